@@ -5,7 +5,7 @@
 #include <cerrno>
 #include <cstddef>
 
-// glibc's own allocator, below the names that are replaced here.
+// The allocator of glibc under the names that are not replaced here.
 extern "C" {
 void* __libc_malloc(std::size_t size);                           // NOLINT(readability-identifier-naming)
 void* __libc_calloc(std::size_t count, std::size_t size);        // NOLINT(readability-identifier-naming)
@@ -43,7 +43,7 @@ void free(void* block) {
   count();
   __libc_free(block);
 }
-// operator new with an alignment ends in one of these.
+// operator new with an alignment calls one of these.
 void* memalign(std::size_t alignment, std::size_t size) {
   count();
   return __libc_memalign(alignment, size);

@@ -5,11 +5,11 @@
 
 namespace tendon {
 
-/// Counts every heap call of the calling thread while it lives: malloc, calloc, realloc, free, their aligned forms
-/// (aligned_alloc, posix_memalign, memalign), and everything that ends in them (new, delete, std::string …). Tests that
-/// the haptic thread makes none.
+/// Counts the heap calls of the calling thread during its lifetime: malloc, calloc, realloc, free, aligned_alloc,
+/// posix_memalign, memalign, and everything that calls them (new, delete, std::string). Used to show that the haptic
+/// thread makes none.
 ///
-/// Works by interposing glibc's malloc in this executable: link heap_guard.cc, not into sanitizer builds.
+/// Interposes glibc's malloc in this executable. Link heap_guard.cc to use it, but not in sanitizer builds.
 class HeapGuard {
  public:
   HeapGuard();

@@ -46,8 +46,8 @@ TEST(HeapGuard, SeesAlignedHeapCalls) {
   EXPECT_EQ(posix_memalign(&block, 3, 100), EINVAL);
 }
 
-// The whole haptic thread: device, velocity, controller with every limiter at work, mail, recording ring full
-// and not, faults and rearms.
+// The complete haptic thread: device, velocity estimator, controller with all limiters active, mailboxes, faults and
+// rearms, with the recording ring full and not full.
 TEST(HapticLoop, AMillionStepsMakeNoHeapCall) {
   SimulatedDevice::Config hand = find_device_profile("falcon")->device();
   hand.hand =
@@ -86,7 +86,7 @@ TEST(HapticLoop, AMillionStepsMakeNoHeapCall) {
       now = loop.step(now);
       calls += guard.calls();
     }
-    while (i > 500'000) {  // the log thread takes part only then: until there the ring is full
+    while (i > 500'000) {  // the log thread only runs in the second half, so the ring is full before
       const StepRecord* step = mail->steps.front();
       if (step == nullptr) break;
       if (step->reasons.has(Reason::kEnergy)) ++limited;
@@ -97,7 +97,7 @@ TEST(HapticLoop, AMillionStepsMakeNoHeapCall) {
   EXPECT_GT(limited, 500U);
 }
 
-// Four leaders that engage, clutch, fall silent and are given other shares.
+// Four leaders engage, clutch, stop sending, and change their shares.
 TEST(HapticLoop, OfAFollowerWithFourLeadersMakesNoHeapCall) {
   SimulatedDevice device(find_device_profile("falcon")->device());
   HapticLoop::Config config;
@@ -119,7 +119,7 @@ TEST(HapticLoop, OfAFollowerWithFourLeadersMakesNoHeapCall) {
   LocalTime now(std::chrono::seconds(1));
   for (std::uint64_t n = 1; n <= 20'000; ++n) {
     for (std::uint32_t i = 0; i < 4; ++i) {
-      if (n % 3000 > 2500 && i == n / 3000 % 4) continue;  // silent
+      if (n % 3000 > 2500 && i == n / 3000 % 4) continue;  // stops sending
       PortState peer;
       peer.epoch = 5 + i;
       peer.sequence = n;
@@ -153,7 +153,7 @@ TEST(HapticLoop, OfAFollowerWithFourLeadersMakesNoHeapCall) {
   EXPECT_GT(engaged, 20'000U);
 }
 
-// Every part of the safety layer, armed, at fault, unarmed.
+// All parts of the safety layer, armed, faulted and disarmed.
 TEST(SafeDevice, MakesNoHeapCallWhateverHappens) {
   SimulatedDevice::Config still = find_device_profile("falcon")->device();
   still.hand = OperatorHand::Config{
@@ -184,7 +184,7 @@ TEST(SafeDevice, MakesNoHeapCallWhateverHappens) {
   EXPECT_GT(safe.times_armed(), 20U);
 }
 
-// Every law of the catalogue, every part of AOL+, every way to follow the hand between two forces.
+// All laws of the catalogue, all parts of AOL+, and all ways to extrapolate between two forces.
 TEST(HapticController, NoLawAndNoPartMakesAHeapCallInTheLoop) {
   for (const LawInfo& law : laws()) {
     for (int between = 0; between < 4; ++between) {

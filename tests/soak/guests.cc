@@ -23,7 +23,7 @@ namespace tendon::soak {
 
 namespace {
 
-constexpr Duration kLook = std::chrono::milliseconds(100);  ///< so often a thread sees that it is to stop
+constexpr Duration kLook = std::chrono::milliseconds(100);  ///< threads check this often whether to stop
 
 ForceClient::Config observer(const std::string& name) {
   ForceClient::Config config;
@@ -32,15 +32,15 @@ ForceClient::Config observer(const std::string& name) {
   return config;
 }
 
-/// One turn, at the latest when the client wants it.
+/// Takes one turn, then waits for the next one or a datagram, at most kLook.
 template <class Transport>
 void turn(ForceClient& client, Transport& transport) {
   const LocalTime due = client.turn(clock::now());
   transport.wait(std::min<Duration>(due - clock::now(), kLook));
 }
 
-/// A guest's socket at one of kHomes addresses of this machine, 127.1.0.1 and up: a server lets a handful of guests a
-/// second come from one address (HelloLimit).
+/// A socket at one of kHomes local addresses (127.1.0.1 and up). HelloLimit only accepts a few clients per second
+/// from one address.
 class Home : public Link {
  public:
   static constexpr std::uint64_t kHomes = 200;
@@ -88,11 +88,11 @@ class Home : public Link {
   int socket_;
 };
 
-/// What a state may say, from those before it.
+/// Checks each state against those before it.
 class Promises {
  public:
   std::optional<std::string> broken(const DeviceState& state) {
-    // A state that was not seen may have been an overrun's.
+    // If a state was missed, it may have reported an overrun.
     const bool next = tick_ != 0 && state.tick == tick_ + 1;
     tick_ = state.tick;
     excused_ = state.energy < 0 && (excused_ || !next || Reasons::from_bits(state.reasons).has(Reason::kOverrun));

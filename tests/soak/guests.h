@@ -14,8 +14,8 @@
 
 namespace tendon::soak {
 
-/// Observers that come, see one state, say Bye and come again from another port: `in_all` times, evenly over
-/// `duration`, from `threads` threads. A server that leaks anything per session leaks it that often.
+/// Observers that connect, receive one state, send Bye and reconnect from another port. They do so `in_all` times,
+/// evenly over `duration`, from `threads` threads. This multiplies any leak per session.
 class Reconnecting {
  public:
   Reconnecting(const Address& server, std::uint64_t in_all, Duration duration, int threads);
@@ -24,8 +24,8 @@ class Reconnecting {
   Reconnecting& operator=(const Reconnecting&) = delete;
 
   void stop();
-  std::uint64_t sessions() const noexcept { return sessions_; }  ///< that showed a state
-  std::uint64_t vain() const noexcept { return vain_; }          ///< attempts in which none came within kPatience
+  std::uint64_t sessions() const noexcept { return sessions_; }  ///< sessions that received a state
+  std::uint64_t vain() const noexcept { return vain_; }          ///< attempts without a state within kPatience
 
  private:
   static constexpr Duration kPatience = std::chrono::seconds(10);
@@ -37,8 +37,8 @@ class Reconnecting {
   std::vector<std::thread> threads_;
 };
 
-/// An observer that stays, and holds each state against what a server promises: numbers that are finite, a force within
-/// the limiter's bound, an account that falls below −1 nJ only after an overrun.
+/// A permanent observer that checks each state: all values are finite, the force is within the limiter's bound, and
+/// the energy account is below −1 nJ only after an overrun.
 class Watching {
  public:
   explicit Watching(const Address& server);
@@ -50,7 +50,7 @@ class Watching {
   std::uint64_t states() const noexcept { return states_; }
   std::uint64_t sessions() const noexcept { return sessions_; }
   Duration longest_silence() const noexcept { return Duration(longest_silence_); }
-  /// In words, the first one; empty when there is none.
+  /// The first violation, in words.
   std::optional<std::string> broken() const;
 
  private:

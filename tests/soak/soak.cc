@@ -61,14 +61,14 @@ std::vector<std::string> operator+(std::vector<std::string> words, const std::ve
 }
 
 constexpr int kVisitors = 8;
-// Growth that still counts as flat.
+// Growth that is still accepted as flat.
 constexpr VitalSigns kGrowth{.resident = std::size_t{1} << 20};
-/// The proxy keeps a socket and statistics for each recent engine; their number varies from second to second.
+/// The proxy keeps a socket and statistics for each recent engine, so their number varies.
 constexpr VitalSigns kProxyGrowth{.resident = std::size_t{4} << 20, .files = 8};
-/// The index of a recording, which its end is to hold: four chunks in a second, of some 200 bytes each.
+/// The index of a recording is held in memory until the end: four chunks per second, about 200 bytes each.
 constexpr std::size_t kIndexBytesPerSecond = 1024;
 
-/// A program whose output goes to a file (`log`). Ending before `stop` is noticed as a failure.
+/// A program whose output goes to the file `log`. It is a failure if it ends before stop().
 class Program {
  public:
   Program(const std::string& name, const std::vector<std::string>& arguments, const std::filesystem::path& folder,
@@ -85,13 +85,13 @@ class Program {
     process_->signal(SIGKILL);
     process_->wait();
   }
-  /// By SIGTERM; its exit code.
+  /// Sends SIGTERM. Returns the exit code.
   int stop() {
     process_->signal(SIGTERM);
     return process_->wait();
   }
 
-  /// The first line in the log that holds `text`, as soon as there is one.
+  /// Waits for the first line in the log that contains `text`.
   std::string line(const std::string& text) const {
     for (const LocalTime end = clock::now() + e2e::kPatience; clock::now() < end;
          std::this_thread::sleep_for(std::chrono::milliseconds(20))) {
@@ -99,7 +99,7 @@ class Program {
     }
     throw std::runtime_error(name_ + " did not say " + text + "; see " + log_.string());
   }
-  /// As line(), now.
+  /// As line(), without waiting.
   std::optional<std::string> said(const std::string& text) const {
     std::ifstream file(log_);
     for (std::string line; std::getline(file, line);) {
@@ -114,7 +114,7 @@ class Program {
   std::unique_ptr<e2e::Process> process_;
 };
 
-/// A disk that is soon full; none without the right to mount.
+/// A small tmpfs, which a recording fills quickly. Empty without the right to mount.
 class SmallDisk {
  public:
   explicit SmallDisk(std::filesystem::path path) : path_(std::move(path)) {
@@ -134,7 +134,7 @@ class SmallDisk {
   bool mounted_ = false;
 };
 
-/// Processes that only burn time.
+/// Processes that keep all processors busy.
 class Hogs {
  public:
   ~Hogs() { stop(); }
@@ -163,7 +163,7 @@ class Hogs {
   std::vector<pid_t> pids_;
 };
 
-/// Truncates a log while its program writes to it; returns its former length.
+/// Truncates a log while its program writes to it. Returns the previous size.
 std::uint64_t rotate(const std::filesystem::path& log) {
   const std::uint64_t size = std::filesystem::file_size(log);
   std::filesystem::copy_file(log, log.string() + ".1", std::filesystem::copy_options::overwrite_existing);
@@ -171,7 +171,7 @@ std::uint64_t rotate(const std::filesystem::path& log) {
   return size;
 }
 
-/// A program that must stay flat.
+/// A program whose vital signs must stay flat.
 struct Watched {
   Watched(std::string the_name, std::unique_ptr<Program> the_program, const VitalSigns& the_growth)
       : name(std::move(the_name)), program(std::move(the_program)), growth(the_growth) {}
@@ -182,7 +182,6 @@ struct Watched {
   std::vector<VitalSigns> looks{};
 };
 
-/// One whole run: its programs and its report.
 class Run {
  public:
   explicit Run(const Config& config)
@@ -210,7 +209,7 @@ class Run {
     const LocalTime start = clock::now();
     const LocalTime end = start + config_.duration;
     const Address server = parse_address(address(*server_));
-    // Visitors finish a little before the end, so that the last sample sees a resting server.
+    // The visitors finish a little early, so that the last sample shows an idle server.
     Reconnecting visitors(server, config_.reconnects, config_.duration * 9 / 10, kVisitors);
     Watching watcher(server);
     LocalTime next_look = start;
@@ -247,14 +246,14 @@ class Run {
   static constexpr Duration kRough = std::chrono::seconds(7);
   static constexpr Duration kLook = std::chrono::seconds(1);
 
-  /// An upper bound of a program's life, should this one be killed.
+  /// Limits the lifetime of the programs in case this one is killed.
   std::vector<std::string> own_end() const {
     return {"--duration-s", std::to_string(static_cast<int>(seconds(config_.duration)) + 300)};
   }
   Program* watch(const std::string& name, std::unique_ptr<Program> program, const VitalSigns& growth) {
     return watched_.emplace_back(name, std::move(program), growth).program.get();
   }
-  /// A server, in a folder of its own, with a wall clock that is wrong.
+  /// Starts a server in its own folder with a manipulated wall clock.
   Program* tendond(const std::string& name, const std::vector<std::string>& more, const VitalSigns& growth) {
     const std::filesystem::path folder = config_.folder / name;
     std::filesystem::create_directories(folder);
@@ -281,7 +280,7 @@ class Run {
     return true;
   }
 
-  /// The engine comes or is killed.
+  /// Starts or kills the engine.
   void flap(LocalTime now) {
     if (now < next_flap_) return;
     if (engine_) {
@@ -330,8 +329,8 @@ class Run {
                                     .threads = watched.looks.back().threads});
       }
       const int code = watched.program->stop();
-      // Exit code 1: with so many hogs the proxy missed release times, and what a full disk did not take is missing;
-      // both say so.
+      // Exit code 1 is allowed: under this load the proxy misses release times, and the full disk loses data. Both
+      // programs report it.
       const bool may_miss = watched.program.get() == proxy_ || watched.program.get() == full_;
       if (code != 0 && !(code == 1 && may_miss)) {
         broken(watched.name + ": exit code " + std::to_string(code));
@@ -355,9 +354,9 @@ class Run {
   std::string scene_;
   std::string clock_file_;
   std::vector<Watched> watched_;
-  Program* server_ = nullptr;  ///< of `watched_`, as the next ones
+  Program* server_ = nullptr;  ///< owned by `watched_`, as the next ones
   Program* proxy_ = nullptr;
-  Program* full_ = nullptr;  ///< null where no disk could be mounted
+  Program* full_ = nullptr;  ///< null if no disk could be mounted
   std::unique_ptr<Program> engine_;
   std::string through_;
   Hogs hogs_;

@@ -10,21 +10,22 @@
 
 namespace tendon::soak {
 
-/// A process's memory, files and threads at one moment, from /proc/PID.
+/// Memory, files and threads of a process, from /proc/PID.
 struct VitalSigns {
   std::size_t resident = 0;  ///< bytes in memory
   std::size_t files = 0;     ///< open descriptors
   std::size_t threads = 0;
 };
 
-/// Empty when there is no such process any more.
+/// Returns nullopt if the process does not exist.
 std::optional<VitalSigns> vital_signs(pid_t process);
 
-/// Checks that a process stays flat over equal spans of a run; the first fifth is warm-up.
+/// Checks that a process does not grow. The first fifth of the samples is warm-up; flat means
 ///
-///     most of the last two fifths ≤ most of the second and third + `growth`
+///     max(last two fifths) ≤ max(second and third fifth) + `growth`
 ///
-/// Returns a sentence naming the first that grows; empty when none does or with fewer than ten samples.
+/// Returns a sentence that names the first value that grows. Returns nullopt if none does or if there are fewer than
+/// ten samples.
 std::optional<std::string> not_flat(const std::string& name, const std::vector<VitalSigns>& looks,
                                     const VitalSigns& growth);
 

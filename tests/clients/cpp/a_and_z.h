@@ -17,15 +17,15 @@
 #include "protocol/link.h"
 #include "protocol/session.h"
 
-// Two ends and what lies between them, on virtual time: A is the guest under test, Z a server written
-// out by hand from the protocol's own parts, and the network loses and delays by one seed.
+// A client (A), a server (Z) and a network between them on virtual time. A is the ForceClient under test. Z is
+// assembled from the parts of the protocol. The network loses and delays datagrams according to a seed.
 
 namespace tendon::a_and_z {
 
 inline const Address a_address = parse_address("127.0.0.2:50000");
 inline const Address z_address = parse_address("127.0.0.1:47100");
 
-/// Loses, delays and (by its jitter) reorders. The delay must be above zero.
+/// Loss, delay and jitter of the network; the jitter reorders datagrams. The delay must be above zero.
 struct Weather {
   double loss = 0.05;
   Duration delay = std::chrono::milliseconds(5);
@@ -33,7 +33,7 @@ struct Weather {
 };
 inline constexpr Weather kFineWeather{.loss = 0, .delay = std::chrono::milliseconds(5), .jitter = Duration::zero()};
 
-/// A force that identifies the state that it answers.
+/// The force depends on the state, so a test can tell which state an answer belongs to.
 inline Vec3 answer(const DeviceState& hand) { return -100 * hand.position; }
 
 class Network {
@@ -42,9 +42,9 @@ class Network {
 
   void set(Weather weather) { weather_ = weather; }
   void send(LocalTime now, const Address& from, const Address& to, std::span<const std::byte> bytes);
-  /// The next datagram for `to` that is due at `now`; 0 when none.
+  /// Returns the size of the next datagram for `to` that is due at `now`, or 0.
   std::size_t receive(LocalTime now, const Address& to, Address& from, std::span<std::byte> buffer);
-  /// What nobody has taken when it arrived is gone: there was no socket.
+  /// Drops the datagrams that have arrived while no socket was open.
   void drop_arrived(LocalTime now);
   LocalTime next_arrival() const { return flying_.empty() ? LocalTime::max() : flying_.begin()->first; }
 
@@ -61,7 +61,7 @@ class Network {
   std::multimap<LocalTime, Datagram> flying_;
 };
 
-/// One end's view of the network. Its time is the world's.
+/// The link of one peer.
 class Port : public Link {
  public:
   Port(Network& network, const LocalTime& now, Address self) : network_(network), now_(now), self_(self) {}
@@ -81,35 +81,33 @@ class Port : public Link {
   Address self_;
 };
 
-/// Z: one guest at a time, the newest one; states of a hand that moves along a known path.
+/// Z serves one client at a time, the newest. The simulated hand moves along a known path.
 class Server {
  public:
   Server(Link& link, std::uint8_t secret) : link_(link), doorman_(doorman_config(secret)) {}
 
   LocalTime turn(LocalTime now);
-  /// The position of the hand at a tick, m.
   static Vec3 position(std::uint64_t tick) { return {1e-3 * static_cast<double>(tick), 0, -1}; }
   void say_bye(LocalTime now, Code code);
-  /// Of the open session.
   const LinkStats& link_stats() const { return session_->stats(); }
 
-  std::optional<Refused> refusal;  ///< set: everybody is refused with it
-  bool features = true;            ///< agree to whatever is offered, or to nothing
+  std::optional<Refused> refusal;  ///< if set, every client is refused with it
+  bool features = true;            ///< whether the offered features are accepted
   static constexpr int kLoopHz = 1000;
   int state_hz = kLoopHz;
-  std::optional<Turning> turning;  ///< of the handle, in each state
-  std::uint64_t press_every = 0;   ///< ticks: button 1 is held in one state of so many, unless 0
+  std::optional<Turning> turning;  ///< of the handle, sent in each state
+  std::uint64_t press_every = 0;   ///< button 1 is pressed in one of this many states; 0: never
 
-  std::vector<Code> lease_answers;  ///< to take_lease, in this order; then kOk
-  int snatches = 0;                 ///< so many leases are another one's as soon as they are given
+  std::vector<Code> lease_answers;  ///< answers to take_lease in order, then kOk
+  int snatches = 0;                 ///< number of leases that another client takes at once
 
-  std::vector<LocalTime> attempts;  ///< when Hellos with a good cookie came, one per attempt
-  std::vector<Hello> hellos;        ///< … and what they said
+  std::vector<LocalTime> attempts;  ///< one entry for each Hello with a valid cookie
+  std::vector<Hello> hellos;
   std::vector<std::pair<LocalTime, ForceCommand>> forces;
-  std::vector<Request> requests;  ///< but for descriptions: everybody asks for those
-  std::optional<Code> closed;     ///< how the last session ended
+  std::vector<Request> requests;  ///< requests except those for descriptions
+  std::optional<Code> closed;     ///< reason for which the last session ended
   int welcomes = 0;
-  std::uint64_t tick = 0;  ///< of the newest state sent
+  std::uint64_t tick = 0;
 
  private:
   static Doorman::Config doorman_config(std::uint8_t secret) {
@@ -131,7 +129,7 @@ class Server {
   LocalTime next_state_{};
 };
 
-/// A, Z and the network, turned in the order of their next wake-up.
+/// Advances A, Z and the network in the order of their next wake-ups.
 class World {
  public:
   explicit World(std::uint64_t seed, Weather weather = {})
@@ -145,11 +143,10 @@ class World {
   void connect(ForceClient::Config config, Callback callback) {
     a.emplace(a_port, z_address, config, std::move(callback), now);
   }
-  /// Lets time pass.
   void run(Duration length);
-  /// Lets time pass until A is in `phase`; false when it is not within `limit`.
+  /// Runs until A is in `phase`. Returns false after `limit`.
   bool run_until(ForceClient::Phase phase, Duration limit);
-  /// Z dies without a word and comes back with another secret.
+  /// Stops Z without a Bye and starts it with a different secret.
   void restart_server() {
     kill_server();
     z.emplace(z_port, std::uint8_t{2});
@@ -160,7 +157,7 @@ class World {
  private:
   void turn();
   LocalTime next() const;
-  /// To the next wake-up. Throws std::logic_error when time stands still.
+  /// Advances to the next wake-up. Throws std::logic_error if it is not later than now.
   void advance();
 
   Network network_;

@@ -70,7 +70,7 @@ TEST(ForceClient, ShowsThePhysicsTheNewestStateOnly) {
   world.run(5 * kSecond);
   ASSERT_GT(seen.size(), 90U);
   EXPECT_TRUE(std::is_sorted(seen.begin(), seen.end(), std::less_equal<>())) << "a state came back, or came twice";
-  // The youngest of the last 35 states takes little more than the constant delay; a queue would take 35 ms and more.
+  // The newest of the last 35 states is little older than the constant delay. A queue would add 35 ms or more.
   EXPECT_LE(behind, 30U);
   const ForceClient::Stats stats = world.a->stats();
   EXPECT_EQ(stats.states, seen.size() + stats.states_skipped + 1) << "the +1 still waits for its turn";
@@ -85,7 +85,7 @@ TEST(ForceClient, OfStatesThatArriveTogetherOnlyTheNewestIsComputed) {
   });
   ASSERT_TRUE(world.run_until(Phase::kOpen, kSecond));
   world.run(kSecond);
-  // A does nothing for 50 ms, as if its physics had computed for so long.
+  // A is blocked for 50 ms, as by a long computation.
   const ForceClient::Stats before = world.a->stats();
   const int calls_before = calls;
   const LocalTime end = world.now + milliseconds(50);
@@ -147,8 +147,7 @@ TEST(ForceClient, NumbersTheForcesWithoutAGap) {
   for (std::size_t i = 0; i < world.z->forces.size(); ++i) EXPECT_EQ(world.z->forces[i].second.sequence, i + 1);
 }
 
-// The work of the physics lies between the two turns; a time stamp from before it would hide it.
-// An engine that computes elsewhere: its callback knows no force, and the answer comes later.
+// An engine that computes asynchronously: the callback returns no force, and the answer is sent later.
 TEST(ForceClient, ALaterAnswerIsSentUnlessANewerStateWasAnswered) {
   World world(24, kFineWeather);
   std::vector<Seen> seen;
@@ -482,7 +481,7 @@ TEST(ForceClient, RefusesAnImpossibleConfigurationByFieldValueAndExpectation) {
   EXPECT_EQ(complaint({.max_datagrams = 0}), "max_datagrams = 0: expected 1 or more");
 }
 
-/// A socket that is read a little after the turn has begun, as every real one is.
+/// A link that stamps a datagram a little after the turn has begun, as real sockets do.
 class LateLink : public Link {
  public:
   explicit LateLink(Link& link) : link_(link) {}
@@ -518,9 +517,9 @@ TEST(ForceClient, AForceLeavesInTheTurnThatHasComputedIt) {
     return answer(hand);
   });
   ASSERT_TRUE(world.run_until(Phase::kOpen, kSecond));
-  world.run(kSecond);  // the descriptions have come
+  world.run(kSecond);  // the descriptions have arrived
   int answers = 0;
-  for (int i = 0; i < 1000; ++i) {  // Z turns once a millisecond
+  for (int i = 0; i < 1000; ++i) {  // Z takes one turn per millisecond
     world.now += milliseconds(1);
     world.z->turn(world.now);
     const int sent_before = world.a_port.sent;
@@ -533,7 +532,7 @@ TEST(ForceClient, AForceLeavesInTheTurnThatHasComputedIt) {
   EXPECT_GT(answers, 900);
 }
 
-/// A link with a clock that the callback lets run.
+/// A link whose clock the callback can advance.
 class ClockedLink : public Link {
  public:
   ClockedLink(Link& link, const LocalTime& clock) : link_(link), clock_(clock) {}

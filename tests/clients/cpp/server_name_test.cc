@@ -50,7 +50,7 @@ TEST(ServerName, LocalhostIsThisMachine) {
 }
 
 TEST(ServerName, TheSystemLooksAHostNameUp) {
-  // Neither numeric nor "localhost" as parse_address() reads them: /etc/hosts answers.
+  // parse_address() only accepts numeric addresses and "localhost" in lower case, so /etc/hosts is used.
   const auto addresses = ServerName("LOCALHOST:47100").look_up().addresses;
   ASSERT_FALSE(addresses.empty());
   for (const Address& address : addresses) {

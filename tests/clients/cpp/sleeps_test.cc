@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// How often a guest on real sockets sleeps. Sleeps are counted, not timed.
+// Counts how often a client on real sockets sleeps.
 #include <gtest/gtest.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
@@ -21,7 +20,7 @@ namespace {
 
 using std::chrono::milliseconds;
 
-/// Z at a real socket, with states at 1 kHz, on a thread of its own.
+/// Z on a real socket and its own thread. It sends states at 1 kHz.
 class Server {
  public:
   Server()
@@ -36,7 +35,7 @@ class Server {
   Server& operator=(const Server&) = delete;
 
   Address address() const { return link_.local_address(); }
-  /// Forces that came. Ends the thread.
+  /// Stops the thread. Returns the number of forces received.
   std::uint64_t forces() {
     end();
     return z_.forces.size();
@@ -54,7 +53,7 @@ class Server {
   std::thread thread_;
 };
 
-/// Times that this thread has gone to sleep; losing the processor to another one is none.
+/// Voluntary context switches of this thread. Preemption is not counted.
 std::uint64_t sleeps() {
   rusage usage{};
   ::getrusage(RUSAGE_THREAD, &usage);
@@ -79,7 +78,7 @@ TEST(Sleeps, AGuestSleepsOnceForEachStateThatItAnswers) {
   const std::uint64_t slept = sleeps() - before;
   const std::uint64_t forces = server.forces();
   ASSERT_GT(forces, 20U);
-  constexpr std::uint64_t kOthers = 60;  // the handshake, the answers to its questions, keep-alives
+  constexpr std::uint64_t kOthers = 60;  // the handshake, its answers, keep-alives
   EXPECT_LE(slept, forces + kOthers) << "a sleep between a state and its force would double them";
 }
 
@@ -97,7 +96,7 @@ TEST(Sleeps, ABusyGuestNeverSleepsAndStillEndsInTime) {
 TEST(Sleeps, ABusyGuestHasItsTimersServed) {
   Options options;
   options.client.name = "wall";
-  options.server = "127.0.0.1:9";  // nobody is there
+  options.server = "127.0.0.1:9";  // no server is there
   options.client.patience = options.client.retry_min = options.client.retry_max = milliseconds(5);
   options.duration = milliseconds(200);
   options.busy = true;

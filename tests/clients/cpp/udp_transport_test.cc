@@ -17,7 +17,7 @@
 namespace tendon::udp_transport_test {
 namespace {
 
-/// A plain socket on loopback. Datagrams to loopback have arrived when send() returns.
+/// A plain socket on loopback. A datagram to loopback has arrived when send() returns.
 class Z {
  public:
   Z() : fd_(::socket(AF_INET, SOCK_DGRAM, 0)) {
@@ -36,7 +36,7 @@ class Z {
     fd_ = -1;
   }
   Address address() const { return parse_address("127.0.0.1:" + std::to_string(port_)); }
-  /// The size of the datagram that has come, and remembers its sender.
+  /// Returns the size of the next datagram and remembers its sender.
   ssize_t receive() {
     std::array<char, kMaxDatagram> buffer{};
     socklen_t size = sizeof guest_;
@@ -65,12 +65,12 @@ class Z {
 
 constexpr std::array<std::byte, 8> kWords{};
 
-/// Of this process, the one that reads the folder among them.
+/// Includes the descriptor that reads the folder.
 std::ptrdiff_t open_files() {
   return std::distance(std::filesystem::directory_iterator("/proc/self/fd"), std::filesystem::directory_iterator());
 }
 
-// An epoll that watched it would cost each datagram a wake-up for nobody.
+// An epoll instance that watched the socket would cost an additional wake-up for each datagram.
 TEST(UdpTransport, HasASocketAndNoOtherFile) {
   Z z;
   const std::ptrdiff_t before = open_files();
@@ -162,12 +162,12 @@ TEST(UdpTransport, WaitsForAnyOfSeveral) {
   far.receive();
   far.reply(3);
   const std::array<UdpTransport*, 2> both{&to_near, &to_far};
-  UdpTransport::wait_for_any(both, std::chrono::hours(1));  // ends at once, or never
+  UdpTransport::wait_for_any(both, std::chrono::hours(1));  // returns at once, or the test hangs
   Address from;
   std::array<std::byte, kMaxDatagram> buffer{};
   EXPECT_EQ(to_near.receive(from, buffer), 0U);
   EXPECT_EQ(to_far.receive(from, buffer), 3U);
-  UdpTransport::wait_for_any(both, Duration::zero());  // nothing is left, and it does not wait
+  UdpTransport::wait_for_any(both, Duration::zero());  // nothing is left to read
 }
 
 TEST(UdpTransport, HearsNobodyButItsServer) {
@@ -179,7 +179,6 @@ TEST(UdpTransport, HearsNobodyButItsServer) {
   UdpTransport b(stranger.address());
   b.send(stranger.address(), kWords);
   stranger.receive();
-  // The stranger learns A's port and writes to it.
   const_cast<sockaddr_in&>(stranger.guest()) = z.guest();
   stranger.reply(20);
   std::array<std::byte, kMaxDatagram> buffer{};

@@ -113,7 +113,7 @@ struct Said {
   bool json = false;
 };
 
-/// Returns the error message for these words, "none" or "help".
+/// Returns the error message, "none" or "help".
 std::string refusal(std::vector<const char*> words) {
   Said said;
   CLI::App app("A tool (1,5)", "tool");

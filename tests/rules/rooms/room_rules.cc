@@ -29,15 +29,15 @@ struct Room {
   Names may_include;
 };
 
-/// `tests` is not here: it may see all.
+/// `tests` is not listed because it may include everything.
 const std::vector<Room>& rooms() {
   static const std::vector<Room> kRooms = {
       {"core", {"core"}},
       {"protocol", {"protocol", "core"}},
       {"devices", {"devices", "core"}},
       {"server", {"server", "protocol", "core", "devices"}},
-      // A guest sees the types of core through the headers of protocol, its own folder, and the library for guests in
-      // C++, clients/cpp; not another guest.
+      // A client may include its own folder, clients/cpp, and the headers of protocol, which also provide the types
+      // of core. It may not include other clients.
       {"clients", {"protocol"}},
   };
   return kRooms;
@@ -54,7 +54,7 @@ const Names kAtTheRoot = {".ci",          ".dockerignore",  ".clang-format",    
 const Names kForAllRooms = {"core/base/arithmetic.h", "core/base/nearest_word.h", "core/exchange/latest.h",
                             "clients/cpp/usage.h", "server/machine/output.h"};
 
-/// Paths that end with a slash are folders; those that begin with a star are endings.
+/// Paths that end with a slash are folders. Paths that begin with a star are suffixes.
 struct Door {
   std::string_view library;
   Names headers;
@@ -64,7 +64,7 @@ struct Door {
 const std::vector<Door>& front_doors() {
   static const std::vector<Door> kDoors = {
       {"Asio", {"asio.hpp", "asio/"}, {"server/machine/udp_link.cc", "clients/cpp/udp_transport.cc"}},
-      // HTTP and WebSockets of a process of its own, which is not the haptic one.
+      // HTTP and WebSockets, only in processes without a haptic thread.
       {"Boost.Beast and Boost.Asio",
        {"boost/"},
        {"clients/dashboard/server_socket.h", "clients/dashboard/web_server.cc",
@@ -73,13 +73,13 @@ const std::vector<Door>& front_doors() {
       {"CLI11",
        {"CLI/"},
        {"server/main.cc", "clients/cpp/options.cc", "clients/cpp/usage.h", "clients/cpp/usage.cc", "*_main.cc"}},
-      // DDS, and the types that idlc makes of ros2_types.idl.
+      // DDS and the types that idlc generates from ros2_types.idl.
       {"Cyclone DDS", {"dds/", "ros2_types.h"}, {"clients/plug/ros2/ros2_node.cc"}},
       {"Eigen", {"Eigen/"}, {"core/", "protocol/", "devices/", "server/", "clients/"}},
       {"Eigen's tree of boxes", {"unsupported/Eigen/BVH"}, {"clients/softbody/effects/self_collision.cc"}},
       {"libsodium", {"sodium.h", "sodium/"}, {"protocol/secrets/crypto.cc", "devices/falcon/firmware.cc"}},
       {"libusb", {"libusb.h", "libusb-1.0/"}, {"devices/usb/with_libusb.cc", "tests/devices/usb/far_usbfs.cc"}},
-      // What programs and their libraries print and pages read: no haptic thread writes JSON.
+      // JSON output of programs and their libraries. The haptic thread writes no JSON.
       {"nlohmann's JSON",
        {"nlohmann/"},
        {"server/commands/", "server/main.cc", "clients/cpp/discovery/list.cc", "clients/cpp/engine/self_test.cc",
@@ -92,7 +92,7 @@ const std::vector<Door>& front_doors() {
       {"protobuf",
        {"google/protobuf/", "*.pb.h"},
        {"server/recording/recording_codec.cc", "clients/dashboard/foxglove_message.cc"}},
-      // The C library's own resolver, for records that getaddrinfo() does not know.
+      // The resolver of the C library, for record types that getaddrinfo() does not support.
       {"libresolv", {"resolv.h"}, {"clients/cpp/discovery/unicast.cc"}},
       {"libsystemd", {"systemd/"}, {"server/machine/announcer.cc", "clients/cpp/discovery/avahi.cc"}},
       {"Spectra", {"Spectra/"}, {"tests/tools/lab/models/spectrum.cc"}},
@@ -104,7 +104,7 @@ const std::vector<Door>& front_doors() {
   return kDoors;
 }
 
-/// What the standard library offers to mathematics: no thread, no lock, no clock, no file, no stream, no randomness.
+/// Standard headers for mathematics. Threads, locks, clocks, files, streams and random numbers are excluded.
 const std::set<std::string_view> kStandardForCore = {
     "algorithm",   "array",    "atomic",      "bit",       "bitset",     "cassert",
     "cfloat",      "charconv", "cmath",       "compare",   "complex",    "concepts",
@@ -114,7 +114,7 @@ const std::set<std::string_view> kStandardForCore = {
     "string_view", "tuple",    "type_traits", "utility",   "variant",    "vector",
     "version"};
 
-/// protocol does no input or output, waits for nothing and is used by one thread at a time.
+/// protocol does no I/O, never blocks, and is used by one thread at a time.
 const std::set<std::string_view> kNotForProtocol = {
     "condition_variable", "fcntl.h",   "filesystem",   "fstream", "future",  "iostream", "mutex", "netdb.h", "poll.h",
     "pthread.h",          "semaphore", "shared_mutex", "thread",  "unistd.h"};
@@ -125,36 +125,23 @@ const std::set<std::string_view> kSystemHeaders = {"dlfcn.h",  "elf.h",    "fcnt
                                                    "sched.h",  "signal.h", "spawn.h", "unistd.h"};
 const Names kSystemFolders = {"arpa/", "linux/", "net/", "netinet/", "sys/"};
 
-/// Work of the thread beside the answers may still run when the model that asked for it is gone, or end before it: neither
-/// can own what both touch.
+/// The background thread may outlive the model that gave it work, or end earlier, so both share ownership of the
+/// data.
 const Names kSharedWithAThread = {"clients/softbody/near/near_model.cc", "clients/softbody/near/near_model.h",
                                   "server/machine/output.cc"};
 
-/// The threads of the server and of the client library wait and read the clock once for each turn, and their sockets
-/// when they have received something; everybody else is told the time. tests/core/base/time_test.cc shows that the time
-/// types of core have no now().
-const Names kClockReaders = {"server/machine/clock.h",
-                             "server/machine/clock.cc",
-                             "server/machine/log.cc",
-                             "server/server.cc",
-                             "server/machine/udp_link.cc",
-                             "clients/cpp/machine.h",
-                             "clients/cpp/machine.cc",
-                             "clients/plug/chai3d/hd_phantom.cc",  // in a stranger's process, whose threads call it
-                             "clients/softbody/softbody_main.cc",
-                             "tests/clients/softbody/bench.cc",
-                             "tests/clients/softbody/bullet_block.cc",
-                             "tests/tools/bench/",
-                             "tests/e2e/",
-                             "tests/realtime/",
-                             "tests/soak/",
-                             "tests/devices/usb/",
-                             "tests/core/base/time_test.cc",
-                             "tests/tools/lab/experiments/meter.cc",
-                             "tests/tools/injector/proxy/real_time.cc",
-                             "tests/tools/conformance/udp_wire.cc",
-                             "tests/tools/conformance/worker_wire.cc",
-                             "*_main.cc"};
+/// Threads of the server and of the client library read the clock once per turn, and their sockets on each receive.
+/// All other code takes the time as a parameter. tests/core/base/time_test.cc checks that the time types of core have
+/// no now().
+const Names kClockReaders = {
+    "server/machine/clock.h", "server/machine/clock.cc", "server/machine/log.cc", "server/server.cc",
+    "server/machine/udp_link.cc", "clients/cpp/machine.h", "clients/cpp/machine.cc",
+    // runs in another program's process, whose threads call it
+    "clients/plug/chai3d/hd_phantom.cc", "clients/softbody/softbody_main.cc", "tests/clients/softbody/bench.cc",
+    "tests/clients/softbody/bullet_block.cc", "tests/tools/bench/", "tests/e2e/", "tests/realtime/", "tests/soak/",
+    "tests/devices/usb/", "tests/core/base/time_test.cc", "tests/tools/lab/experiments/meter.cc",
+    "tests/tools/injector/proxy/real_time.cc", "tests/tools/conformance/udp_wire.cc",
+    "tests/tools/conformance/worker_wire.cc", "*_main.cc"};
 
 /// A path with one of these endings is a citation when its first folder is a room. A page (.md) always is one.
 const Names kCitedSources = {"*.h",  "*.cc",   "*.py",  "*.ts",    "*.mjs",  "*.proto",
@@ -224,7 +211,7 @@ void for_each_comment_and_literal(std::string_view text, const OnComment& commen
     const auto at = text.find(mark, from);
     return at == std::string_view::npos ? text.size() : at + mark.size();
   };
-  // The end of a literal that begins at `from` with `quote`.
+  // Returns the end of a literal that begins at `from` with `quote`.
   const auto end_of_literal = [&](std::size_t from, char quote) {
     auto i = from + 1;
     while (i < text.size() && text[i] != quote && text[i] != '\n') {
@@ -262,7 +249,7 @@ void for_each_comment_and_literal(std::string_view text, const OnComment& commen
       const auto end = end_of_literal(i, '"');
       literal(i + 1, end);
       i = end + 1;
-    } else if (text[i] == '\'' && (i == 0 || !is_name(text[i - 1]))) {  // not the ' of 1'000
+    } else if (text[i] == '\'' && (i == 0 || !is_name(text[i - 1]))) {  // not the digit separator in 1'000
       const auto end = end_of_literal(i, '\'');
       literal(i + 1, end);
       i = end + 1;

@@ -14,7 +14,7 @@ struct File {
   std::string text;
 };
 
-/// One place where a rule is broken, and the rule as a sentence.
+/// A broken rule: where, and the rule as a sentence.
 struct Finding {
   std::string path;
   int line = 1;
@@ -23,29 +23,30 @@ struct Finding {
   friend bool operator==(const Finding&, const Finding&) = default;
 };
 
-/// The rules of the building, read from the text of its files:
+/// Checks the rules about includes and files, from the text of all files:
 ///
-///     clients ──▶ protocol ──▶ core ◀── devices        tests may see all;
-///                     ▲          ▲          ▲          nobody sees server or tests but tests
+///     clients ──▶ protocol ──▶ core ◀── devices        tests may include everything;
+///                     ▲          ▲          ▲          only tests may include server and tests
 ///                     └───────  server  ────┘
 ///
-/// who may include whom; one front door per library; what core and protocol must not know; who may read a clock; what
-/// nobody may use; the licence line; a README.md in every room; nothing at the root that has no place there; no citation
-/// of a file, or of a section of core/PROOFS.md, that does not exist.
-/// The last rule reads pages (but CHANGELOG.md) and comments. The other rules ignore comments and the contents of string
-/// literals. Findings come in the order of `tree`, by line in each file; those about the tree as a whole come last. Empty
-/// when all rules are kept.
+/// The rules cover includes between rooms, the files that may use each library, what core and protocol must not use,
+/// who may read a clock, functions that are forbidden everywhere, the license line, a README.md in each room, files
+/// at the root, and citations of files and of sections of core/PROOFS.md.
+///
+/// The rule about citations reads pages (except CHANGELOG.md) and comments. The others ignore comments and the
+/// contents of string literals. The findings are in the order of `tree` and by line; those about the whole tree are
+/// last.
 std::vector<Finding> check(const std::vector<File>& tree);
 
-/// All files under `root` in the order of their paths, without what is made there and ignored by git (build folders,
-/// caches, packages). Throws std::filesystem::filesystem_error when `root` cannot be read.
+/// Reads all files under `root` in the order of their paths, without those that git ignores (build folders, caches,
+/// packages). Throws std::filesystem::filesystem_error if `root` cannot be read.
 std::vector<File> read_tree(const std::filesystem::path& root);
 
-/// `path:line: rule`, which editors and terminals take for a link.
+/// Returns `path:line: rule`, which editors and terminals turn into a link.
 std::string to_string(const Finding& finding);
 
-/// `text` with every comment, and the inside of every string and character literal, turned into spaces. Lines and
-/// columns stay. The file name of an #include "…" stays too.
+/// Replaces all comments and the contents of string and character literals by spaces. Lines and columns stay the
+/// same. The file name in #include "…" is kept.
 std::string without_comments_and_strings(std::string_view text);
 
 }  // namespace tendon::rooms

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The last test reads this tree. Those before it show that the checker sees what it is there to see: each gives it a
-// small tree in which one rule is broken.
+// The last test checks this tree. The others show that the checker finds what it must find: each passes a small tree
+// in which one rule is broken.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -16,7 +16,7 @@ namespace {
 const std::string kLicence = "// SPDX-License-Identifier: Apache-2.0\n";
 const std::string kHeader = kLicence + "#pragma once\n";
 
-/// "path:line" of everything that is wrong with one file in a tree that is otherwise as it should be.
+/// Returns "path:line" of all findings for one file in an otherwise correct tree.
 std::vector<std::string> places(const std::string& path, const std::string& text) {
   const auto room = path.substr(0, path.find('/'));
   std::vector<std::string> places;

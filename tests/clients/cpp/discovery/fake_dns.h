@@ -13,7 +13,7 @@
 
 namespace tendon::testing {
 
-/// Bytes of DNS (RFC 1035), as strings: what a name server writes, right or wrong.
+/// Builds DNS messages (RFC 1035), valid or malformed.
 namespace dns {
 
 inline constexpr std::uint16_t kPtr = 12;
@@ -21,9 +21,9 @@ inline constexpr std::uint16_t kTxt = 16;
 inline constexpr std::uint16_t kSrv = 33;
 
 std::string two(unsigned value);
-/// The labels of a name, separated by '/': "falcon at 3/_tendon/_udp/example/org".
+/// Encodes the labels of a name, which are separated by '/': "falcon at 3/_tendon/_udp/example/org".
 std::string name(std::string_view labels);
-/// A record of the name that was asked for.
+/// Encodes a record that belongs to the name in the question.
 std::string record(std::uint16_t type, const std::string& data);
 std::string srv(unsigned priority, unsigned weight, unsigned port, const std::string& target);
 
@@ -32,15 +32,15 @@ struct Question {
   std::string bytes;  ///< name, type, class
   std::uint16_t type;
 };
-/// An answer with these records; `flags` are the second 16 bits: 0x8180 no error, 0x8183 no such name, 0x8380 cut.
+/// Encodes an answer with these records. `flags` is 0x8180 (no error), 0x8183 (no such name) or 0x8380 (truncated).
 std::string answer(const Question& question, const std::vector<std::string>& records, unsigned flags = 0x8180);
 
 }  // namespace dns
 
-/// A name server on loopback, by UDP and TCP on one port, with a thread of its own.
+/// A name server on loopback with UDP and TCP on the same port. It has its own thread.
 class FakeDns {
  public:
-  /// What it answers; an empty string: nothing.
+  /// Returns the answer; empty: no answer.
   using Answer = std::function<std::string(const dns::Question&, bool tcp)>;
   explicit FakeDns(Answer answer);
   ~FakeDns();

@@ -9,8 +9,6 @@
 #include "tests/clients/cpp/discovery/fake_dns.h"
 #include "tests/support/refusal.h"
 
-// Records of name servers, from one on loopback that says right things and wrong ones.
-
 namespace tendon::dns_sd::unicast_test {
 namespace {
 
@@ -23,7 +21,7 @@ const std::string kText =
     "device=falcon\x07"
     "hz=1000";
 
-/// What a name server that has the falcon says.
+/// The answers of a name server that knows the device "falcon".
 std::string sound(const Question& question, bool /*tcp*/) {
   if (question.type == kSrv) return answer(question, {srv(0, 0, 47100, name("localhost"))});
   if (question.type == kTxt) return answer(question, {record(kTxt, kText)});
@@ -44,7 +42,7 @@ TEST(UnicastDiscovery, FindsHostPortAndText) {
       return sound(question, tcp);
     });
     found = resolve_by_dns(kFalcon, server.address());
-  }  // ends the thread of the server, which wrote what was asked
+  }  // joins the server's thread, which writes the recorded questions
   ASSERT_EQ(found.size(), 1U);
   EXPECT_EQ(found[0].host, "localhost");
   EXPECT_EQ(found[0].port, 47100);
@@ -111,13 +109,14 @@ TEST(UnicastDiscovery, AnAnswerToAnotherQuestionIsNone) {
 }
 
 TEST(UnicastDiscovery, NamesThatPointAtEachOtherLeadNowhere) {
-  // The target of the SRV record begins with a pointer to itself: header, question, 12 bytes of the record, 6 of its data.
+  // The target of the SRV record is a pointer to itself: header, question, 12 bytes of record header, 6 bytes of
+  // data.
   const std::string problem = problem_with([](const Question& question, bool) {
     const auto here = static_cast<unsigned>(12 + question.bytes.size() + 12 + 6);
     return answer(question, {srv(0, 0, 47100, two(0xC000U | here))});
   });
   EXPECT_NE(problem.find("have no SRV record"), std::string::npos) << problem;
-  // The owner of the record does.
+  // The owner name of the record is a pointer to itself.
   const std::string ring = problem_with([](const Question& question, bool) {
     const auto here = static_cast<unsigned>(12 + question.bytes.size());
     return answer(question, {two(0xC000U | here) + two(kSrv) + two(1) + two(0) + two(60) + two(0)});
@@ -127,7 +126,8 @@ TEST(UnicastDiscovery, NamesThatPointAtEachOtherLeadNowhere) {
 
 TEST(UnicastDiscovery, AnAnswerThatEndsTooSoonIsRefused) {
   for (const std::uint16_t type : {kSrv, kTxt}) {
-    for (std::size_t lost = 1; lost < 22; lost += 4) {  // with all of the question, so that the resolver takes it
+    // keeps the whole question, otherwise the resolver ignores the answer
+    for (std::size_t lost = 1; lost < 22; lost += 4) {
       const FakeDns server([&](const Question& question, bool tcp) {
         const std::string whole = sound(question, tcp);
         return question.type == type ? whole.substr(0, whole.size() - lost) : whole;

@@ -20,7 +20,7 @@ TEST(FdStiffness, OfALinearForceIsItsMatrix) {
 }
 
 TEST(FdStiffness, HasAnErrorOfSecondOrder) {
-  // F = −c·x³ along x: K = 3·c·x², and the differences add c·h².
+  // F = −c·x³ along x gives K = 3·c·x². Central differences add c·h².
   const double c = 1e6;
   const auto cubic = [&](const Vec3& x) { return Vec3(-c * x.x() * x.x() * x.x(), 0, 0); };
   for (const double h : {1e-3, 1e-4}) {
@@ -49,7 +49,7 @@ TEST(FdStiffness, ShowsASurfaceThatIsWithinAStep) {
   EXPECT_NEAR(inside->kink, 0, 1e-7);
 }
 
-/// A spring whose rest follows the hand: each call moves it half of the way.
+/// A spring whose rest position moves halfway to the hand at each call.
 struct Creeping {
   Vec3 rest = Vec3::Zero();
   Vec3 saved = Vec3::Zero();

@@ -16,7 +16,7 @@ namespace {
 constexpr double kK = 1000;  // N/m
 constexpr double kB = 4;     // N·s/m
 
-/// A wall at x = 0 that yields as a spring and a damper, which never pulls.
+/// A spring and a damper behind x = 0. The damper never pulls.
 Touch wall(const DeviceState& hand) {
   const double x = hand.position.x();
   Touch touch;
@@ -67,7 +67,7 @@ TEST(SelfTest, IsPassedByAKelvinVoigtWallInEveryClaim) {
 }
 
 TEST(SelfTest, MeasuresWhatAPressCosts) {
-  // A spring gives back all of it: ½·k·(10 mm)² = 50 mJ go in, 0 stay.
+  // A spring returns all energy: 0.5·k·(10 mm)² = 50 mJ.
   const SelfTest result =
       self_test([](const DeviceState& hand) -> Touch { return Vec3(-kK * std::max(hand.position.x(), 0.0), 0, 0); });
   const auto& press = result.findings.front();
@@ -85,7 +85,7 @@ TEST(SelfTest, OfAnElasticBodyWantsBackWhatAWayHasCost) {
       [](const DeviceState& hand) -> Touch { return Vec3(-kK * std::max(hand.position.x(), 0.0), 0, 0); }, script);
   EXPECT_TRUE(spring.passed()) << spring.text();
   EXPECT_EQ(count(spring, kPassed, "gives back what it took"), 14) << spring.text();
-  // The damper of the wall takes energy: passive, and not elastic.
+  // The damper dissipates energy: the engine is passive but not elastic.
   const SelfTest damped = self_test(wall, script);
   EXPECT_EQ(count(damped, kFailed, "gives out"), 0) << damped.text();
   EXPECT_EQ(count(damped, kFailed, "gives back what it took"), 14) << damped.text();
@@ -93,7 +93,7 @@ TEST(SelfTest, OfAnElasticBodyWantsBackWhatAWayHasCost) {
   const auto& press = damped.findings.at(1);
   EXPECT_EQ(press.what, "gives back what it took: press and release, 0.025 m/s");
   EXPECT_GT(press.value, press.bound);
-  // Where the body snaps from one place of rest to another at the end of the slide, the way across alone fails.
+  // The body snaps to a different equilibrium at the end of the slide. Only the check on the sideways motion fails.
   const SelfTest snaps = self_test(
       [snapped = false](const DeviceState& hand) mutable -> Touch {
         const double depth = std::max(hand.position.x(), 0.0);
@@ -107,7 +107,7 @@ TEST(SelfTest, OfAnElasticBodyWantsBackWhatAWayHasCost) {
 }
 
 TEST(SelfTest, AllowsForWhatFewStatesASecondMakeOfAForceThatBends) {
-  // A ball of springs that stiffen, at 50 Hz and up to 2 mm from one state to the next: conservative all the same.
+  // A ball of stiffening springs is conservative, even if the hand moves up to 2 mm between states at 50 Hz.
   SelfTestScript script;
   script.rate_hz = 50;
   script.work_tolerance = 1e-5;
@@ -132,7 +132,7 @@ TEST(SelfTest, IsFailedByAForceThatPushesOnWithTheHand) {
 }
 
 TEST(SelfTest, IsFailedByAForceThatIsLate) {
-  // The wall of 10 states ago: hysteresis the wrong way round.
+  // A delay of 10 states turns the wall's hysteresis around, so it generates energy.
   const SelfTest result = self_test([late = std::vector<Vec3>(10, Vec3::Zero())](const DeviceState& hand) mutable {
     late.insert(late.begin(), Vec3(-kK * std::max(hand.position.x(), 0.0), 0, 0));
     const Touch touch = late.back();
@@ -145,7 +145,7 @@ TEST(SelfTest, IsFailedByAForceThatIsLate) {
 
 TEST(SelfTest, IsFailedByAForceWithACurlInWhicheverPlane) {
   SelfTestScript script;
-  script.start = Vec3::Zero();  // where this spring, which pulls too, holds no energy
+  script.start = Vec3::Zero();  // this bilateral spring stores no energy there
   for (int axis = 0; axis < 3; ++axis) {
     for (const double sign : {-1, 1}) {
       const SelfTest result = self_test(
@@ -171,7 +171,7 @@ TEST(SelfTest, IsFailedByAStiffnessThatIsWrong) {
     EXPECT_EQ(count(result, kFailed, "stiffness"), 3) << "at one of the four depths nothing is touched";
     EXPECT_FALSE(result.passed());
   }
-  // In the wrong direction.
+  // A stiffness of the wrong sign.
   EXPECT_EQ(count(self_test([](const DeviceState& hand) {
                     Touch touch = wall(hand);
                     touch.stiffness = Mat3(touch.stiffness->norm() * Vec3::UnitY().asDiagonal().toDenseMatrix());
@@ -183,14 +183,15 @@ TEST(SelfTest, IsFailedByAStiffnessThatIsWrong) {
 
 TEST(SelfTest, DoesNotJudgeAStiffnessWhereASurfaceIsWithinAStep) {
   SelfTestScript script;
-  script.start = Vec3(-0.01, 0, 0);  // so that half of the way is the wall's edge
+  script.start = Vec3(-0.01, 0, 0);  // the wall's edge is in the middle of the path
   script.depth = 0.02;
   const SelfTest result = self_test(wall, script);
   EXPECT_EQ(count(result, kNotJudged, "stiffness"), 1) << result.text();
   EXPECT_TRUE(result.passed()) << result.text();
 }
 
-/// A spring whose rest creeps after the hand: passive, and no function of the place. Without time it does not creep.
+/// A spring whose rest position creeps towards the hand: passive, but the force is no function of position. It does
+/// not creep if no time passes.
 struct Creeping {
   Vec3 rest = Vec3::Zero();
   Vec3 saved = Vec3::Zero();
@@ -206,7 +207,7 @@ TEST(SelfTest, JudgesTheStiffnessOfAnEngineThatGoesOnOnlyWithSaveAndRestore) {
   Creeping engine;
   const Physics physics = [&](const DeviceState& hand) { return engine.answer(hand); };
   SelfTestScript script;
-  script.work_tolerance = 1;  // what was stored before the way began comes out on it
+  script.work_tolerance = 1;  // the energy stored before the path begins is released on it
   const SelfTest without = self_test(physics, script);
   EXPECT_EQ(count(without, kNotJudged, "stiffness"), 4) << without.text();
   EXPECT_NE(without.text().find("give save and restore"), std::string::npos) << without.text();

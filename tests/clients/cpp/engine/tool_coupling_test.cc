@@ -9,7 +9,7 @@
 namespace tendon::tool_coupling_test {
 namespace {
 
-/// A rigid body before a wall at x = 0, which some engine integrates by semi-implicit Euler.
+/// A rigid body in front of a wall at x = 0, integrated with semi-implicit Euler as in a typical engine.
 struct Tool {
   double mass;
   double step;
@@ -59,7 +59,7 @@ TEST(ToolCoupling, PutsEqualAndOppositeForcesOnHandAndTool) {
 }
 
 TEST(ToolCoupling, HoldsAFreeToolStablyHoweverHardItIs) {
-  // Explicit, k·T² + 2·b·T < 4·m would be needed: this is 25 000 times beyond it.
+  // An explicit spring and damper are stable only if k·T² + 2·b·T < 4·m, which this exceeds 25 000 times.
   for (const double damping : {0.0, 100.0}) {
     const double most = std::numeric_limits<double>::max();
     const ToolCoupling coupling(

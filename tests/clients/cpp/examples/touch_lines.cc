@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// touch_lines EXAMPLE [ARGUMENT…]: what a rendering example answers to hands on paper. There is no server: run() is the
-// one below, which reads a line "DEVICE X Y Z U V W" for each state (m, m/s) and prints its answer, "FX FY FZ" in N
-// and, where the example sends a stiffness, its nine numbers in N/m, row by row. The examples' sources are the real
-// ones.
+// touch_lines EXAMPLE [ARGUMENT…]: prints the answers of a rendering example to given states, without a server.
+//
+// The example's source is linked unchanged to the run() below. For each input line "DEVICE X Y Z U V W" (m, m/s),
+// run() prints "FX FY FZ" in N and, if the example sends a stiffness, its nine elements in N/m by rows.
 #include <cstdio>
 #include <cstring>
 #include <iostream>
@@ -11,7 +11,7 @@
 
 #include "clients/cpp/run.h"
 
-// Each example's own main function, under another name.
+// Declares the examples' main functions, which are renamed at compile time.
 #define TENDON_EXAMPLE(name) int name##_main(int argc, char** argv);
 TENDON_EXAMPLES
 #undef TENDON_EXAMPLE

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A robot that follows a hand: the cases that Python and TypeScript pass too.
+// The cases in tests/clients/follower_cases.json, which the Python and TypeScript clients run as well.
 #include "clients/cpp/teleop/follower.h"
 
 #include <gtest/gtest.h>

@@ -40,14 +40,14 @@ bool opened(Crew& crew) {
   return event && std::holds_alternative<Crew::Opened>(*event);
 }
 
-/// Why it ended.
+/// Returns the reason for which the worker ended.
 std::string ended(Crew& crew) {
   const auto event = next(crew);
   const auto* end = event ? std::get_if<Crew::Ended>(&*event) : nullptr;
   return end != nullptr ? end->why : "it has not ended";
 }
 
-/// Processes whose command line has `text` in it, zombies not counted.
+/// Counts the processes whose command line contains `text`, without zombies.
 int running(const std::string& text) {
   int count = 0;
   std::error_code ignored;
@@ -59,7 +59,7 @@ int running(const std::string& text) {
   return count;
 }
 
-/// Until everything has gone, at most kPatienceMs.
+/// Waits until all processes have ended, at most kPatienceMs.
 bool gone(Crew& crew, const std::string& text) {
   for (int i = 0; i < kPatienceMs / 10; ++i) {
     crew.next();
@@ -155,7 +155,7 @@ TEST(Crew, TheNextWorkerIsLeftAloneWhileTheLastOneIsEnded) {
   EXPECT_TRUE(gone(crew, "987125"));
 }
 
-/// A stranger's connection to a Unix socket.
+/// Connects to a Unix socket without the secret.
 int connect_to(const std::string& address) {
   const std::string path = address.substr(5);
   sockaddr_un to{};
@@ -178,7 +178,7 @@ TEST(Crew, AStrangerWithoutTheSecretDoesNotOpenTheStream) {
   const auto word = to_bytes(opening(kSecret));
   ASSERT_EQ(::write(right, word.data(), word.size()), static_cast<ssize_t>(word.size()));
   EXPECT_TRUE(opened(crew));
-  const int late = connect_to(crew.address());  // the same secret a second time
+  const int late = connect_to(crew.address());  // the secret is used a second time
   ASSERT_EQ(::write(late, word.data(), word.size()), static_cast<ssize_t>(word.size()));
   EXPECT_FALSE(next(crew, 300).has_value());
   for (const int socket : {silent, wrong, right, late}) ::close(socket);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A worker that pulls the hand to the middle, and goes wrong as it is told: fake_worker [WAY [AFTER]] SCENE. After so
-// many answers it …
+// fake_worker [WAY [AFTER]] SCENE: a worker that pulls the hand to the origin. After AFTER answers it fails as WAY
+// says.
 #include <unistd.h>
 
 #include <csignal>
@@ -16,7 +16,7 @@ using namespace tendon;
 
 namespace {
 
-/// A child in a process group of its own, as Open MPI's ranks are, which ignores what it can.
+/// Starts a child in its own process group, like the ranks of Open MPI, that ignores all signals it can ignore.
 void leave_a_child() {
   if (::fork() != 0) return;
   ::setsid();

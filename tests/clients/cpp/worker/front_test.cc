@@ -22,7 +22,7 @@ Seen at_tick(std::uint64_t tick) {
 
 Touch force(double newtons) { return Vec3(newtons, 0, 0); }
 
-/// A front, and all that it has ordered since.
+/// A Front and the orders that it has given so far.
 class Played {
  public:
   explicit Played(const Front::Config& config = {}) : front(config, now) { turn(); }
@@ -58,7 +58,7 @@ class Played {
     front.ended(now, "it was ended by signal 9");
     turn();
   }
-  /// What was said since the last time.
+  /// Returns the orders since the last call.
   std::string news() {
     std::string all;
     for (const std::string& one : said) all += (all.empty() ? "" : ", ") + one;
@@ -118,7 +118,7 @@ TEST(Front, TheDeadlineIsThreeTimesTheMedian) {
   EXPECT_EQ(played.front.stats().median, milliseconds(40));
 }
 
-/// In free space an answer takes next to nothing. A hand that taps a body whose answers take 100 ms feels every tap.
+/// Answers without contact take almost no time. A hand that taps a body with answers of 100 ms must feel every tap.
 TEST(Front, QuickAnswersWithoutAForceDoNotMakeSlowOnesLate) {
   Played played;
   played.open();
@@ -139,7 +139,7 @@ TEST(Front, QuickAnswersWithoutAForceDoNotMakeSlowOnesLate) {
   EXPECT_EQ(played.front.stats().median, milliseconds(100));
 }
 
-/// A client takes for usual how far the last two answers lie apart: nothing in free space, where a slow answer is next.
+/// The client expects the interval of the last two answers, which is almost zero without contact.
 TEST(Front, AnAnswerOfASlowBodyHoldsUntilTheNextIsLate) {
   Played played;
   played.open();
@@ -168,7 +168,7 @@ TEST(Front, AnAnswerOfAQuickBodyHoldsAsLongAsTheClientSays) {
   }
 }
 
-/// 180 000 unknowns on two ranks: the first touch takes .8 s, those that remember it .2 s.
+/// Measured with 180 000 unknowns on two ranks: the first contact takes 0.8 s, later ones 0.2 s.
 TEST(Front, ASlowFirstTouchIsWaitedForAndTenTimesTheMedianAfterIt) {
   Played played;
   played.open();
@@ -261,7 +261,7 @@ TEST(Front, AWorkerThatLastedSetsTheWaitBack) {
     played.after(played.front.next_turn() - played.now);
   }
   played.open();
-  for (std::uint64_t tick = 1; tick < 60; ++tick) {  // 5.9 s, longer than the 4 s that the next wait would be
+  for (std::uint64_t tick = 1; tick < 60; ++tick) {  // 5.9 s, longer than the next deadline of 4 s
     played.see(tick);
     played.after(milliseconds(40));
     played.answer();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// This version does not have the functions that are used by tendon-plug.
+// A version without the functions that tendon-plug uses.
 typedef int dds_entity_t;
