@@ -70,7 +70,7 @@ TEST(Plug, AForceIsOnTheWireInTheTurnInWhichItWasAskedFor) {
   world.run(200, [&] { plug.ask(kOld, world.now, world.now + milliseconds(50), pushes_by(0)); });
   double wanted = 0;
   world.run(100, [&] {
-    // The device's next step has the force that was asked for at the end of the last millisecond.
+    // The next step of the device uses the force requested at the end of the previous millisecond.
     EXPECT_NEAR(world.step.wanted.y(), wanted, 1e-9);
     wanted += 1e-3;
     plug.ask(kOld, world.now, world.now + milliseconds(50), pushes_by(wanted));
@@ -113,7 +113,7 @@ TEST(Plug, APushIsSentOnceHoweverManyStatesCome) {
 }
 
 TEST(Plug, ReadsWhatStillComesForASessionThatHasEnded) {
-  // A datagram that nobody reads would wake a sleeping bridge for ever.
+  // An unread datagram would wake a sleeping bridge forever.
   World world("demo_parts.toml", {}, 5);
   Plug& plug = world.add_plug();
   world.run(100);

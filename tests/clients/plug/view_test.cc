@@ -19,7 +19,7 @@
 namespace tendon::plug::view_test {
 namespace {
 
-/// All 24 ways in which a device can lie before the operator with its axes along the operator's.
+/// Returns the 24 rotations that map axes to axes.
 std::vector<Quat> axis_aligned_rotations() {
   std::vector<Quat> all;
   std::array<Eigen::Index, 3> order = {0, 1, 2};
@@ -81,7 +81,7 @@ TEST(View, AHandleInItsMiddleIsNotTurnedWhateverTheFrame) {
   }
 }
 
-/// M (x, y, z) as the page writes it: "(−z, −x, y)".
+/// Formats M·(x, y, z) as the README does: "(−z, −x, y)".
 std::string in_words(const Frame& frame) {
   std::string text = frame.per_metre == 1 ? "(" : std::to_string(std::lround(frame.per_metre)) + " (";
   for (Eigen::Index i = 0; i < 3; ++i) {
@@ -109,7 +109,7 @@ TEST(View, ThePageForNewcomersTellsTheFramesAsTheyAre) {
 }
 
 TEST(View, TurnsTheStylusAboutTheProgramsOwnAxis) {
-  // A quarter turn to the left about the axis that points up: up is z in ROS, y for VRPN.
+  // A quarter turn to the left about the vertical axis, which is z in ROS and y in VRPN.
   const Quat left = rotation_by(Vec3(0, std::numbers::pi / 2, 0));
   EXPECT_TRUE((View(*find_frame("ros"), {}).orientation(left) * Vec3::UnitX()).isApprox(Vec3::UnitY(), 1e-12))
       << "ahead has become left";

@@ -18,8 +18,8 @@
 
 namespace tendon::plug {
 
-/// A server with a shipped scene, and plugs that reach it, on virtual time: one haptic step each millisecond, and
-/// `delay` each way. Nothing is random but the simulated device.
+/// A server with a shipped scene, and its bridges, on virtual time. The haptic loop runs at 1 kHz, and `delay`
+/// applies in each direction. Only the simulated device is random.
 class World {
  public:
   explicit World(const std::string& scene_file, const std::vector<std::string>& settings = {}, int delay_ms = 0)
@@ -29,7 +29,7 @@ class World {
   World(const World&) = delete;
   World& operator=(const World&) = delete;
 
-  /// A plug of its own: its two sessions are two more clients of the server.
+  /// Each Plug opens two sessions, so it is two more clients of the server.
   Plug& add_plug(Plug::Config config = {}) {
     config.new_seed = [this] {
       Seed seed;
@@ -45,7 +45,7 @@ class World {
     return *guest.plug;
   }
 
-  /// Lets time pass; `each` is called each millisecond, after the plugs' turns.
+  /// Runs for this time. Calls `each` once per millisecond, after the turns of the plugs.
   void run(int milliseconds, const std::function<void()>& each = nullptr) {
     for (int i = 0; i < milliseconds; ++i) {
       now += std::chrono::milliseconds(1);
@@ -55,13 +55,13 @@ class World {
       turn_plugs();
       if (each) {
         each();
-        turn_plugs();  // what was asked leaves now
+        turn_plugs();  // sends the requests of this turn
       }
       carry();
     }
   }
 
-  /// The server dies without a word; it may come back, and knows nothing of before.
+  /// Stops the server without a Bye. A new server does not know its sessions.
   void kill_server() { assembly_.reset(); }
   void open_server() {
     ++epoch_;
@@ -76,19 +76,20 @@ class World {
     assembly_->turn_network(0, now);
   }
 
-  /// Datagrams that have come to the plugs and that nobody has read.
+  /// Returns the number of datagrams that have arrived at the plugs and have not been read.
   std::size_t unread() const {
     std::size_t all = 0;
     for (const Guest& guest : guests_) all += guest.watcher->inbox.size() + guest.controller->inbox.size();
     return all;
   }
 
-  /// Datagrams go through, or are lost.
+  /// false: datagrams are lost
   bool connected = true;
   LocalTime now = LocalTime(std::chrono::seconds(1000));
-  StepRecord step;           ///< the newest haptic step
-  double least_energy = 0;   ///< J, of the ledger: below zero is energy that nobody put in
-  HandleDescription handle;  ///< what the server says of it from its next start on
+  StepRecord step;  ///< the newest haptic step
+  /// J, minimum of the energy ledger; below zero, the device has given out more than it received
+  double least_energy = 0;
+  HandleDescription handle;  ///< used by the server from its next start on
 
  private:
   struct Guest {

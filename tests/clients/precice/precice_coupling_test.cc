@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// preCICE itself between two processes of this machine.
+// Tests preCICE between two processes on this machine.
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <sys/wait.h>
@@ -14,10 +13,10 @@
 namespace tendon::precice_worker::precice_coupling_test {
 namespace {
 
-/// What spring_body_main.cc is made of, N/m.
+/// The total stiffness in spring_body_main.cc, N/m.
 constexpr double kStiffness = 500;
 
-/// The body's process; it is gone at the end.
+/// The process of the body, which ends with this object.
 class Body {
  public:
   explicit Body(const std::string& file) : pid_(::fork()) {
@@ -39,7 +38,7 @@ class Body {
 TEST(PreciceCoupling, EachForceAnswersTheStateOfItsOwnWindow) {
   const auto folder = std::filesystem::path(testing::TempDir()) / ("precice-" + std::to_string(::getpid()));
   std::filesystem::create_directories(folder);
-  std::filesystem::current_path(folder);  // where both look for each other's address
+  std::filesystem::current_path(folder);  // where preCICE exchanges addresses
   const PreciceEngine::Config config{.file = TENDON_PRECICE_CONFIG};
   {
     const Body body(config.file);

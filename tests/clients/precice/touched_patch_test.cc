@@ -21,7 +21,7 @@ DeviceState at(double x, double y = 0, double z = 0) {
   return hand;
 }
 
-/// What holds the nodes of springs that are this stiff together.
+/// Returns the reaction forces of nodes on springs with this total stiffness.
 std::vector<double> held(const TouchedPatch& patch, const DeviceState& hand, double stiffness) {
   std::vector<double> forces = patch.displacements(hand);
   for (double& force : forces) force *= stiffness / static_cast<double>(patch.nodes());
@@ -90,7 +90,7 @@ TEST(TouchedPatch, TheErrorIsHowFarTheSecantWasWrong) {
   TouchedPatch patch({});
   pressed(patch, at(0.001), 500);
   pressed(patch, at(0.002), 500);
-  const Touch stiffer = pressed(patch, at(0.003), 700);  // 2.1 N, where 1.5 N were expected
+  const Touch stiffer = pressed(patch, at(0.003), 700);  // 2.1 N; 1.5 N were expected
   EXPECT_NEAR(stiffer.error.value_or(-1), 0.6, 1e-12);
   EXPECT_NEAR(stiffer.stiffness.value_or(Mat3::Zero())(0, 0), 1100, 1e-8);
 }

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// The whole way of a CHAI3D program to a device: chai3d_program, libhdPhantom.so, tendon-plug, tendond.
+// The whole path of a CHAI3D program to a device: chai3d_program, libhdPhantom.so, tendon-plug, tendond.
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <unistd.h>
@@ -25,7 +24,7 @@ using testing::ScratchFolder;
 
 std::string old_program(const std::string& name) { return std::string(TENDON_OLD_PROGRAMS) + "/" + name; }
 
-/// tendon-plug chai3d, and the program that it starts; both say what they say through it.
+/// Starts tendon-plug chai3d, which starts the program. The output of both is captured.
 Process plug(const std::string& server, const ScratchFolder& folder, std::vector<std::string> program,
              const std::vector<std::string>& options = {}) {
   std::vector<std::string> arguments = {"chai3d", "--server", server};
@@ -53,7 +52,7 @@ std::vector<std::string> lines_with(const std::string& text, const std::string& 
   return lines;
 }
 
-/// Processor time that the process has used, s.
+/// Returns the CPU time that the process has used, s.
 double processor_time(pid_t pid) {
   std::ifstream file("/proc/" + std::to_string(pid) + "/stat");
   std::string text;
@@ -83,13 +82,13 @@ TEST(Chai3d, AProgramFindsTheDeviceAndMovesWithItOneTurnAStep) {
   const double took = number_in(end, "took_s");
   EXPECT_EQ(old.wait(), 0);
   EXPECT_EQ(number_in(end, "failed"), 0);
-  // One turn a haptic step; on a machine that pauses some last 2 ms. Where the hand turns back, it stays within one
-  // count of the encoder for several steps.
+  // The program takes one turn per haptic step, or per 2 ms if the machine pauses. At the turning points of the hand,
+  // several steps have the same encoder count.
   EXPECT_GT(number_in(end, "moved"), 0.4 * number_in(end, "turns"));
   EXPECT_LT(number_in(end, "turns"), 1.02 * 1000 * number_in(end, "took_s") + 10);
   EXPECT_GT(number_in(end, "turns"), 0.5 * 1000 * number_in(end, "took_s"));
   EXPECT_EQ(number_in(end, "threads"), 1) << "the library has none of its own";
-  // The hand of the scene moves along the device's x, which is CHAI3D's y.
+  // The simulated hand moves along the device's x axis, which is CHAI3D's y axis.
   double least = 0;
   double most = 0;
   for (const std::string& line : lines_with(old.out(), R"("position")")) {
@@ -102,7 +101,7 @@ TEST(Chai3d, AProgramFindsTheDeviceAndMovesWithItOneTurnAStep) {
   EXPECT_GT(most, 0.010);
   std::printf("%.1f %% of a core, %.0f turns in %.3f s, getter p99 %.2f us\n", 100 * used / took,
               number_in(end, "turns"), took, number_in(end, "getter_p99_us"));
-  // 8 % of a core on a quiet machine (README.md); this gate only finds a loop that does not sleep.
+  // Measured: 8 % of a core on an idle machine (README.md). The bound only detects a loop that does not sleep.
   EXPECT_LT(used / took, 0.25) << "of a core";
 }
 
@@ -162,8 +161,8 @@ TEST(Chai3d, ASecondPlugIsToldThatTheChannelIsTaken) {
   EXPECT_EQ(first.wait(), 0);
 }
 
-/// A program that pushes along the device's x, and a client of ours that watches the device. Without the limiter, so that
-/// the push is what the hand gets, whatever it has put in.
+/// A program that pushes along the device's x axis, and a client that observes the device. The scene has no limiter,
+/// so the device outputs the requested force.
 struct Pushing {
   explicit Pushing(const ScratchFolder& folder)
       : server(folder.path(), write(folder.path() / "hand.toml", kPressingHand), {"--without-limiter"}),
@@ -230,7 +229,7 @@ TEST(Chai3d, AProgramLinkedToOpenHapticsIsRefusedInASentence) {
   EXPECT_NE(old.err().find("is linked to OpenHaptics itself (libHD.so)"), std::string::npos) << old.err();
 }
 
-/// The wall of 1000 N/m that CHAI3D draws, 20 ms away each way. Returns the recording.
+/// Runs CHAI3D's wall of 1000 N/m over a delay of 20 ms in each direction. Returns the recording.
 Recording wall_far_away(const ScratchFolder& folder, const std::vector<std::string>& more) {
   std::vector<std::string> options = {"--record", "run.mcap"};
   options.insert(options.end(), more.begin(), more.end());

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// A program that calls libhdPhantom.so as CHAI3D does (cPhantomDevice, cHapticDeviceHandler): the two libraries by
-// their names, RTLD_GLOBAL, 14 symbols, the count, then for each device the count again, radius, type and Open, then
-// position, velocity, rotation, buttons and force in a loop that does not sleep, then Close and StopServo.
+// Calls libhdPhantom.so as CHAI3D does (cPhantomDevice, cHapticDeviceHandler).
 //
-//   chai3d_program [--seconds S] [--wall N_PER_M] [--push X Y Z] [--twist X Y Z] [--second-process]
+// Loads both libraries by name with RTLD_GLOBAL and looks up 14 symbols. Reads the number of devices, then for each
+// device the number again, radius and type, and opens it. Reads position, velocity, rotation and buttons and sets the
+// force in a loop without sleep, then calls Close and StopServo.
 //
-// The wall is at CHAI3D's y > 0. One JSON object a line on stdout.
+//  chai3d_program [--seconds S] [--wall N_PER_M] [--push X Y Z] [--twist X Y Z] [--second-process]
+//
+// The wall is at y > 0 in CHAI3D's frame. Prints one JSON object per line.
 #include <dlfcn.h>
 #include <sys/wait.h>
 #include <unistd.h>

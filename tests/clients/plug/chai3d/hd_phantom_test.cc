@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// libhdPhantom.so itself, in this process, on memory of ours: what its threads do to each other.
+// Tests the threads of libhdPhantom.so in this process, with shared memory that the test provides.
 #include <dlfcn.h>
 #include <fcntl.h>
 #include <gtest/gtest.h>
@@ -21,10 +20,10 @@
 namespace tendon::plug::chai3d::hd_phantom_test {
 namespace {
 
-/// The library waits this long for a state, at most.
+/// The longest time for which the library waits for a state.
 constexpr auto kLongestPace = std::chrono::milliseconds(2);
 
-/// Two devices in memory that the library has found. The library looks for it once in a process, so there is one.
+/// Two devices in shared memory. The library searches for devices once per process, so there is only one instance.
 class Library {
  public:
   static Library& get() {
@@ -32,7 +31,7 @@ class Library {
     return once;
   }
 
-  /// A state of each device comes that is newer than all before.
+  /// Publishes a new state of each device.
   void come() {
     ++tick_;
     for (std::size_t i = 0; i < hands_->devices; ++i) {
@@ -47,7 +46,7 @@ class Library {
     double z = 0;
     EXPECT_NE(position_(device, &x, &y, &z), 0);
   }
-  /// How long it took.
+  /// Returns the duration of the call.
   Duration set_force(int device = 0) {
     const double zero = 0;
     const LocalTime before = read_clock();
@@ -93,7 +92,8 @@ TEST(HdPhantom, AForceWaitsForAStateThatItsThreadHasNotRead) {
 }
 
 TEST(HdPhantom, AThreadThatLooksOnTakesNoStateFromTheThreadThatPushes) {
-  // A program draws in one thread and pushes in another. The machine may pause in one of the tries, not in all.
+  // A program may draw in one thread and set forces in another. The machine may delay one of the attempts, but not
+  // all.
   Library& library = Library::get();
   library.come();
   Duration shortest = Duration::max();
@@ -116,7 +116,7 @@ TEST(HdPhantom, AThreadThatReadsNothingPushesOnceAState) {
 }
 
 TEST(HdPhantom, AThreadThatPushesTwoDevicesInTurnWaitsOnceATurn) {
-  // CHAI3D's example of several devices reads and pushes one after the other.
+  // CHAI3D's example with several devices accesses them one after the other.
   Library& library = Library::get();
   library.come();
   std::thread([&] {

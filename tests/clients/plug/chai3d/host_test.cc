@@ -13,7 +13,7 @@
 namespace tendon::plug::chai3d::host_test {
 namespace {
 
-/// The plug, the shared memory, and a program that does its turns in the world's time.
+/// The bridge, the shared memory, and a program whose turns follow the virtual time.
 struct Theatre {
   explicit Theatre(const std::string& scene, const std::vector<std::string>& settings = {}, Quat lies = {1, 0, 0, 0},
                    double max_torque = 0)
@@ -48,7 +48,7 @@ struct Theatre {
   HandNow hand;
 };
 
-// As WoodenHaptics lies: x ahead, y left, z up. CHAI3D: x to the user, y right, z up.
+// WoodenHaptics' base frame: x forward, y left, z up. CHAI3D: x to the user, y right, z up.
 const Quat kWooden = quaternion_of(operator_from_device("right=-y up=z user=-x"));
 const std::vector<std::string> kDirections = {"[1, 0, 0]", "[0, 1, 0]", "[0, 0, 1]"};
 const std::vector<Vec3> kSeen = {Vec3(-1, 0, 0), Vec3(0, -1, 0), Vec3(0, 0, 1)};
@@ -56,7 +56,7 @@ const std::vector<Vec3> kSeen = {Vec3(-1, 0, 0), Vec3(0, -1, 0), Vec3(0, 0, 1)};
 TEST(Chai3dHost, AHandThatMovesAlongEachAxisIsSeenOnChai3dsOwn) {
   for (std::size_t axis = 0; axis < 3; ++axis) {
     Theatre theatre("demo_parts.toml", {"device.hand.motion.direction=" + kDirections[axis]}, kWooden);
-    theatre.run(500);  // a sine of 0.5 Hz: at its far end
+    theatre.run(500);  // the sine of 0.5 Hz is at its peak
     const Vec3 seen(theatre.hand.position.data());
     EXPECT_GT(seen.dot(kSeen[axis]), 0.010) << axis;
     EXPECT_LT((seen - seen.dot(kSeen[axis]) * kSeen[axis]).norm(), 0.001) << axis;
@@ -94,7 +94,7 @@ TEST(Chai3dHost, ATorqueGoesToADeviceThatHasMotorsForIt) {
   for (const double most : {0.0, 0.2}) {
     Theatre theatre("peg.toml", {}, {1, 0, 0, 0}, most);
     theatre.asks = true;
-    theatre.asked.torque = {0, 0, 0.01};  // about CHAI3D's z: up
+    theatre.asked.torque = {0, 0, 0.01};  // about CHAI3D's z axis, upward
     theatre.run(600);
     ASSERT_TRUE(theatre.plug.state());
     ASSERT_TRUE(theatre.plug.state()->torque_applied);
@@ -108,7 +108,7 @@ TEST(Chai3dHost, AProgramThatStandsStillForASecondIsNotFeltForASecond) {
   theatre.asked.force = {0, 0, 0.5};
   theatre.run(500);
   EXPECT_NEAR(theatre.world.step.applied.y(), 0.5, 1e-6);
-  theatre.asks = false;  // SIGSTOP: its last force stays in the memory
+  theatre.asks = false;  // as after SIGSTOP: the last force stays in the shared memory
   theatre.run(300);
   EXPECT_EQ(theatre.world.step.applied.y(), 0);
 }
@@ -120,7 +120,7 @@ TEST(Chai3dHost, AForceThatIsReadLateIsOldAndNotSent) {
                    .count = 1,
                    .open = 1,
                    .force = {0, 0, 0.5}};
-  theatre.world.run(60);  // the plug's process was stopped
+  theatre.world.run(60);  // the bridge's process was stopped
   theatre.hands->device[0].asked.put(theatre.asked);
   theatre.run(100);
   EXPECT_EQ(theatre.plug.owner(), 0U);

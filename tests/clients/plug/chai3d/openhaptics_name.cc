@@ -1,4 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-// A library with the name of OpenHaptics' libHD.so.
+// Builds a library with the name of OpenHaptics' libHD.so.
 int hdInitDevice();
 int hdInitDevice() { return 0; }

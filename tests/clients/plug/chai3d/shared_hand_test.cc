@@ -51,7 +51,7 @@ TEST(Box, NoReaderSeesHalfOfAValue) {
 }
 
 TEST(Box, AWriterThatDiedWhileItWroteBlocksNoReader) {
-  // The memory of a box whose writer has got as far as its first word: an odd number of turns.
+  // The writer has only written the first word: its counter is odd.
   Box<Asked> box;
   box.put({.count = 1});
   std::uint64_t turn = 0;

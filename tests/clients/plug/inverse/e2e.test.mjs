@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// tendon-plug inverse as programs and hostile programs meet it, by the npm package ws. The loops are written from
+// Tests tendon-plug inverse with regular and hostile clients that use the npm package ws. The client loops follow
 // clients/plug/inverse/README.md.
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
@@ -10,7 +9,7 @@ import { Program, packageOf, raw, scratch, startServer, until } from "../../dash
 
 const { WebSocket } = packageOf("clients/typescript", "ws");
 
-/** tendon-plug inverse for a server; where it listens. */
+/** Starts tendon-plug inverse for a server. Returns its address. */
 async function startBridge(test, server, ...more) {
   const listen = ["--listen", "127.0.0.1:0", "--duration-s", "120", "--json"];
   const program = new Program(test, "tendon-plug", ["inverse", "--server", server, ...listen, ...more]);
@@ -24,11 +23,11 @@ async function startBoth(test, scene = "demo", ...more) {
   return { server, bridge: await startBridge(test, server.address, ...more) };
 }
 
-/** A message that asks for a force upwards, N. */
+/** Returns a message that requests an upward force of `z` N. */
 const pushing = (id, z) =>
   JSON.stringify({ inverse3: [{ device_id: id, commands: { set_cursor_force: { vector: { x: 0, y: 0, z } } } }] });
 
-/** A client that has had its first message. Its messages are in `got`; `next()` waits for one more. */
+/** Connects a client and waits for its first message. `got` has all messages; `next()` waits for one more. */
 async function come(test, url, options = {}) {
   const socket = new WebSocket(url, options);
   const got = [];
@@ -56,7 +55,7 @@ async function come(test, url, options = {}) {
   return { socket, got, ended, first, id, push, ask, next };
 }
 
-/** What a refused client is told: the status and the sentence. */
+/** Returns the status and the message with which the server refuses a client. */
 const refusal = (url, options = {}) =>
   new Promise((resolve, reject) => {
     const socket = new WebSocket(url, options);
@@ -150,7 +149,7 @@ test("broken frames and half requests end nobody else's connection", async (t) =
   const { bridge } = await startBoth(t);
   const other = await come(t, bridge.url);
   const [host, port] = bridge.address.split(":");
-  let random = 22; // of the bytes: a linear congruential generator, the same in each run
+  let random = 22;  // a linear congruential generator, so that each run has the same bytes
   const byte = () => (random = (random * 1103515245 + 12345) % 2147483648) >> 16 & 255;
   const hello = [
     "GET / HTTP/1.1",
@@ -208,7 +207,7 @@ test("one client at 1 kHz costs little of a core", async (t) => {
   const client = await come(t, bridge.url);
   const ticks = () => {
     const fields = readFileSync(`/proc/${bridge.program.process.pid}/stat`, "utf8").split(") ")[1].split(" ");
-    return Number(fields[11]) + Number(fields[12]); // utime + stime, of 10 ms
+    return Number(fields[11]) + Number(fields[12]);  // utime + stime, in units of 10 ms
   };
   const begin = ticks();
   const start = performance.now();

@@ -22,10 +22,10 @@ using std::chrono::milliseconds;
 using std::chrono::nanoseconds;
 using std::chrono::seconds;
 
-/// Uniform in [0, 1): an inverse CDF, the same everywhere.
+/// Uniform in [0, 1). std::uniform_real_distribution may differ between standard libraries.
 double uniform(std::mt19937_64& random) { return static_cast<double>(random() >> 11) * 0x1p-53; }
 
-/// A server, one plug on it, and clients of its bridge.
+/// A server, a bridge, and the bridge's clients.
 struct Bridge {
   explicit Bridge(const std::string& scene, Plug::Config config = {}, const HandleDescription& handle = {})
       : world(scene, {}) {
@@ -53,7 +53,7 @@ struct Bridge {
     EXPECT_EQ(replies.size(), 1U);
     return json::parse(replies.at(0));
   }
-  /// Lets time pass; the client says `message` each millisecond. The last reply.
+  /// Runs for `ms` milliseconds. The client sends `message` in each. Returns the last reply.
   json run(int ms, InverseSession& session, const std::string& message) {
     json last;
     world.run(ms, [&] {
@@ -79,7 +79,7 @@ const json& refused(const json& reply) { return reply.at("tendon").at("refused")
 const std::string kProbe = R"({"inverse3":[{"device_id":"0","commands":{"probe_position":{}}}]})";
 
 TEST(InverseSession, SpeaksFirstAndListsAGripEvenWhereNothingMeasuresIt) {
-  Bridge bridge("demo_parts.toml");  // a Falcon has no orientation
+  Bridge bridge("demo_parts.toml");  // the Falcon measures no orientation
   const auto client = bridge.client();
   const json first = json::parse(client->greeting(bridge.world.now));
   EXPECT_EQ(first.at("session_id"), 1);
@@ -124,7 +124,7 @@ TEST(InverseSession, OfTooManyMessagesTheOlderAreSkippedAndTheNewestIsTaken) {
   const int batch = 64;
   std::uint64_t messages = 0;
   double last = 0;
-  bridge.world.run(1000, [&] {  // 64 000 messages in a second
+  bridge.world.run(1000, [&] {  // 64 000 messages per second
     std::vector<std::string> all;
     for (int i = 0; i < batch; ++i)
       all.push_back(bridge.force(Vec3(0, 0, last = 1e-6 * static_cast<double>(++messages))));
@@ -157,7 +157,8 @@ TEST(InverseSession, ASpinningClientSendsOneForceForEachState) {
 }
 
 TEST(InverseSession, PositionAndForceAreRightAlongEachAxis) {
-  // The device lies as WoodenHaptics does: x ahead, y left, z up. Its hand moves along its x, so ahead: the client's y.
+  // WoodenHaptics' base frame: x forward, y left, z up. The hand moves along its x axis, which is the client's y
+  // axis.
   HandleDescription handle;
   handle.operator_from_device = quaternion_of(operator_from_device("right=-y up=z user=-x"));
   Bridge bridge("demo_parts.toml", {}, handle);
@@ -187,7 +188,8 @@ TEST(InverseSession, ABasisTurnsWhatIsSeenAndWhatIsAskedFor) {
                                              "force_render_full_state":{}}})");
   EXPECT_EQ(reply.at("inverse3").at(0).at("config").at("basis").at("permutation"), "-XZY");
   EXPECT_NEAR(xyz(arm(reply).at("cursor_position")).x(), -bridge.plug->state()->position.x(), 1e-12);
-  bridge.run(300, *client, bridge.force(Vec3(0, 0.25, 0)));  // the client's y is the service's z: up
+  // the client's y axis is the service's z axis, which points up
+  bridge.run(300, *client, bridge.force(Vec3(0, 0.25, 0)));
   EXPECT_TRUE(bridge.world.step.wanted.isApprox(Vec3(0, 0.25, 0), 1e-9)) << bridge.world.step.wanted.transpose();
   const auto other = bridge.client();
   EXPECT_NEAR(xyz(arm(bridge.say(*other, "{}")).at("cursor_position")).x(), bridge.plug->state()->position.x(), 1e-12)
@@ -208,7 +210,7 @@ TEST(InverseSession, OrientationButtonsGripAndTorquePassBothWays) {
   json reply = bridge.run(900, *client, all);
   EXPECT_EQ(grip(reply).at("buttons").at("a"), false);
   EXPECT_EQ(refused(reply), json::array());
-  // The service's y is ahead, the operator's −z; its z is up, the operator's y.
+  // The service's y axis points forward (the operator's −z), its z axis points up (the operator's y).
   EXPECT_TRUE(bridge.world.step.handle->turn->wanted.isApprox(Vec3(0.01, 0.03, -0.02), 1e-9));
   EXPECT_NEAR(bridge.world.step.handle->grip->wanted, 0.4, 1e-9);
   EXPECT_TRUE(bridge.world.step.wanted.isApprox(Vec3(0, 0.1, 0), 1e-9));
@@ -224,7 +226,7 @@ TEST(InverseSession, OrientationButtonsGripAndTorquePassBothWays) {
           .isApprox(Vec3(state.torque_applied->x(), -state.torque_applied->z(), state.torque_applied->y()), 1e-9));
   EXPECT_EQ(ours(reply).at("grip_rad"), state.grip->opening);
   EXPECT_EQ(ours(reply).at("grip_force_n"), *state.grip_applied);
-  reply = bridge.run(200, *client, all);  // the button is held from 1000 to 1300 ms
+  reply = bridge.run(200, *client, all);  // the button is pressed from 1000 to 1300 ms
   EXPECT_EQ(grip(reply).at("buttons").at("a"), true);
   EXPECT_EQ(grip(reply).at("buttons").at("button_0"), true);
   EXPECT_EQ(grip(reply).at("buttons").at("b"), false);
@@ -234,10 +236,10 @@ TEST(InverseSession, APressBetweenTwoRepliesIsInTheNextOneAndInNoLaterOne) {
   Bridge bridge("handle.toml");
   const auto client = bridge.client();
   const auto held = [&] { return grip(bridge.say(*client, kProbe)).at("buttons").at("a").get<bool>(); };
-  bridge.world.run(1800, [&] { client->see(bridge.world.now); });  // until 1.9 s; of a press of 300 ms at 1 s
+  bridge.world.run(1800, [&] { client->see(bridge.world.now); });  // until 1.9 s; the press of 300 ms began at 1 s
   EXPECT_TRUE(held());
   EXPECT_FALSE(held());
-  bridge.world.run(500, [&] { client->see(bridge.world.now); });  // of a press of 50 ms at 2 s
+  bridge.world.run(500, [&] { client->see(bridge.world.now); });  // the press of 50 ms begins at 2 s
   EXPECT_TRUE(held());
   EXPECT_FALSE(held());
 }
@@ -296,7 +298,7 @@ TEST(InverseSession, ASecondClientThatAsksForAForceIsToldAndTheFirstKeepsIt) {
   EXPECT_NE(refused(told)[0].get<std::string>().find("another client's forces are taken"), std::string::npos);
   EXPECT_EQ(ours(told).at("tick"), bridge.plug->state()->tick) << "it is answered all the same";
   EXPECT_GT(bridge.world.step.applied.y(), 0);
-  // The first one goes quiet, and the device is free after a second.
+  // The first client stops sending, so the device is free after a second.
   bridge.world.run(1100);
   EXPECT_EQ(refused(bridge.say(*second, bridge.force(Vec3(0, 0, -0.5)))), json::array());
   bridge.run(500, *second, bridge.force(Vec3(0, 0, -0.5)));

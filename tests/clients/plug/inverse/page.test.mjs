@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// A page in a browser reads the hand and pushes it, with nothing but the browser's own WebSocket; a page from elsewhere
-// may not.
+// A web page reads the hand and sends forces through the browser's WebSocket. A page from another host is refused.
 import assert from "node:assert/strict";
 import { createServer } from "node:http";
 import { test } from "node:test";
@@ -36,7 +34,7 @@ test("a page of this machine pushes the hand, one from elsewhere may not", async
   await near.locator("#said", { hasText: "pushed up" }).waitFor();
   assert.ok(bridge.lines.some((line) => line.includes("client 1 owns the force")));
 
-  // The same page, under a name that is not of this machine's.
+  // The same page under the name of another host.
   const url = "http://evil.example/";
   const before = (page) => page.route(url, (route) => route.fulfill({ contentType: "text/html", body }));
   const far = await visit(t, url, { before });

@@ -1,10 +1,10 @@
 #!/usr/bin/env node
 // SPDX-License-Identifier: Apache-2.0
+// turnaround.mjs [SECONDS]: measures tendon-plug inverse and prints a table. It is not run in CI.
 //
-// turnaround.mjs [SECONDS]: how long a client of tendon-plug inverse waits for its reply, beside a plain WebSocket echo
-// of the same library (ws) on the same machine, turn by turn; how long until a force that it asks for is in a reply as
-// given out; turns a second; eight clients at 500; and the processor. No test and no gate: it prints a table.
-// TENDON_PROGRAMS: where the programs are.
+// Measures the time from request to reply against a plain WebSocket echo with the same library (ws), the time until a
+// requested force is reported as applied, the maximum rate of one client, eight clients at 500 Hz, and the CPU time.
+// TENDON_PROGRAMS is the folder with the programs.
 import { fork } from "node:child_process";
 import { readFileSync } from "node:fs";
 import { fileURLToPath } from "node:url";
@@ -53,7 +53,7 @@ if (process.argv[2] === "echo") {
   run.after(() => child.kill());
   const echo = await open(`ws://127.0.0.1:${await new Promise((resolve) => child.once("message", resolve))}`);
 
-  // Request to reply, beside the echo: one of each in turn, at 1 kHz.
+  // Request to reply, alternating with the echo at 1 kHz.
   const ours = [];
   const floor = [];
   const time = async (one, text, into) => {
@@ -70,7 +70,7 @@ if (process.argv[2] === "echo") {
   console.log(`request to reply     ${us(ours.slice(100))}`);
   console.log(`  a plain echo       ${us(floor.slice(100))}`);
 
-  // A force until it is given out: by the tick's next step, and the state after it. The limiter lets these small ones pass.
+  // From a force request to the state after the step that applies it. The limiter does not change forces this small.
   const felt = [];
   for (let i = 0; i < 500; ++i) {
     const wanted = 0.1 + 0.01 * (i % 10) + (i % 2) * 0.05;
@@ -83,7 +83,7 @@ if (process.argv[2] === "echo") {
   }
   console.log(`force until felt     ${us(felt)} (a haptic step is 1000 µs)`);
 
-  // As fast as one client can, and the echo's.
+  // The maximum rate of one client, and of the echo.
   for (const [name, one] of [["turns of one client", client], ["  of a plain echo", echo]]) {
     let turns = 0;
     const begin = performance.now();
@@ -94,7 +94,7 @@ if (process.argv[2] === "echo") {
     console.log(`${name.padEnd(20)} ${(turns / (performance.now() - begin) * 1000).toFixed(0)} a second`);
   }
 
-  // The processor: the bridge with an onlooker's silence, one client at 1 kHz, and eight at 500 Hz.
+  // CPU time of the bridge: one silent client, one client at 1 kHz, and eight at 500 Hz.
   const paced = async (one, hz, into) => {
     const begin = performance.now();
     for (let i = 1; performance.now() - begin < 1000 * seconds; ++i) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The DDS end of `tendon-plug ros2` without Tendon: it publishes known values on every topic at 1 kHz, stamped as they
-// leave, and answers each wrench_command with the same in `wrench`. So the tests see the types of all messages, and
-// measurements their floor.
+// The DDS side of `tendon-plug ros2` without Tendon. It publishes known values on every topic at 1 kHz, stamped when
+// sent, and copies each wrench_command to `wrench`. Tests use it to check the message types, and measurements to
+// obtain the latency of DDS alone.
 #include <poll.h>
 
 #include <array>

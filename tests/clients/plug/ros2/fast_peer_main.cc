@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A program of ROS's kind, as the tests' other side of `tendon-plug ros2`: Fast DDS with types of its own. It reads
-// topics and publishes wrench_command. Ten times a second it prints one flat JSON object with the newest values.
+// A client of `tendon-plug ros2` that uses Fast DDS, as ROS 2 does, with independently written message types. It
+// reads topics and publishes wrench_command. Ten times per second it prints a flat JSON object with the newest
+// values.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <array>
@@ -58,7 +59,7 @@ constexpr std::string_view kPeers =
 
 double us(Clock::duration d) { return std::chrono::duration<double, std::micro>(d).count(); }
 
-/// Delays of one kind, in µs.
+/// Delays in µs.
 class Delays {
  public:
   void add(double value) { all_.push_back(value); }
@@ -103,19 +104,19 @@ void describe(ordered_json& line, const std::string& topic, const DiagnosticArra
 class Reader {
  public:
   virtual ~Reader() = default;
-  /// `last`: with what is known at the end only.
+  /// `last` adds the values that are only known at the end.
   virtual void write(ordered_json& line, bool last) = 0;
 };
 
-/// What `wrench` is watched for: the toggled force along y, and no force at all once no more commands are sent.
+/// The events awaited on `wrench`: the toggled force along y, and zero force after the last command.
 struct Awaited {
   std::mutex mutex;
   double value = 0;
   Clock::time_point since{};
   bool waiting = false;
   Delays delays;
-  std::optional<Clock::time_point> stopped;  ///< the newest command, once no more follow
-  std::optional<Clock::duration> let_go;     ///< … until the hand felt nothing
+  std::optional<Clock::time_point> stopped;  ///< time of the last command
+  std::optional<Clock::duration> let_go;     ///< from then until the force was zero
 };
 
 template <class Message>
@@ -169,7 +170,7 @@ class ReaderOf final : public Reader, public dds::DataReaderListener {
   Awaited& awaited_;
   std::mutex mutex_;
   std::uint64_t count_ = 0;
-  std::uint64_t back_ = 0;            ///< messages that were older than the one before
+  std::uint64_t back_ = 0;            ///< messages older than the previous one
   std::chrono::nanoseconds first_{};  ///< stamps
   std::chrono::nanoseconds newest_{};
   Clock::duration first_age_{};
@@ -228,7 +229,7 @@ class Peer {
     }
     if (!options.wrench.empty() || options.toggle) {
       dds::DataWriterQos qos = dds::DATAWRITER_QOS_DEFAULT;
-      qos.reliability().kind = dds::RELIABLE_RELIABILITY_QOS;  // as rclcpp by default
+      qos.reliability().kind = dds::RELIABLE_RELIABILITY_QOS;  // the default of rclcpp
       qos.history().depth = 10;
       qos.publish_mode().kind = dds::SYNCHRONOUS_PUBLISH_MODE;
       writer_ = publisher_->create_datawriter(topic_of<WrenchStamped>(path_of("wrench_command")), qos);
@@ -250,7 +251,8 @@ class Peer {
       if (writer_ != nullptr && std::chrono::duration<double>(now - start).count() < options_.wrench_for_s) {
         if (options_.toggle && now >= next_toggle) {
           wrench.first[1] = 0.5 - wrench.first[1];
-          next_toggle = now + std::chrono::microseconds(20'300);  // at all phases of the haptic step
+          // not a multiple of the haptic period, so all phases occur
+          next_toggle = now + std::chrono::microseconds(20'300);
           const std::lock_guard lock(awaited_.mutex);
           awaited_.value = wrench.first[1];
           awaited_.since = Clock::now();
@@ -293,7 +295,7 @@ class Peer {
   void read(const std::string& topic, const std::string& path) {
     dds::DataReaderQos qos = dds::DATAREADER_QOS_DEFAULT;
     qos.reliability().kind = options_.best_effort ? dds::BEST_EFFORT_RELIABILITY_QOS : dds::RELIABLE_RELIABILITY_QOS;
-    qos.history().depth = 10;  // as rclcpp by default
+    qos.history().depth = 10;  // the default of rclcpp
     auto listener = std::make_unique<ReaderOf<Message>>(topic, awaited_);
     if (subscriber_->create_datareader(topic_of<Message>(path), qos, listener.get()) == nullptr) {
       throw std::runtime_error("Fast DDS makes no reader of " + path);

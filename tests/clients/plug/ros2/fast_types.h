@@ -14,8 +14,8 @@
 
 namespace tendon::fast {
 
-// The messages of ROS 2 for Fast DDS, written from the definitions of the ROS packages and without a look at
-// clients/plug/ros2: the tests' other side. `each` names the fields in the order of the wire.
+// The ROS 2 messages for Fast DDS, written from the definitions in the ROS packages and independently of
+// clients/plug/ros2. `each` visits the fields in wire order.
 
 struct Header {
   std::int32_t sec = 0;
@@ -38,7 +38,7 @@ struct PoseStamped {
   }
 };
 
-/// Two vectors: a twist or a wrench.
+/// A twist or a wrench.
 struct TwoVectors {
   Header header;
   std::array<double, 3> first{};
@@ -77,7 +77,7 @@ struct JointState {
   }
 };
 
-/// Visits the elements of a sequence of structures, after its length.
+/// Visits the length and then the elements of a sequence of structures.
 template <class Element, class Visit>
 void each_of(std::vector<Element>& elements, Visit& visit) {
   auto count = static_cast<std::uint32_t>(elements.size());

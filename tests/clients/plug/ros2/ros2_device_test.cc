@@ -31,7 +31,7 @@ bool has(const std::vector<std::string>& all, const std::string& words) {
   return std::ranges::any_of(all, [&](const auto& one) { return one.find(words) != std::string::npos; });
 }
 
-/// REP 103's y is the operator's left: −x of the simulated device, which lies like a Falcon.
+/// The y axis of REP 103 points left, which is −x of the simulated device (oriented like a Falcon).
 RosWrench push(double left_n) { return {.header = {}, .force = {0, left_n, 0}, .torque = {0, 0.01, 0}}; }
 
 struct Stage {
@@ -42,12 +42,12 @@ struct Stage {
     world.handle.buttons = {"stylus"};
     start_anew();
   }
-  /// With what world.handle says now.
+  /// Restarts with the current world.handle.
   void start_anew() {
     world.kill_server();
     world.open_server();
   }
-  /// `ms` milliseconds, in each of which `program` may act and all that is due is counted.
+  /// Runs for `ms` milliseconds. In each, calls `program` and counts the messages that are due.
   void run(int ms, const std::function<void()>& program = nullptr) {
     world.run(ms, [&] {
       if (program) program();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// `tendon-plug ros2` between a real tendond and programs on Fast DDS (fast_peer).
+// Tests `tendon-plug ros2` between a real tendond and programs with Fast DDS (fast_peer).
 #include <arpa/inet.h>
 #include <gtest/gtest.h>
 #include <netinet/in.h>
@@ -30,8 +30,8 @@ namespace {
 using std::chrono::milliseconds;
 using tendon::testing::ScratchFolder;
 
-/// A stylus that goes to and fro along the operator's right, with motors that turn it, a gripper, and a button that is
-/// held from the first second on. The device lies like a Falcon.
+/// A stylus that oscillates along the operator's right, with torque motors, a gripper, and a button that is pressed
+/// from 1 s on. Its base frame is that of a Falcon.
 constexpr std::string_view kScene = R"([device]
 kind = "simulated"
 profile = "touch"
@@ -103,8 +103,8 @@ coulomb_friction_n = 0.05
 viscous_friction_n_s_per_m = 0.25
 )";
 
-/// A DDS domain that no other test on this machine uses: its owner holds a UDP port of the domain that participants
-/// with an index below 100 do not take.
+/// Reserves a DDS domain that no other test on this machine uses. The owner binds a UDP port of the domain that
+/// participants with an index below 100 do not use.
 class Domain {
  public:
   Domain() {
@@ -153,7 +153,7 @@ class Peer : public Process {
       : Process(std::filesystem::path(TENDON_PEERS) / "fast_peer", with({"--domain", domain.text()}, more),
                 folder.path()) {}
 
-  /// Waits for a line of which `holds` is true.
+  /// Waits for a line for which `holds` returns true.
   std::string until(const std::function<bool(const std::string&)>& holds) {
     const auto patience = read_clock() + kPatience;
     while (read_clock() < patience) {
@@ -169,7 +169,7 @@ class Peer : public Process {
   std::string until_pushed(double newtons) {
     return until([&](const std::string& line) { return std::abs(number(line, "wrench_y") - newtons) < 1e-6; });
   }
-  /// 1e9: the line does not say.
+  /// Returns 1e9 if the key is missing.
   static double number(const std::string& line, const std::string& key) {
     return line.find('"' + key + "\":") == std::string::npos ? 1e9 : number_in(line, key);
   }
@@ -230,7 +230,7 @@ TEST(Ros2, ReliableAndBestEffortReadersGetEachTopicOfADevice) {
     const std::string line = peer->until([](const std::string& all) {
       return number(all, "pose_n") > 100 && number(all, "twist_n") > 100 && number(all, "wrench_n") > 100 &&
              number(all, "joy_n") > 10 && number(all, "joint_states_n") > 100 && number(all, "servo_twist_n") > 100 &&
-             number(all, "diagnostics_values") == 12;  // the last one is the safety
+             number(all, "diagnostics_values") == 12;  // the last one is the safety layer
     });
     EXPECT_EQ(text_in(line, "pose_frame"), "device_base");
     EXPECT_EQ(text_in(line, "servo_twist_frame"), "device_servo");
@@ -345,7 +345,8 @@ TEST(Ros2, ASecondPublisherIsDroppedAndTold) {
   }
 }
 
-/// Seconds until a reader that is told ten times a second sees no force; the hand must be pushed when it begins.
+/// Seconds until a reader that receives ten updates per second sees no force. The force must not be zero at the
+/// start.
 double seconds_to_no_force(Peer& reader) {
   const auto start = read_clock();
   reader.until_pushed(0);

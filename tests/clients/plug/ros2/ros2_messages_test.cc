@@ -19,9 +19,9 @@ namespace {
 
 constexpr double kQuarter = std::numbers::pi / 2;
 
-/// A Falcon lies as the operator sees: x right, y up, z to the user. REP 103: x forward, y left, z up.
+/// A Falcon's axes are the operator's: x right, y up, z to the user. REP 103: x forward, y left, z up.
 const std::optional<Quat> kFalcon = Quat{};
-/// WoodenHaptics lies as REP 103 wants it already.
+/// WoodenHaptics' axes are those of REP 103.
 const std::optional<Quat> kWooden = quaternion_of(operator_from_device("right=-y up=z user=-x"));
 
 DeviceState at(const Vec3& position) {

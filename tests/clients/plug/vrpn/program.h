@@ -12,7 +12,7 @@
 
 #include "clients/plug/vrpn/vrpn_message.h"
 
-// The bytes of a VRPN program, as VRPN.md has them.
+// The bytes that a VRPN program sends, according to VRPN.md.
 
 namespace tendon::plug::vrpn {
 
@@ -41,7 +41,7 @@ inline Buffer plane_payload(const Plane& plane) {
   return out;
 }
 
-/// A program with numbers of its own: sender 5, and types from 100 on in the order of `Type`.
+/// A program with its own numbering: it is sender 5, and its types start at 100 in the order of `Type`.
 class Program {
  public:
   static constexpr std::int32_t kSender = 5;
@@ -76,12 +76,12 @@ class Program {
   static Buffer draw(const Plane& plane) { return say(Type::kPlane, plane_payload(plane)); }
 };
 
-/// A message of ours, by its names.
+/// A decoded message of the server, with names instead of numbers.
 struct Said {
   std::string sender;
   std::string type;
   Buffer payload;
-  double number(std::size_t at) const {  ///< the f64 that begins at that byte
+  double number(std::size_t at) const {  ///< the f64 at this byte offset
     std::uint64_t bits = 0;
     for (std::size_t i = 0; i < 8; ++i) bits = bits << 8U | std::to_integer<std::uint64_t>(payload.at(at + i));
     return std::bit_cast<double>(bits);
@@ -93,7 +93,7 @@ struct Said {
   }
 };
 
-/// What a program makes of our bytes.
+/// Decodes the server's bytes.
 class Reader {
  public:
   std::vector<Said> take(Bytes bytes, bool has_cookie = false) {

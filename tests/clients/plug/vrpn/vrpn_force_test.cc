@@ -55,7 +55,7 @@ TEST(VrpnPlane, PushesOutAlongItsNormalOnlyAndAnyLengthOfItIsTheSame) {
       const Vec3 normal = sign * Vec3::Unit(axis);
       for (const double length : {1.0, 0.1, 7.0}) {
         Drawing drawing;
-        // The hand is outside where n·x + d > 0: this one lies 10 mm along the normal.
+        // The hand is outside if n·x + d > 0. This one is 10 mm outside along the normal.
         ASSERT_TRUE(drawing.draw(Plane{.normal = length * normal, .offset = -0.01 * length, .spring = 0.5}));
         const Touch touch = felt(drawing, 0.008 * normal + Vec3(0.1, 0.2, 0.3) - 0.1 * (axis == 0) * Vec3::UnitX() -
                                               0.2 * (axis == 1) * Vec3::UnitY() - 0.3 * (axis == 2) * Vec3::UnitZ());
@@ -127,7 +127,7 @@ TEST(VrpnPlane, FrictionSticksAtTheStaticCoefficientAndSlipsAtTheOther) {
 }
 
 TEST(VrpnForce, IsTurnedIntoTheDevicesOwnFrame) {
-  // The device's x looks up, its y to the user, its z to the right.
+  // The device's x axis points up, y to the user, z right.
   const View view(*find_frame("openhaptics"), quaternion_of(operator_from_device("right=z up=x user=y")));
   Drawing drawing;
   drawing.draw(Plane{.normal = Vec3::UnitY(), .spring = 1});

@@ -21,7 +21,7 @@ namespace {
 constexpr Stamp kStamp{1'700'000'000, 250'000};
 constexpr std::uint32_t kSequence = 7;
 
-/// The golden messages of VRPN.md, by name.
+/// Returns the golden messages of VRPN.md by name.
 std::map<std::string, Buffer> golden() {
   std::ifstream file(TENDON_VRPN_MD);
   const std::string page{std::istreambuf_iterator<char>(file), {}};
@@ -88,7 +88,6 @@ TEST(VrpnMessage, TheGoldenMessagesOfThePageAreTheBytesOfTheCode) {
   of("ping", Type::kPing, [](Buffer&) {});
   of("pong", Type::kPong, [](Buffer&) {});
 
-  // What programs say is read.
   EXPECT_EQ(port_in_hello(page.at("hello")), 40000);
   EXPECT_EQ(read_update_rate(payload_of(page.at("update-rate"))), 60);
   const auto field = read_field(payload_of(page.at("force-field"))).value();

@@ -20,7 +20,7 @@ namespace {
 
 using std::chrono::milliseconds;
 
-/// One program before two stations.
+/// One program and two stations.
 class VrpnPeer : public testing::Test {
  protected:
   VrpnPeer() {
@@ -37,7 +37,7 @@ class VrpnPeer : public testing::Test {
     peer_.take_datagram(now_, bytes);
     peer_.end_of_batch(now_);
   }
-  /// Cookie, sender and types.
+  /// Sends cookie, sender and types.
   void introduces_itself() {
     comes(program_.hello());
     comes(Program::description(Program::kSender, kSenderDescription, "Phantom0"));
@@ -217,7 +217,7 @@ TEST_F(VrpnPeer, ANumberMeansWhatItWasDescribedAsLast) {
   comes(Program::all_types());
   comes(Program::draw(ForceField{.force = Vec3(1, 0, 0), .radius = 1}));
   EXPECT_FALSE(peer_.drawing(1).empty());
-  // All types move by one, so that the number of a plane is a field's from now on; and the sender is the other one.
+  // All type numbers move by one, so the former number of a plane now means a field. The sender changes as well.
   comes(Program::all_types(Program::kFirstType + 1));
   comes(Program::description(Program::kSender, kSenderDescription, "Phantom0"));
   comes(Program::message(Program::kSender, Program::kFirstType + static_cast<std::int32_t>(Type::kPlane),
@@ -301,7 +301,7 @@ TEST_F(VrpnPeer, TellsOfADeviceThatStopsGivingForceOnce) {
 TEST_F(VrpnPeer, OfTooManyMessagesTheNewestOfEachBatchIsTaken) {
   introduces_itself();
   double newest = 0;
-  for (int batch = 0; batch < 10; ++batch) {  // a second of 10 000 fields
+  for (int batch = 0; batch < 10; ++batch) {  // 10 000 fields within a second
     for (int i = 0; i < 1000; ++i) {
       newest += 1e-4;
       peer_.take_datagram(now_, Program::draw(ForceField{.force = Vec3(newest, 0, 0), .radius = 1}));
@@ -350,7 +350,7 @@ TEST_F(VrpnPeer, DescriptionsByDatagramAndPortsOfOthersAreNonsense) {
   EXPECT_FALSE(peer_.drawing(0).empty()) << "the sender is still Phantom0";
 }
 
-/// Changes, cuts and doubles bytes of what a program says: whatever comes, a peer ends or goes on.
+/// Changes, truncates and duplicates bytes that a program sends. The peer must close the connection or keep working.
 TEST_F(VrpnPeer, SurvivesAHundredThousandMutatedMessages) {
   std::mt19937_64 random(22);
   const auto below = [&](std::size_t n) { return static_cast<std::size_t>(random() % n); };
@@ -400,7 +400,7 @@ TEST_F(VrpnPeer, SurvivesAHundredThousandMutatedMessages) {
   EXPECT_GT(drawn, 1000U);
 }
 
-/// The bytes that VRPN's own programs sent to a server, NAME.stream, by TCP from the cookie on.
+/// NAME.stream has the bytes that VRPN's own programs sent to a server by TCP, starting with the cookie.
 TEST(VrpnCaptures, WhatRealProgramsSentIsUnderstood) {
   const char* const data = std::getenv("TENDON_DATA");  // NOLINT(concurrency-mt-unsafe): one thread
   if (data == nullptr) GTEST_SKIP() << "TENDON_DATA is not set: no bytes of real programs";

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A VRPN program of its own process is killed, or frozen, while it pushes; what the device did is in the recording.
+// A VRPN program is killed or stopped while it pushes. The recording shows what the device did.
 #include <gtest/gtest.h>
 #include <poll.h>
 
@@ -34,10 +34,10 @@ frequency_hz = 1
 kind = "none"
 )";
 constexpr double kPush = -2;  // N, along x: `vrpn_client.py … press`
-/// N/ms: a fade with a time constant of 50 ms moves 2 N by 0.04 N in a millisecond.
+/// N/ms. A fade with a time constant of 50 ms changes a force of 2 N by 0.04 N in the first millisecond.
 constexpr double kFastest = 0.05;
 
-/// The steps from the last fresh force on.
+/// Returns the steps after the last fresh force.
 std::vector<StepRecord> after_the_last_fresh_one(const Recording& recording) {
   const auto last = std::find_if(recording.steps.rbegin(), recording.steps.rend(), [](const StepRecord& step) {
     return step.mode == Mode::kActive && step.applied.x() < 0.99 * kPush;
@@ -66,7 +66,7 @@ void expect_that_it_fades(int signal) {
   Duration faded{};
   LocalTime before = steps.front().hand.at;
   for (const StepRecord& step : steps) {
-    // A pause of the machine does not stop the fade.
+    // The fade continues while the machine pauses.
     const double passed = std::max(1.0, std::chrono::duration<double, std::milli>(step.hand.at - before).count());
     EXPECT_LT(std::abs(step.applied.x() - last), kFastest * passed) << "tick " << step.tick;
     last = step.applied.x();

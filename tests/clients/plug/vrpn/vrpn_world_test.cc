@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// VRPN programs, the logic of tendon-plug vrpn, and the server's own loops, on virtual time.
+// VRPN programs, the logic of tendon-plug vrpn, and the loops of the server on virtual time.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -33,7 +33,7 @@ class Old {
   Moment now() const { return {world_.now, world_.now.time_since_epoch()}; }
   void says(const Buffer& bytes) { peer.take_stream(now(), bytes); }
 
-  /// As the loop of tendon-plug does: the state goes out, what has come is taken, the plug is asked.
+  /// As the loop of tendon-plug: sends the state, takes the received bytes, and runs the plug.
   void turn() {
     if (const auto sentence = station_.learn(plug_)) sentences.push_back(*sentence);
     if (plug_.state() && plug_.states() != seen_) {
@@ -81,13 +81,13 @@ class Old {
   Vec3 force = Vec3::Zero();
 };
 
-/// A hand that stays where it is but for what it feels.
+/// A hand that only moves if a force acts on it.
 const std::vector<std::string> kStill = {"limiter.kind=\"none\"", "device.hand.motion.amplitude_mm=0"};
 
 Buffer constant(const Vec3& force) { return Program::draw(ForceField{.force = force, .radius = 1}); }
 
 TEST(VrpnWorld, AForceAlongEachAxisPushesThatWayAndTheHandsMotionIsSeenThere) {
-  // The device's x looks to the user, its y to the right, its z up.
+  // The device's x axis points to the user, y right, z up.
   for (const std::string axes : {"", "right=y up=z user=x", "right=-y up=z user=-x"}) {
     for (int axis = 0; axis < 3; ++axis) {
       World world("left.toml", kStill);
@@ -175,7 +175,7 @@ TEST(VrpnWorld, EveryStateIsOnePoseAndNoForceIsAskedForByOneThatWatches) {
   EXPECT_FALSE(plug.pushes());
 }
 
-/// The largest change of the force between two steps, and when it is zero, in ms; −1: it does not end.
+/// The largest change of the force between two steps, and the time at which the force is zero, ms; −1: never.
 struct Fade {
   double largest_step = 0;
   int zero_after = -1;
@@ -296,9 +296,10 @@ TEST_F(VrpnOnAStillHand, AServerThatDiesAndComesBackIsFoundAndFeltAgain) {
   EXPECT_GT(old_.peer.counts().reports, before + 1000);
 }
 
-/// Given out by the device through 20 ms each way, J: the program answers each pose with the force of a wall.
+/// Energy that the device gives out with 20 ms of delay in each direction, J. The program answers each pose with the
+/// force of a wall.
 double given_out(bool limited, bool as_plane) {
-  // Two scenes with one hand; the limiter of the first has parts that none has.
+  // Two scenes with the same simulated hand. The parts of the first scene's limiter cannot be used without a limiter.
   World world = limited ? World("demo_parts.toml", {}, 20) : World("left.toml", {"limiter.kind=\"none\""}, 20);
   Plug& plug = world.add_plug();
   Station station{.name = "Phantom0"};
