@@ -156,7 +156,7 @@ TEST(PairAccount, IsBothAccountsAndWhatIsUnderWayInTheLeadersJoules) {
   Board::Ports ports = both_ends();
   EXPECT_EQ(role_of(ports), PortRole::kLeader);
   EXPECT_NEAR(pair_account(ports).value(), 0.125 + 0.25 + 0.005, 1e-12);
-  ports.own.position_scale = 0.5;  // one joule of the follower is worth 2/0.5 of the leader's
+  ports.own.position_scale = 0.5;  // one joule at the follower is 2/0.5 joules at the leader
   ports.own.force_scale = 2;
   EXPECT_NEAR(pair_account(ports).value(), 0.125 + 4 * 0.25 + 0.005, 1e-12);
   ports.peer->given = 0.01;

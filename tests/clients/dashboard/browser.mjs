@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// Chromium, and what a person sees in it. TENDON_BROWSER names the program.
+// Starts Chromium and reads what the page shows. TENDON_BROWSER is the path of the browser.
 import assert from "node:assert/strict";
 import { after, before } from "node:test";
 import { packageOf, until } from "./support.mjs";
 
 const { chromium } = packageOf("clients/dashboard/page", "playwright-core");
-/** No GPU: WebGL is computed too, for the 3-D view. */
+/** Renders without a GPU; SwiftShader computes WebGL for the 3-D view. */
 const kArgs = ["--no-sandbox", "--disable-gpu-compositing", "--use-angle=swiftshader-webgl", "--enable-unsafe-swiftshader"];
 let browser;
 before(async () => {
@@ -14,7 +13,10 @@ before(async () => {
 });
 after(() => browser?.close());
 
-/** `at`: where in it; `before`: what is done to the page before it is opened. A page that has looked nowhere but at tendon-dash, and against whose policy nothing was done. */
+/**
+ * Opens `at`, which is by default the page's address `url`. `before` prepares the page before it is loaded. The test
+ * fails if the page logs an error or sends a request to another host.
+ */
 export async function visit(test, url, { at = url, before = () => {}, ...options } = {}) {
   const context = await browser.newContext({ viewport: { width: 1280, height: 900 }, ...options });
   const page = await context.newPage();
@@ -33,14 +35,14 @@ export async function visit(test, url, { at = url, before = () => {}, ...options
 }
 
 export const shown = (page) => page.locator("main.live").getAttribute("data-states").then(Number);
-/** Engages a coupling while the hand is far from the wall behind the follower: then the follower will run into it. */
+/** Engages a coupling while the hand is far from the wall at the follower, which the follower will later touch. */
 export async function engage(page) {
   const x = page.locator("[data-chart=position] .key .value").first();
   await until("the hand is far back", async () => Number((await x.textContent()).replace("−", "-")) < -12);
   await page.locator("#engage:not(:disabled)").click();
 }
 export const says = (page, selector, text) => page.locator(selector, { hasText: text }).first().waitFor();
-/** Pixels of a plot that are not empty. */
+/** Returns the number of pixels of a plot that are not empty. */
 export const painted = (page, selector) =>
   page.locator(selector).first().evaluate((canvas) => {
     const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
@@ -48,5 +50,5 @@ export const painted = (page, selector) =>
     for (let i = 3; i < data.length; i += 4) count += data[i] > 0;
     return count;
   });
-/** What the plots look like: a text that is another one when a pixel is. */
+/** Returns a data URL of the first plot, which changes if a pixel changes. */
 export const picture = (page, selector) => page.locator(selector).first().evaluate((canvas) => canvas.toDataURL());

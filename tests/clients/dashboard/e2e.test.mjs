@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// tendon-dash between a tendond and whoever may come to its door.
+// tendon-dash between a tendond and regular or hostile web clients.
 import assert from "node:assert/strict";
 import { once } from "node:events";
 import { truncateSync, writeFileSync } from "node:fs";
@@ -13,7 +12,7 @@ const { WebSocket } = packageOf("clients/typescript", "ws");
 
 async function open(test, url, options = {}) {
   const socket = new WebSocket(url, options);
-  // From the beginning: the first words may come with the very answer that opens it.
+  // Registered before "open", because the first message may arrive with the response of the handshake.
   socket.said = [];
   socket.on("message", (data, binary) => binary || socket.said.push(JSON.parse(data)));
   test.after(() => socket.terminate());
@@ -22,7 +21,7 @@ async function open(test, url, options = {}) {
   return socket;
 }
 
-/** The status with which a WebSocket is refused. */
+/** Returns the status with which a WebSocket is refused; 101: accepted. */
 async function refusal(url, options = {}) {
   const socket = new WebSocket(url, options);
   socket.on("error", () => {});
@@ -32,7 +31,7 @@ async function refusal(url, options = {}) {
   return response.statusCode;
 }
 
-/** A datagram in the clear (0), or one that looks sealed (1). */
+/** Returns a datagram that claims cipher suite 0 (plain) or 1 (sealed). */
 function datagram(number, suite = 0, size = 40) {
   const bytes = Buffer.alloc(size, number & 0xff);
   bytes.set([0x54, 0x13, 0, suite, 1, 0, 0, 0]);
@@ -59,7 +58,7 @@ it("shows a server, its device and its engine, live and as metrics", async (test
   assert.equal(loop.loop.safety, "unguarded");
   const { engines } = await find("the engine is reported", (m) => m.type === "reports" && m.engines.length > 0 && m.engines[0].round_trip_ms);
   assert.equal(engines[0].name, "virtual_wall");
-  // Every state that came, in order: none is told twice.
+  // Each state arrived once and in order.
   const ticks = said.filter((m) => m.type === "states").flatMap((m) => m.tick);
   assert.ok(ticks.every((tick, i) => i === 0 || tick > ticks[i - 1]));
 
@@ -155,7 +154,7 @@ it("refuses who is not what it says, and stays for the others", async (test) => 
   assert.equal((await fetch(`${url}/metrics`)).status, 200);
 });
 
-/** Connections from one address that have said `words` and read nothing. */
+/** Opens connections from one address that send `words` and read nothing. */
 async function crowd(test, address, count, words) {
   const [host, port] = address.split(":");
   const sockets = Array.from({ length: count }, () => connect(Number(port), host).on("error", () => {}));

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// A server of four devices that none of the simulated ones is yet: what /live would say of it, put in the page's WebSocket's place.
+// Replaces the WebSocket of the page with messages from four devices that no simulated device provides.
 
-/** The turn by `angle` about an axis, as w, x, y, z. */
+/** Returns the rotation by `angle` about an axis as w, x, y, z. */
 const turn = (x, y, z, angle) => [Math.cos(angle / 2), ...[x, y, z].map((v) => v * Math.sin(angle / 2))];
 const product = (a, b) => [
   a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
@@ -13,7 +12,7 @@ const product = (a, b) => [
 const kBox = [[-0.08, -0.06, -0.06], [0.08, 0.06, 0.06]];
 const handle = (more) => ({ operator_from_device: [1, 0, 0, 0], buttons: [], orientation_measured: false, max_torque_nm: 0, gripper_open_rad: null, max_gripper_force_n: 0, group: "", hand: "any", ...more });
 
-/** A base frame with x to the user, y to the right and z up, as of a Falcon. */
+/** A base frame with x to the user, y right, z up, as of a Falcon. */
 export const kTurnedFrame = [0.5, -0.5, -0.5, -0.5];
 
 export const kDevices = [
@@ -28,7 +27,7 @@ export const serverMessage = (devices = kDevices) => ({
   devices: devices.map((device, number) => ({ number, loop_hz: 1000, max_force_n: 8, channels: [], arming_objection: "This page only looks on.", ...device })),
 });
 
-/** `number` of kDevices at `t` s. */
+/** Returns the state of kDevices[number] at time `t`, s. */
 function stateOf(number, t) {
   const sway = (rate, phase = 0) => Math.sin(rate * t + phase);
   const plain = { orientation: null, torque_nm: null, grip_rad: null, grip_n: null, buttons: 0 };
@@ -44,7 +43,7 @@ function stateOf(number, t) {
   return { ...plain, position_m: [0.03 * sway(1.4), 0.03 * sway(2.9), 0.02], applied_n: [0, 0, 0], wanted_n: [0, 0, 0] };
 }
 
-/** The states of a device at ticks [from, to), one in `every`: the columns that page_json.cc makes. */
+/** Returns the states of a device at ticks [from, to), one in `every`, in the columns of page_json.cc. */
 export function statesMessage(number, from, to, every = 1) {
   const ticks = [];
   for (let tick = from; tick < to; tick += every) ticks.push(tick);
@@ -68,8 +67,8 @@ const reportsMessage = (device) => ({
 });
 
 /**
- * Stands in for /live of `page`, before it is opened: what a page hears of four devices at 1 kHz, sixty times a second. `heard`: the
- * lines that it said. `until` ticks; then the devices stand still.
+ * Replaces /live of `page` by four devices at 1 kHz, with 60 messages per second. Call it before the page is opened.
+ * The devices stop at tick `until`. Returns the list of lines that the page sends.
  */
 export async function fakeFeed(page, { devices = kDevices, until = Infinity, begin = 4000 } = {}) {
   const heard = [];

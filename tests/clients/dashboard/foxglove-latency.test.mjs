@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// How long a state takes from its sample to Foxglove's client, beside the floor of the same connection: half the round
-// trip of a WebSocket's ping, which tendon-dash answers at once. Not in CI: run foxglove-latency.
+// Measures the latency from a state's sample to Foxglove's client. The reference is half the round trip of a
+// WebSocket ping on the same connection. Run foxglove-latency by hand; it is not part of CI.
 import { readFileSync } from "node:fs";
 import { it } from "node:test";
 import { Viewer } from "./foxglove_client.mjs";
@@ -15,7 +14,7 @@ const summary = (values) => {
   return `p50 ${quantile(sorted, 0.5)} ms, p99 ${quantile(sorted, 0.99)} ms, n = ${sorted.length}`;
 };
 
-/** The processor's time of a process: in /proc/PID/stat in hundredths of a second, after the name in brackets. */
+/** Returns the CPU time of a process, from fields of /proc/PID/stat in units of 10 ms. */
 function usedMs(pid) {
   const fields = readFileSync(`/proc/${pid}/stat`, "utf8").split(") ")[1].split(" ");
   return 10 * (Number(fields[11]) + Number(fields[12]));
@@ -27,7 +26,7 @@ it("measures", { timeout: 120_000 }, async (test) => {
   const viewer = new Viewer(test, address);
   const { messages: reports } = await viewer.subscribe("/demo/device");
   const { messages: steps } = await viewer.subscribe("/haptic/step");
-  // The first times are before the clocks are compared well.
+  // The first time stamps precede a good estimate of the clock offset.
   await until("a few reports come", () => reports.length >= 5);
   steps.length = 0;
   const began = { at: performance.now(), used: usedMs(program.process.pid) };
@@ -40,7 +39,7 @@ it("measures", { timeout: 120_000 }, async (test) => {
   }, 20);
   await until("enough steps come", () => steps.length >= kSteps);
   clearInterval(pinging);
-  // A report holds a time by the server's clock, CLOCK_MONOTONIC like hrtime, beside the same time as Foxglove sees it.
+  // A report has the same time on the server's clock (CLOCK_MONOTONIC, as hrtime) and as converted for Foxglove.
   const report = reports.at(-1);
   const offset = report.time - BigInt(report.until_ns);
   const late = steps.map((step) => Number(step.now - (step.time - offset)) / 1e6);

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// Foxglove's own client at a tendon-dash and a tendond.
+// Tests Foxglove's own client with tendon-dash and tendond.
 import assert from "node:assert/strict";
 import { it } from "node:test";
 import { foxgloveEnumSchemas, foxgloveMessageSchemas, generateProto, kNames, protobuf, refusal, Viewer, WebSocket } from "./foxglove_client.mjs";
@@ -9,7 +8,7 @@ import { fakeServer, metric, Program, scratch, startDash, startServer, until } f
 const sleep = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
 const statesOf = (url, device = "demo") => metric(url, `tendon_device_states_total{device="${device}"}`);
 
-/** The ticks of the steps: how many steps, how many ticks they span, and whether each is newer than the one before. */
+/** Returns the number of steps, the range of their ticks, and whether the ticks increase. */
 function ticksOf(steps) {
   return { count: steps.length, span: steps.at(-1).tick - steps[0].tick + 1, inOrder: steps.every((step, i) => i === 0 || step.tick > steps[i - 1].tick) };
 }
@@ -40,7 +39,8 @@ it("gives Foxglove's client every step until it unsubscribes", async (test) => {
     const { count, span, inOrder } = ticksOf(steps);
     const hz = (span - 1) / (Number((steps.at(-1).time - steps[0].time) / 1000n) / 1e6);
     test.diagnostic(`${name}: ${count} steps of ${arrived} states that came, of ${span} ticks; ${hz.toFixed(1)} in a second, ${after} after it unsubscribed`);
-    // On a busy machine some states never come. Those that come slowly, before and after, are no steps that it was told.
+    // On a busy machine some states never arrive. States received at the low rate before and after are not sent as
+    // steps.
     assert.ok(inOrder && count >= arrived - 250 && count >= 0.7 * span, `${count} of ${arrived} of ${span}`);
     assert.ok(hz > 900 && hz < 1020, `${hz}`);
     assert.ok(after <= 100, `${after} steps came after that`);
@@ -156,7 +156,7 @@ it("drops whole tenths of a second for one that does not read", async (test) => 
     for (const { time } of some) tenths.set(time / 100_000_000n, (tenths.get(time / 100_000_000n) ?? 0) + 1);
     return tenths;
   };
-  // The other viewer was told of every state that came.
+  // The other viewer received every state that arrived.
   const tenths = tenthsOf(late);
   const whole = tenthsOf(steps);
   const parts = [...tenths].filter(([tenth, some]) => some < whole.get(tenth)).length;

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// The client of Foxglove's own package, @foxglove/ws-protocol, at /foxglove of a tendon-dash.
+// Connects the client of Foxglove's package @foxglove/ws-protocol to /foxglove of tendon-dash.
 import { once } from "node:events";
 import { createRequire } from "node:module";
 import { join } from "node:path";
@@ -16,7 +15,7 @@ export { protobuf };
 
 export const kNames = ["foxglove.sdk.v1", "foxglove.websocket.v1"];
 
-/** The status with which a WebSocket to /foxglove is refused; 101 when it is not. */
+/** Returns the status with which a WebSocket to /foxglove is refused; 101: accepted. */
 export async function refusal(address, protocols, options = {}) {
   const socket = new WebSocket(`ws://${address}/foxglove`, protocols, options);
   socket.on("error", () => {});
@@ -26,7 +25,7 @@ export async function refusal(address, protocols, options = {}) {
   return response.statusCode;
 }
 
-/** A viewer: what it was told, and the decoder of each channel by the schema that came with it. */
+/** Collects all messages and decodes each channel with the schema that the server advertised. */
 export class Viewer {
   channels = new Map();
   statuses = [];

@@ -16,7 +16,7 @@ namespace {
 using nlohmann::json;
 
 constexpr Duration kUnixOffset = std::chrono::seconds(1'700'000'000);
-/// The server's clock is so far ahead of ours.
+/// Offset of the server's clock.
 constexpr Duration kAhead = std::chrono::hours(5);
 
 class FoxgloveFeedTest : public testing::Test {
@@ -57,7 +57,7 @@ class FoxgloveFeedTest : public testing::Test {
     }
     return all;
   }
-  /// The topics' channels, by what was advertised last.
+  /// Returns the channel of a topic in the last advertisement.
   std::uint32_t channel(FoxgloveFeed::ClientId client, const std::string& topic) {
     for (const json& text : told(client).texts) {
       if (text["op"] != "advertise") continue;
@@ -113,7 +113,7 @@ TEST_F(FoxgloveFeedTest, GivesEveryStateOnceFromTheSubscriptionOn) {
     states(1, 3);
     feed_.take(now_);
     feed_.take(now_);
-    if (turn == 2) board_.take_states(1);  // the page's own feed takes them away
+    if (turn == 2) board_.take_states(1);  // the page's own feed takes the states of this device
   }
   const auto steps = told(client).data;
   ASSERT_EQ(steps.size(), 15U);
@@ -125,7 +125,7 @@ TEST_F(FoxgloveFeedTest, TimesAreThoseOfTheSamplesInUnixTime) {
   ASSERT_TRUE(subscribe(client, 3, "/haptic/step"));
   states(0, 1);
   feed_.take(now_ += std::chrono::milliseconds(3));
-  // The estimate of the clock moves a little: the times do not.
+  // Small changes of the clock estimate do not change the time stamps.
   board_.observe_clock(kAhead + std::chrono::microseconds(900));
   states(0, 1);
   feed_.take(now_ += std::chrono::milliseconds(3));

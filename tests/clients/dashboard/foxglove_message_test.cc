@@ -147,7 +147,7 @@ TEST(FoxgloveMessage, ReportsAreAsOnTheWire) {
 }
 
 TEST(FoxgloveMessage, TheOperatorsRightIsTheWorldsRightAndUpIsUp) {
-  // A Falcon's base frame: x to the user, y to the right, z up.
+  // The base frame of a Falcon: x to the user, y right, z up.
   const Quat falcon{.w = 0.5, .x = -0.5, .y = -0.5, .z = -0.5};
   ASSERT_LT((rotated(falcon, Vec3::UnitZ()) - Vec3::UnitY()).norm(), 1e-12) << "z is up";
   const std::array devices = {Drawn{.name = "a", .operator_from_device = Quat{}, .state = full_state()},
@@ -215,7 +215,7 @@ TEST(FoxgloveMessage, AStylusLiesBehindItsTipAndABallHasNoDirection) {
   const auto stylus = parsed<foxglove::SceneUpdate>(scene_payload({.name = "a", .state = state})).entities(0);
   ASSERT_EQ(stylus.cylinders_size(), 1);
   const Vec3 middle = vec3(stylus.cylinders(0).pose().position()) - state.position;
-  // Half a turn about x: its tip, −z of the handle frame, points along +z of the base frame.
+  // After half a turn about x, the tip (−z of the handle frame) points along +z of the base frame.
   EXPECT_LT((middle.normalized() - Vec3(0, 0, -1)).norm(), 1e-12);
   EXPECT_NEAR(middle.norm(), stylus.cylinders(0).size().z() / 2, 1e-12);
   state.turning.reset();

@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
+// Measures the 3-D view of four devices. The results depend on the machine, so it is not part of CI:
 //
-// Measures the 3-D view of four devices; no test, because its figures are those of a machine:
+//   tests/clients/dashboard/run frames
 //
-//     tests/clients/dashboard/run frames
-//
-// What a frame costs the page, and how late the haptic threads of the server begin their steps with the page open and
-// without it, in turns. Chromium has no GPU here: it computes WebGL on the processor, which a visitor's does not.
+// Measures the cost of a frame, and the wake-up lateness of the server's haptic threads with and without the open
+// page, in alternation. Chromium computes WebGL on the CPU here.
 import { writeFileSync } from "node:fs";
 import { join } from "node:path";
 import { it } from "node:test";
@@ -46,7 +45,7 @@ coulomb_friction_nm = 5e-4
 viscous_friction_nm_s_per_rad = 1e-4
 `;
 
-/** Counts of a histogram in /metrics by its bounds, of all devices together. */
+/** Returns the cumulative counts of the lateness histogram in /metrics by upper bound, summed over all devices. */
 async function lateness(url) {
   const text = await (await fetch(`${url}/metrics`)).text();
   const counts = new Map();
@@ -56,7 +55,7 @@ async function lateness(url) {
   return counts;
 }
 const since = (before, now) => new Map([...now].map(([le, count]) => [le, count - (before.get(le) ?? 0)]));
-/** The bound below which `share` of them are, µs. */
+/** Returns the smallest bound that includes this share of the samples, µs. */
 function quantile(counts, share) {
   const bounds = [...counts.keys()].sort((a, b) => a - b);
   const all = counts.get(Infinity);
@@ -64,7 +63,7 @@ function quantile(counts, share) {
 }
 const pause = (seconds) => new Promise((resolve) => setTimeout(resolve, 1000 * seconds));
 
-/** Intervals of frames, and what the page's scripts and its main thread did. */
+/** Measures the frame intervals and the time in scripts and on the main thread. */
 async function frames(page) {
   const client = await page.context().newCDPSession(page);
   await client.send("Performance.enable");

@@ -6,8 +6,8 @@
 
 namespace tendon::dash {
 
-/// Both ends of a coupling, of scales 1 and 1, that have heard of each other. The leader has paid 30 mJ, of which 5 mJ are
-/// under way.
+/// The two sides of an engaged coupling with scales of 1. The leader has given 30 mJ, of which the follower has
+/// received 25 mJ.
 inline Board::Ports both_ends() {
   Board::Ports ports;
   PortFrame& leader = ports.own;
@@ -31,7 +31,7 @@ inline Board::Ports both_ends() {
   return ports;
 }
 
-/// A board of which nothing is missing.
+/// A board with all optional values present.
 inline Board full_board() {
   Board board;
   Welcome welcome;

@@ -17,7 +17,7 @@
 #include "recording.pb.h"
 #include "tests/clients/dashboard/full_board.h"
 
-// deploy/monitoring asks for nothing that is not there.
+// The files in deploy/monitoring must only use metrics, labels and fields that exist.
 
 namespace tendon::dash::monitoring_test {
 namespace {
@@ -30,7 +30,7 @@ std::string read(const std::string& name) {
   return text.str();
 }
 
-/// Every name of a sample that is exported, with its labels.
+/// Returns the names of all exported metrics and their labels.
 std::map<std::string, std::set<std::string>> exported() {
   const std::string text = metrics_text(full_board(), {}, {});
   static const std::regex sample(R"(^(tendon_[a-z_]+)(\{[^\n]*\})? )", std::regex::multiline);
@@ -38,7 +38,7 @@ std::map<std::string, std::set<std::string>> exported() {
   std::map<std::string, std::set<std::string>> names;
   for (auto match = std::sregex_iterator(text.begin(), text.end(), sample); match != std::sregex_iterator(); ++match) {
     auto& labels = names[match->str(1)];
-    labels.insert("instance");  // Prometheus' own
+    labels.insert("instance");  // added by Prometheus
     const std::string all = match->str(2);
     for (auto one = std::sregex_iterator(all.begin(), all.end(), label); one != std::sregex_iterator(); ++one)
       labels.insert(one->str(1));
@@ -46,7 +46,8 @@ std::map<std::string, std::set<std::string>> exported() {
   return names;
 }
 
-/// The metrics that an expression names; each must be exported, and so must the labels by which it chooses and groups.
+/// Returns the metrics in a PromQL expression. They must be exported, and so must the labels that it selects or
+/// groups by.
 std::set<std::string> expect_exported(const std::string& expression) {
   static const std::map<std::string, std::set<std::string>> known = exported();
   static const std::regex metric(R"((tendon_[a-z_]+)(\{([^}]*)\})?)");
@@ -58,7 +59,7 @@ std::set<std::string> expect_exported(const std::string& expression) {
        ++match) {
     const std::string name = match->str(1);
     used.insert(name);
-    if (name == "tendon_expected_servers") continue;  // the site's inventory
+    if (name == "tendon_expected_servers") continue;  // defined by the site's inventory
     const auto found = known.find(name);
     if (found == known.end()) {
       ADD_FAILURE() << name << " is not exported: " << expression;
@@ -69,7 +70,7 @@ std::set<std::string> expect_exported(const std::string& expression) {
     for (auto one = std::sregex_iterator(choices.begin(), choices.end(), choice); one != std::sregex_iterator(); ++one)
       EXPECT_TRUE(found->second.contains(one->str(1))) << name << " has no label " << one->str(1);
   }
-  // Prometheus' own, of a target that is gone.
+  // Prometheus sets `up` for each target.
   if (expression.starts_with("up{job=\"tendon\"}")) used.insert("up");
   EXPECT_FALSE(used.empty()) << "names no metric: " << expression;
   for (auto match = std::sregex_iterator(expression.begin(), expression.end(), group); match != std::sregex_iterator();
@@ -135,7 +136,7 @@ TEST(Monitoring, PrometheusLoadsTheseAlertsAndLooksAtThemAsOftenAsItScrapes) {
   EXPECT_NE(text.find("127.0.0.1:8080"), std::string::npos);
 }
 
-/// The panels that a part of a layout names.
+/// Returns the panels in this part of a layout.
 std::set<std::string> panels_of(const nlohmann::json& part) {
   if (part.is_string()) return {part.get<std::string>()};
   std::set<std::string> all = panels_of(part.at("first"));
@@ -143,7 +144,7 @@ std::set<std::string> panels_of(const nlohmann::json& part) {
   return all;
 }
 
-/// "/haptic/step.position_m.x" leads to a number, a bool or an enum of a step.
+/// Returns whether a path such as "/haptic/step.position_m.x" names a number, bool or enum of a step.
 bool is_plotted_field(const std::string& path) {
   constexpr std::string_view kTopic = "/haptic/step.";
   if (!path.starts_with(kTopic)) return false;

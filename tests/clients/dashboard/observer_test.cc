@@ -13,7 +13,7 @@
 #include "server/network_loop.h"
 #include "tests/support/wire.h"
 
-// The observer against the server's own network half, on virtual time, over a perfect network.
+// The observer and the server's NetworkLoop on virtual time, over a network without loss.
 
 namespace tendon::dash::observer_test {
 namespace {
@@ -41,7 +41,7 @@ class ObserverTest : public testing::Test {
     server_.inbox.clear();
     loop_ = std::make_unique<NetworkLoop>(config, server_, now_);
   }
-  /// 1 ms at a time; each device makes a step in each.
+  /// Runs in steps of 1 ms. Each device takes one step in each.
   void run(Duration length) {
     for (const LocalTime end = now_ + length; now_ < end; now_ += milliseconds(1)) {
       ++tick_;
@@ -86,7 +86,7 @@ class ObserverTest : public testing::Test {
   std::vector<std::unique_ptr<Mailboxes>> mail_;
   std::unique_ptr<NetworkLoop> loop_;
   std::uint64_t tick_ = 0;
-  std::optional<PortState> port_;  ///< of every device
+  std::optional<PortState> port_;  ///< if set, the state of the coupling of every device
   Board board_;
   std::optional<Observer> observer_{std::in_place, own_, server_.self, Observer::Config{.seed = 1}, board_, now_};
 };

@@ -14,7 +14,7 @@
 #include "server/assembly.h"
 #include "tests/support/wire.h"
 
-// The operator beside the observer and an engine, against the server's own loops and its safety layer, on virtual time.
+// The operator, the observer and an engine with the server's loops and its safety layer, on virtual time.
 
 namespace tendon::dash::operator_test {
 namespace {
@@ -23,7 +23,7 @@ using std::chrono::milliseconds;
 using std::chrono::seconds;
 using State = Press::State;
 
-/// A handle at rest.
+/// A handle that does not move.
 class Handle final : public Device {
  public:
   const DeviceInfo& info() const noexcept override { return info_; }
@@ -109,7 +109,7 @@ class OperatorTest : public testing::Test {
       }
     }
   }
-  /// In place of a coupling, which has no other end.
+  /// Stands in for the coupling, which has no peer here.
   void obey(const HapticOrder* order) {
     if (order != nullptr && obeys_ && order->kind == HapticOrder::Kind::kEngage) port_->phase = PortPhase::kEngaged;
     if (order != nullptr && obeys_ && order->kind == HapticOrder::Kind::kDisengage) port_->phase = PortPhase::kCoupled;
@@ -121,7 +121,7 @@ class OperatorTest : public testing::Test {
     port_->phase = PortPhase::kCoupled;
     serve(false);
   }
-  /// As long as a press is under way.
+  /// Runs until the press is no longer under way.
   const Press& settle() {
     for (int i = 0; i < 200 && board_.press()->state == State::kUnderWay; ++i) run(milliseconds(50));
     return *board_.press();
@@ -142,9 +142,9 @@ class OperatorTest : public testing::Test {
   std::optional<Assembly> loops_;
   int steps_ = 0;
   bool shaking_ = false;
-  std::optional<PortState> port_;  ///< of a coupling
-  bool obeys_ = true;              ///< … which does what it is told
-  bool blind_ = false;             ///< what the server tells the observer is lost
+  std::optional<PortState> port_;  ///< if set, the state of the coupling
+  bool obeys_ = true;              ///< whether the coupling obeys orders
+  bool blind_ = false;             ///< whether all messages to the observer are lost
   Board board_;
   Observer observer_{observer_end_, server_.self, {.key = operator_key_.key, .seed = 1}, board_, now_};
   std::optional<ForceClient> engine_;
@@ -181,7 +181,7 @@ TEST_F(OperatorTest, ArmsAndDisarmsBesideAnEngineAndLeaves) {
 }
 
 TEST_F(OperatorTest, TakesNothingFromTheHolderAndSaysWhoThatIs) {
-  serve(true, {"operator"});  // one that need not wait for a lease
+  serve(true, {"operator"});  // this channel needs no wait for a lease
   Operator& person = with(operator_key_, "main");
   start_engine(engine_key_, "main");
   run(seconds(3));
@@ -286,7 +286,7 @@ TEST_F(OperatorTest, SaysThatTheServerDoesNotAnswer) {
   EXPECT_EQ(board_.press()->words, "Not done: no answer from 192.0.2.1:47100.");
 }
 
-// The observer may meanwhile have found another server, with fewer devices.
+// The observer may have connected to another server with fewer devices.
 TEST_F(OperatorTest, ADeviceThatIsGoneWhenTheAnswerComesShowsNothing) {
   Operator& person = with(operator_key_, "operator");
   run(seconds(2));

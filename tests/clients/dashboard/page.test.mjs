@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// The page on a live server, as a person uses it.
+// Operates the page in a browser, with a running server.
 import assert from "node:assert/strict";
 import { writeFileSync } from "node:fs";
 import { join } from "node:path";
@@ -117,7 +116,7 @@ it("says that there is no such page, and shows the pages there are", async (test
   await page.locator("main.live").waitFor();
 });
 
-/** A hand that rests 8 mm deep in a wall, a device that is armed by request, and a channel that is the operator's. */
+/** A hand that rests 8 mm deep in a wall. The device is armed by request, and the operator has its own channel. */
 const kGuarded = `
 [device]
 kind = "simulated"
@@ -142,7 +141,7 @@ name = "operator"
 keys = "keys"
 `;
 
-/** A server with keys for an engine, an operator and a screen. */
+/** Starts a server with keys for an engine, an operator, a colleague and a screen. */
 async function guarded(test) {
   const folder = scratch(test);
   await makeKeys(test, folder, ["engine", "operator", "colleague"]);
@@ -182,7 +181,7 @@ it("two buttons arm and disarm beside a running engine and say the result", asyn
   await result(page, "good", "Armed: it gives forces.");
   await until("force is given again", async () => (await applied(page)) > 0);
 
-  // Another operator disarms: that it was armed is no news any more.
+  // When another operator disarms the device, the result of the previous press disappears.
   const { url: elsewhere, operatorUrl: colleagues } = await startDash(test, server.address, ...key("colleague"), "--arm", "operator");
   const authorization = `Bearer ${colleagues.split("/").at(-1)}`;
   await until("the colleague has disarmed it", async () => {

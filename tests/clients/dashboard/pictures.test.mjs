@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
+// Updates the pictures in deploy/screenshots, which a person should check after changes of the page:
 //
-// Makes the pictures of deploy/screenshots anew; no test, but what a person should look at after a change of the page:
-//
-//     tests/clients/dashboard/run pictures
+//   tests/clients/dashboard/run pictures
 import { writeFileSync } from "node:fs";
 import { join } from "node:path";
 import { it } from "node:test";
@@ -15,7 +14,7 @@ const kDark = { colorScheme: "dark", viewport: { width: 1280, height: 960 } };
 const kLight = { colorScheme: "light", viewport: { width: 1280, height: 960 } };
 const kPhone = { colorScheme: "light", viewport: { width: 390, height: 844 } };
 
-/** A bad network before the server: where a client sends to. */
+/** Starts a simulated bad network in front of the server. Returns the address for clients. */
 async function inject(test, server, profile) {
   const program = new Program(test, "tendon-inject", ["--listen", "127.0.0.1:0", "--to", server, "--profile", profile, "--seed", "8", "--json"]);
   return JSON.parse(await program.line('"start"')).listen;
@@ -53,7 +52,7 @@ name = "operator"
 keys = "keys"
 `;
 
-/** A device with a safety layer, armed from the page, with an engine behind 20 ms. */
+/** Starts a device with a safety layer, armed from the page, and an engine behind a delay of 20 ms. */
 async function armed(test, name, fastest) {
   const folder = scratch(test);
   await makeKeys(test, folder, ["engine", "operator"]);

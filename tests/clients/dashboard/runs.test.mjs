@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// The page on recordings, as a person uses it.
+// Operates the page on recordings, in a browser.
 import assert from "node:assert/strict";
 import { closeSync, copyFileSync, openSync, readFileSync, statSync, truncateSync, writeFileSync, writeSync } from "node:fs";
 import { join } from "node:path";
@@ -76,7 +75,7 @@ it("opens recordings, scrubs them, and shows two side by side", async (test) => 
     await wall.stop();
   };
   await Promise.all([record("one"), record("two", "--without-limiter")]);
-  // The server was killed: no index, and half of a piece at the end.
+  // As after a crash of the server: there is no index, and the last chunk is incomplete.
   copyFileSync(join(folder, "one.mcap"), join(folder, "torn.mcap"));
   truncateSync(join(folder, "torn.mcap"), 400_000);
   writeFileSync(join(folder, "noise.mcap"), "this is no recording");
@@ -118,7 +117,7 @@ it("opens recordings, scrubs them, and shows two side by side", async (test) => 
   await page.click("#compare");
   await page.locator(".runs.two .run").nth(1).waitFor();
   assert.deepEqual(await page.locator(".run h2").allTextContents(), ["one.mcap", "two.mcap"]);
-  // Without a limiter nothing is limited by energy; with it something is.
+  // Only the recording with a limiter has samples that are limited by energy.
   const [left, right] = ["one", "two"].map((name) => page.locator(`[data-run='${name}.mcap']`));
   await page.click("#whole");
   await left.locator("[data-reason='0']").waitFor();
@@ -150,7 +149,7 @@ it("opens a recording at its first instant, and says one number of steps", async
   assert.equal(await tile("state", "note"), `all ${steps} steps are shown`);
   assert.doesNotMatch(await tile("loss", "note"), /\d{3}/, "no third number of steps");
 
-  // At the end the server has stopped the force, and the account of a device without limiter is overdrawn.
+  // At the end the server has stopped the force, and the energy account of the device without a limiter is negative.
   const box = await page.locator("[data-chart=force] .u-over").boundingBox();
   await page.mouse.move(box.x + box.width - 2, box.y + 20);
   await until("the tiles tell of the end", async () => Number((await tile("energy", "name")).match(/at ([\d.]+)/)?.[1]) > 2.5);
@@ -187,7 +186,7 @@ it("shows the force by its components when the legend is told to", async (test) 
   await until("they are gone again", async () => (await keys()) === 3);
 });
 
-/** A recording of `count` steps, one each millisecond: those of another one, again and again. */
+/** Writes a recording of `count` steps at 1 kHz, which repeats the steps of another recording. */
 async function lengthen(from, to, count) {
   const reader = new McapStreamReader();
   reader.append(readFileSync(from));

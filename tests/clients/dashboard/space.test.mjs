@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// The 3-D view: what it draws for which state, as numbers; then the page, as a person sees and turns it.
+// Tests the 3-D view: the figure that it computes for a state, then the page in a browser.
 import assert from "node:assert/strict";
 import { mkdirSync, readFileSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
@@ -9,7 +8,7 @@ import { says, visit } from "./browser.mjs";
 import { fakeFeed, kDevices, kTurnedFrame } from "./fake_feed.mjs";
 import { kRoot, packageOf, Program, scratch, startDash, startServer, until } from "./support.mjs";
 
-/** The page's own modules that need no browser, without their types. */
+/** Imports modules of the page that do not need a browser, transpiled to JavaScript. */
 async function modules(test, ...names) {
   const ts = packageOf("clients/dashboard/page", "typescript");
   const folder = scratch(test);
@@ -32,7 +31,7 @@ const kSample = { t: 0, x: 0.1, y: 0.2, z: 0.3, wx: NaN, wy: NaN, wz: NaN, ax: 1
 
 it("turns everything of a device into the frame of who looks at it", async (test) => {
   const { figureOf, product, rotated } = await modules(test, "space/figure");
-  // x to the user, y to the right, z up.
+  // x to the user, y right, z up.
   const handle = { ...kHandle, operator_from_device: kTurnedFrame };
   const half = Math.SQRT1_2;
   const pose = { position: [1, 2, 3], orientation: [half, 0, 0, half], force: [1, 0, 0], wanted: [0, 1, 0], torque: [0, 0, 1], hand: [0, 0, -1], buttons: 0, contact: { normal: [0, 0, 1], gap: -0.5 } };
@@ -44,7 +43,8 @@ it("turns everything of a device into the frame of who looks at it", async (test
   near(figure.hand, [0, -1, 0], "hand");
   near(figure.plane.normal, [0, 1, 0], "normal");
   near(figure.plane.at, [2, 3.5, 1], "the surface is half a metre above a tool pressed in as deep");
-  // The handle is turned by 90° about the base's z, which is up: what was ahead (−z) stays down, its x points along the base's y.
+  // The handle is rotated by 90° about the base's z axis (up): its −z axis points down and its x axis along the
+  // base's y axis.
   const [x, y, z, w] = figure.quaternion;
   near(rotated([w, x, y, z], [0, 0, -1]), [0, -1, 0], "where it points");
   near(rotated([w, x, y, z], [1, 0, 0]), [1, 0, 0], "its x");
@@ -65,7 +65,7 @@ it("draws what a state holds and nothing else", async (test) => {
   assert.equal(full.opening, 0.25);
   assert.deepEqual(full.buttons, [{ name: "front", held: true }, { name: "rear", held: false }, { name: "button 2", held: true }]);
   assert.equal(wordsOf(full), "a stylus, a force, a torque, two fingers, a surface, front held, button 2 held");
-  // Steps that came before the first handle, and columns that grow.
+  // Steps before the first handle state, and columns that must grow.
   for (let i = 2; i < 5000; ++i) track.push({ ...kSample, t: i / 1000 });
   assert.equal(poseAt(track, 0).orientation, undefined);
   assert.deepEqual(poseAt(track, 1).orientation, [1, 0, 0, 0]);
@@ -120,7 +120,7 @@ it("fills the picture with a grid, and keeps the view within bounds", async (tes
 
 const kCanvas = ".spatial canvas";
 const words = (page) => page.locator(kCanvas).getAttribute("aria-label");
-/** Pixels of the 3-D picture that have about the colour of each of these CSS variables. */
+/** Counts the pixels of the 3-D view whose color is close to that of each CSS variable. */
 async function coloured(page, ...names) {
   const png = (await page.locator(kCanvas).screenshot()).toString("base64");
   return page.evaluate(async ([data, variables]) => {

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// Programs of ours, as a user starts them, and patience.
+// Starts Tendon's programs and waits for their output.
 import { spawn } from "node:child_process";
 import { createSocket } from "node:dgram";
 import { copyFileSync, mkdirSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
@@ -14,17 +13,17 @@ import { fileURLToPath } from "node:url";
 export const kRoot = join(dirname(fileURLToPath(import.meta.url)), "../../..");
 const kPatienceMs = 60_000;
 
-/** A package that npm has brought into one of the clients' folders. */
+/** Imports an npm package that is installed in the folder of one of the clients. */
 export const packageOf = (folder, name) => createRequire(join(kRoot, folder, "package.json"))(name);
 
-/** A folder of the test's own. */
+/** Creates a temporary folder for the test. */
 export function scratch(test) {
   const folder = mkdtempSync(join(tmpdir(), "tendon-dash-"));
   test.after(() => rmSync(folder, { recursive: true }));
   return folder;
 }
 
-/** A running program; its lines on either stream. Gone at the end of the test. */
+/** A running program and the lines of its stdout and stderr. It is killed at the end of the test. */
 export class Program {
   lines = [];
   constructor(test, name, args, folder) {
@@ -48,7 +47,7 @@ export class Program {
   }
 }
 
-/** Waits for what another process brings about. */
+/** Waits for a condition that another process causes. */
 export async function until(what, done, more = () => "") {
   const deadline = performance.now() + kPatienceMs;
   for (;;) {
@@ -59,7 +58,9 @@ export async function until(what, done, more = () => "") {
   }
 }
 
-/** NAME.key in `folder`, and a copy in its `keys`, where a scene's `keys = "keys"` looks. */
+/**
+ * Writes NAME.key to `folder` and a copy to its subfolder `keys`, which is the folder for `keys = "keys"` in a scene.
+ */
 export async function makeKeys(test, folder, names, ...more) {
   mkdirSync(join(folder, "keys"), { recursive: true });
   for (const name of names) {
@@ -69,7 +70,7 @@ export async function makeKeys(test, folder, names, ...more) {
   }
 }
 
-/** tendond with scenes of deploy/scenes, or of files of the test's own; its address. */
+/** Starts tendond with scenes from deploy/scenes or with scene files. */
 export async function startServer(test, folder, scenes, ...more) {
   const paths = scenes.map((scene) => (scene.endsWith(".toml") ? scene : join(kRoot, "deploy/scenes", `${scene}.toml`)));
   const program = new Program(test, "tendond", [...paths, ...(more.includes("--listen") ? [] : ["--listen", "127.0.0.1:0"]), "--json", ...more], folder);
@@ -77,8 +78,8 @@ export async function startServer(test, folder, scenes, ...more) {
 }
 
 /**
- * The two servers of follower.toml and leader.toml, coupled. The leader lets the holder of operator.key in, and is engaged by request.
- * `network`: a profile of tendon-inject between them.
+ * Starts the coupled servers of leader.toml and follower.toml. operator.key can connect to the leader, which is
+ * engaged by request. `network` is the profile of the tendon-inject between them.
  */
 export async function startPair(test, folder, network = "delay=10ms") {
   await makeKeys(test, folder, ["operator"]);
@@ -93,14 +94,17 @@ export async function startPair(test, folder, network = "delay=10ms") {
   return { leader, follower };
 }
 
-/** tendon-dash; where its page is. */
+/** Starts tendon-dash. */
 export async function startDash(test, server, ...more) {
   const program = new Program(test, "tendon-dash", ["--server", server, "--listen", "127.0.0.1:0", "--json", ...more]);
   const { address, operator_url: operatorUrl } = JSON.parse(await program.line('"listening"'));
   return { program, address, url: `http://${address}`, operatorUrl };
 }
 
-/** A UDP socket where a server would be; what comes to it that is Data, which the dashboard's own observer never comes to say. */
+/**
+ * Opens a UDP socket in place of a server and collects the Data datagrams. The dashboard's own observer never
+ * connects, so it sends none.
+ */
 export async function fakeServer(test) {
   const socket = createSocket("udp4");
   const arrived = [];
@@ -110,7 +114,7 @@ export async function fakeServer(test) {
   return { socket, arrived, address: `127.0.0.1:${socket.address().port}` };
 }
 
-/** Bytes of a connection of one's own, from `localAddress`: what comes back until it is closed. */
+/** Sends bytes over a new TCP connection from `localAddress`. Returns all bytes received until it is closed. */
 export async function raw(address, bytes, localAddress = "127.0.0.1") {
   const [host, port] = address.split(":");
   const socket = connect({ port: Number(port), host, localAddress });
@@ -122,7 +126,7 @@ export async function raw(address, bytes, localAddress = "127.0.0.1") {
   return answer;
 }
 
-/** The value of a sample of /metrics; undefined when it is not there. */
+/** Returns the value of a sample in /metrics, or undefined. */
 export async function metric(url, sample) {
   const text = await (await fetch(`${url}/metrics`)).text();
   const line = text.split("\n").find((one) => one.startsWith(`${sample} `));

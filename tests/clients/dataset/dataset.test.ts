@@ -19,7 +19,7 @@ function scratch(test: TestContext): string {
 
 const scene = (map: string): string => `[teleoperation]\nrole = "leader"\n[teleoperation.map]\n${map}`;
 
-/** Six seconds at 1 kHz: engaged from 1 to 3 s and, by another act, from 4 to 6 s; the leader moves along its x. */
+/** Six seconds at 1 kHz, engaged from 1 to 3 s and again from 4 to 6 s. The leader moves along its x axis. */
 function coupling({ contact = true, map = "" } = {}): Coupling {
   const leader = { steps: [], ports: [] } as Coupling["leader"];
   const follower = { steps: [], ports: [] } as Coupling["follower"];
@@ -49,7 +49,7 @@ describe("episodesOf", () => {
     near(frame.state[0]!, 1.018);
     near(frame.state[3]!, 0.009);
     near(frame.contact![0], -2);
-    // The offset of the follower is (1, 2, 3): where the operator wants the tool to be.
+    // The action is the tool position that the operator requests; the offset of the follower is (1, 2, 3).
     frame.action.forEach((value, i) => near(value, [1.02, 2, 3][i]!));
   });
 
@@ -123,8 +123,8 @@ describe("readCoupling", () => {
 });
 
 /**
- * At 100 Hz: engaged from tick 51 on, clutched from 151 to 200; 0.5/4096 m a tick. tests/clients/python writes the same
- * bytes.
+ * 100 Hz. Engaged from tick 51 on, clutched from 151 to 200; the target moves by 0.5/4096 m per tick. A test in
+ * tests/clients/python writes the same bytes.
  */
 const kDemonstration = join(kRoot, "tests/clients/demonstration.jsonl");
 
@@ -139,7 +139,7 @@ describe("episodesOfRobot", () => {
     const step = 0.5 / 4096;
     const row = (name: string, k: number): readonly number[] => columns.get(name)!.values[k] as readonly number[];
     for (let k = 0; k < 50; ++k) {
-      // At tick 51 + 2 k the tool is where it was to go at the tick before.
+      // At tick 51 + 2k the tool is at the target of the previous tick.
       near(row("action", k)[0]!, 0.25 + 2 * k * step);
       near(row("observation.state", k)[0]!, 0.25 + Math.max(2 * k - 1, 0) * step);
       near(row("observation.state", k)[2]!, 0.125);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// Real processes: a hand leads the device of another server, both record, and the two recordings become a dataset.
+// Real processes: a hand leads the device of another server, both servers record, and the recordings become a
+// dataset.
 import assert from "node:assert/strict";
 import { execFileSync, spawnSync } from "node:child_process";
 import { mkdtempSync, rmSync } from "node:fs";

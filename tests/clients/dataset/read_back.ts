@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reads a dataset with parquet-wasm, the Parquet of Apache Arrow's Rust implementation: it shares no line with the writer.
+// Reads a dataset with parquet-wasm (Apache Arrow's Rust implementation), which shares no code with the writer.
 import { readFileSync } from "node:fs";
 import { createRequire } from "node:module";
 
-// Packages of clients/dataset, in whose folder this runs. Their types are not looked up from here.
+// The packages are installed in clients/dataset, where this runs. TypeScript cannot find their types from here.
 const load = createRequire(import.meta.url);
 const kReader: string = "parquet-wasm/esm";
 const parquet = (await import(kReader)) as {
@@ -17,7 +17,7 @@ export interface Column {
   readonly values: readonly (number | readonly number[])[];
 }
 
-/** The columns of a Parquet file, by name. */
+/** Returns the columns of a Parquet file by name. */
 export function readParquetFile(path: string): Map<string, Column> {
   const { tableFromIPC } = load("apache-arrow") as {
     tableFromIPC: (bytes: Uint8Array) => {

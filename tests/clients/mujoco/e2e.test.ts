@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// Real processes: tendond (TENDON_PROGRAMS names its folder) with the simulated device in its simulated hand, and MuJoCo.
+// Real processes: tendond with a simulated device and hand, and MuJoCo. TENDON_PROGRAMS is tendond's folder.
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import { join } from "node:path";
@@ -13,7 +12,7 @@ import { block } from "./scenes.js";
 
 const kBuilt = join(kRoot, "clients/mujoco/dist/examples/touch_block.js");
 
-/** A line of echo_motion in which the hand is inside the block and pushed out of it. */
+/** Returns whether the hand is inside the block and is pushed out, in a line of echo_motion. */
 function isPush(line: string): boolean {
   if (!line.includes('"tick"')) return false;
   const { position_m: position, force_n: force } = JSON.parse(line);

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// A tool that the hand holds: it turns with the handle, and gives force, torque and both stiffnesses.
+// A tool that rotates with the handle and returns force, torque and both stiffnesses.
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import { join } from "node:path";
@@ -13,7 +12,7 @@ import { kStiff } from "./scenes.js";
 
 const kOrigin: Vec3 = { x: 0, y: 0, z: 0 };
 const kHeld: Quat = { w: 1, x: 0, y: 0, z: 0 };
-/** A frame of a device that is askew to the scene. */
+/** A device frame that is rotated against the scene. */
 const kAskew = [2, -1, 2, 2, 2, -1, -1, 2, 2].map((value) => value / 3);
 const kInertia = '<inertial pos="0 0 0" mass="0.05" diaginertia="2e-5 2e-5 2e-5"/>';
 
@@ -33,7 +32,7 @@ const about = (axis: readonly number[], degrees: number): Quat => {
   const [x, y, z] = axis.map((value) => (Math.sin(half) * value) / length) as [number, number, number];
   return { w: Math.cos(half), x, y, z };
 };
-/** Rodrigues' formula, not the quaternions of what is tested. */
+/** Rodrigues' formula, because the code under test uses quaternions. */
 function turned(axis: readonly number[], degrees: number, v: readonly number[]): number[] {
   const [angle, n] = [(degrees * Math.PI) / 180, axis.map((value) => value / Math.hypot(...axis))];
   const along = n.reduce((sum, value, i) => sum + value * v[i]!, 0);
@@ -68,7 +67,7 @@ describe("a held tool", () => {
     const { force, torque } = settle(held, kOrigin, about(axis, 40));
     const weight = gravity.map((value) => 0.1 * value);
     near(list(force), toDevice(kAskew, weight), 1e-4, "force");
-    // It sags by a degree, so that the lever is where MuJoCo has the mass.
+    // The tool sags by a degree, so the lever arm is computed from MuJoCo's center of mass.
     const sagged = cross([0, 1, 2].map((i) => held.data.xipos[3 + i] - held.data.xpos[3 + i]), weight);
     near(list(torque!), toDevice(kAskew, sagged), 1e-5, "torque");
     near(toScene(kAskew, list(torque!)), cross(toScene(kAskew, turned(axis, 40, toDevice(kAskew, lever))), weight), 2e-3, "unsagged");
@@ -107,7 +106,7 @@ describe("a held tool", () => {
       const { torque, angularStiffness: k } = settle(fixed, kOrigin, about(axis, degrees));
       const angle = (degrees * Math.PI) / 180;
       near(list(torque!), axis.map((value) => -0.5 * Math.sin(angle) * value), 0.003, `${degrees}°`);
-      // −∂τ/∂θ about the same axis; beyond 90° the spring gives way, and no stiffness below zero is sent.
+      // −∂τ/∂θ about the same axis. Beyond 90° it is negative, and a negative stiffness is not sent.
       const along = toScene(k!, axis).reduce((sum, value, i) => sum + value * axis[i]!, 0);
       near([along], [Math.max(0.5 * Math.cos(angle), 0)], 0.01, `stiffness at ${degrees}°`);
     }
@@ -176,7 +175,7 @@ describe("the stiffness", () => {
   });
 
   it("against a smooth plane is the coupling's along the normal", async (test) => {
-    const normal = [2, 3, 6].map((value) => value / 7); // in the scene
+    const normal = [2, 3, 6].map((value) => value / 7); // in scene coordinates
     const more = `<geom type="plane" size="1 1 1" zaxis="2 3 6" pos="${normal.map((n) => -0.012 * n).join(" ")}" condim="1" ${kStiff}/>`;
     const { scene: held } = await load(test, scene(kBall, { more }), { rotation: kAskew });
     const [x, y, z] = toDevice(kAskew, normal.map((n) => -0.004 * n)) as [number, number, number];
@@ -186,7 +185,7 @@ describe("the stiffness", () => {
     near(pressed.stiffness!, n.flatMap((a) => n.map((b) => 1000 * a * b)), 20, "K");
     near(pressed.angularStiffness!, Array(9).fill(0), 1e-6, "a smooth ball turns freely");
     near([pressed.validRadius!], [0.002], 1e-4, "so far back it lets go");
-    // And so it is when the hand goes there: 0.5 mm deeper, 0.3 mm along.
+    // The hand moves there: 0.5 mm deeper and 0.3 mm sideways.
     const [a, b, c] = n.map((value, i) => -0.0005 * value + 0.0003 * cross(n, [1, 0, 0])[i]!) as [number, number, number];
     const there = settle(held, { x: x + a, y: y + b, z: z + c }, kHeld);
     const predicted = list(pressed.force).map((f, i) => f - toScene(pressed.stiffness!, [a, b, c])[i]!);
@@ -194,7 +193,7 @@ describe("the stiffness", () => {
   });
 
   it("of a plate that lies flat is the coupling's, but not about its normal", async (test) => {
-    const tool = `quat="${[0.5, 0.5, 0.5, 0.5].join(" ")}" pos="0 0 0.01"`; // its own y points up
+    const tool = `quat="${[0.5, 0.5, 0.5, 0.5].join(" ")}" pos="0 0 0.01"`; // its own y axis points up
     const plate = `${kInertia}<geom type="box" size="0.05 0.01 0.05" condim="1" ${kStiff}/>`;
     const more = `<geom type="plane" size="1 1 1" condim="1" ${kStiff}/>`;
     const { scene: held } = await load(test, scene(plate, { tool, more }), { rotation: kAskew });
@@ -245,13 +244,13 @@ describe("the stiffness", () => {
 describe("a scene whose z points up", () => {
   it("has the operator's right at x and what points to the operator at −y", () => {
     near(toScene(zUp(), [1, 2, 3]), [1, -3, 2], 1e-12, "x right, y up, z to the user");
-    // A device whose x points to the user, y to the right and z up: operator axes are its y, z, x.
+    // The device's x axis points to the user, y right, z up; the operator's axes are its y, z and x.
     const operatorFromDevice = { w: 0.5, x: -0.5, y: -0.5, z: -0.5 };
     near(toScene(zUp(operatorFromDevice), [1, 2, 3]), [2, -1, 3], 1e-12, "x to the user, y right, z up");
   });
 });
 
-/** The example's, led along the scene's own axes. */
+/** The scene of the example. The tool is moved along the axes of the scene. */
 const kExample = readFileSync(join(kRoot, "clients/mujoco/examples/peg_in_hole.ts"), "utf8");
 const kPeg = /`([\s\S]*)`/.exec(kExample)![1]!.replace('name="peg"', 'name="tool"');
 const kProbes = [[1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 0], [1, -1, 0], [1, 0, 1], [1, 0, -1], [0, 1, 1], [0, 1, -1], [1, 1, 1]];

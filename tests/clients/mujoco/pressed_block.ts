@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// B1 under the patch of clients/softbody, for comparison with its models.
+// Block B1 under the patch of clients/softbody, to compare the models.
 import assert from "node:assert/strict";
 import type { TouchableScene } from "../../../clients/mujoco/src/index.js";
 
 /**
- * Presses the block of `block({ n })` in the middle of its top for `steps` steps: by the force F = `newtons`, which is the
- * pressure 3F/(πa²)·(1 − (r/a)²)² over a patch of a = 20 mm. Gives the patch's mean displacement down, m.
+ * Presses the top center of `block({ n })` with F = `newtons` for `steps` steps. The pressure is 3F/(πa²)·(1 −
+ * (r/a)²)² over a patch of radius a = 20 mm. Returns the mean downward displacement of the patch, m.
  */
 export function press(scene: TouchableScene, n: number, newtons: number, steps: number): number {
   const { mujoco, model, data } = scene;
@@ -16,7 +16,7 @@ export function press(scene: TouchableScene, n: number, newtons: number, steps: 
   for (let v = 0; v < rest.length / 3; ++v)
     if (rest[3 * v + 2]! > 0.05 - 1e-6) index.set(`${Math.round(rest[3 * v]! / h)},${Math.round(rest[3 * v + 1]! / h)}`, v);
   assert.equal(index.size, (n + 1) ** 2);
-  // Each cell's two triangles, whose diagonals point to the middle, by the midpoints of 24² small ones.
+  // Integrates over two triangles per cell, whose diagonals point to the center, with 24² midpoints each.
   const weight = new Map<number, number>();
   let total = 0;
   const add = (corners: readonly (readonly [number, number])[]): void => {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// Real processes: a simulated hand, and 50 ± 10 ms and 2 % loss away from it an arm in MuJoCo that follows and touches a
-// table. Then the network dies and comes back. TENDON_PROGRAMS names the folder of tendond, tendon-inject and tendon-report.
+// Real processes: a simulated hand, and an arm in MuJoCo that follows it and touches a table, behind 50 ± 10 ms of
+// delay and 2 % loss. Then the network fails and recovers. TENDON_PROGRAMS is the folder of tendond, tendon-inject
+// and tendon-report.
 import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
 import { createSocket } from "node:dgram";
@@ -14,7 +14,7 @@ import { kRoot } from "../typescript/support/paths.js";
 import { findTendond, Program, scene } from "../typescript/support/program.js";
 
 const kBuilt = join(kRoot, "clients/mujoco/dist/examples/robot_arm.js");
-/** Of the example and its scene. */
+/** The values in the example and its scene. kSpeed is in m/s. */
 const [kScale, kForceScale, kSpeed] = [0.5, 0.4, 0.25];
 
 interface Line {
@@ -23,7 +23,7 @@ interface Line {
   readonly hand: { readonly x: number; readonly y: number; readonly z: number };
   readonly tool: Line["hand"];
   readonly force: Line["hand"];
-  /** What the device gave out, N on the hand. */
+  /** Force that the device applied to the hand, N. */
   readonly felt?: Line["hand"];
 }
 const parsed = (program: Program): Line[] =>
@@ -39,7 +39,7 @@ async function freePort(): Promise<number> {
   return port;
 }
 
-/** Runs of lines in the same phase, in order. */
+/** Splits the lines into runs of the same phase. */
 function stretches(lines: readonly Line[]): Line[][] {
   const all: Line[][] = [];
   for (const line of lines) {
@@ -49,7 +49,7 @@ function stretches(lines: readonly Line[]): Line[][] {
   return all;
 }
 
-/** How far the tool goes within a stretch, m, from where it was `settleMs` after it began. */
+/** The largest distance of the tool from its position at `settleMs` after the beginning of the run, m. */
 const wander = (lines: readonly Line[], settleMs: number): number => {
   const rest = lines.filter(({ ms }) => ms >= lines[0]!.ms + settleMs);
   return Math.max(0, ...rest.map(({ tool }) => apart(tool, rest[0]!.tool)));
@@ -76,7 +76,7 @@ it("an arm in MuJoCo follows a far hand, is felt, and waits for the act", async 
     [scene("robot"), "--listen", address, "--record", recording, "--duration-s", "18.5", "--json"]);
 
   await engine.line(isPhase("clutched"));
-  for (let last = ""; last !== "engaged,clutched,engaged";) { // the button's first act, then the clutch
+  for (let last = ""; last !== "engaged,clutched,engaged";) { // engaged by the button, then clutched and engaged again
     await new Promise((resolve) => setTimeout(resolve, 20));
     last = stretches(parsed(engine)).map(([first]) => first!.phase).slice(-3).join();
     assert.ok(!isPhase("lost")(engine.lines.at(-1)!), "the network was not yet cut");
@@ -106,7 +106,8 @@ it("an arm in MuJoCo follows a far hand, is felt, and waits for the act", async 
     assert.ok(apart(a.tool, b.tool) <= Math.min(allowed, 5e-3), `engaging moved the robot by ${apart(a.tool, b.tool)} m`);
   }
 
-  // It follows at half the way: the rest of a second, 20 mm below where it was engaged (the device's y is the robot's z).
+  // The scale is one half. The hand rests for a second, 20 mm below where it engaged (the device's y is the robot's
+  // z).
   const start = following![0]!;
   const resting = following!.filter(({ hand, tool }) => Math.abs(hand.y + 0.02) < 0.002 && tool.z > 0.172);
   const settled = resting.slice(Math.floor(resting.length / 4), Math.floor(resting.length / 2)).at(-1)!;

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// What the adapter gives to the hand against known answers, and each of MuJoCo's traps (clients/mujoco/README.md).
+// Compares the forces with known solutions, and tests each pitfall of MuJoCo in clients/mujoco/README.md.
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import { join } from "node:path";
@@ -21,7 +20,7 @@ const near = (actual: number, expected: number, tolerance: number, what = "") =>
   assert.ok(Math.abs(actual - expected) <= tolerance, `${what} expected ${expected} ± ${tolerance}, got ${actual}`);
 const kRigid = (inside: string, option = "") => `<mujoco><option timestep="0.001" ${option}/><worldbody>${inside}</worldbody></mujoco>`;
 
-/** A plate in the hand, tilted, on which a weight of 0.2 kg lies, held by friction. */
+/** A tilted plate in the hand. A weight of 0.2 kg rests on it by friction. */
 const kPlate = `<body name="tool" mocap="true" euler="8 10 20"><geom type="box" size="0.1 0.1 0.01" friction="0.7"/></body>
   <body name="weight" pos="0.004 -0.004 0.03" euler="8 10 20"><freejoint/><geom type="box" size="0.02 0.02 0.02" mass="0.2" friction="0.7"/></body>`;
 
@@ -69,7 +68,7 @@ describe("the force", () => {
     const { scene, warnings } = await load(test, block({ n: 8, contact: "" }));
     let force;
     for (let i = 0; i <= 60; ++i) force = scene.answer(at(0, 0, -0.0055 - 0.002 * Math.min(i / 40, 1)), 0.01);
-    // 0.549 N with stiff contact, 0.289 N with MuJoCo's own; the truth, 0.165 N, wants a finer mesh than this.
+    // 0.549 N with stiff contact, 0.289 N with MuJoCo's default. The exact 0.165 N needs a finer mesh.
     near(force!.z, 0.549, 0.03);
     near(Math.hypot(force!.x, force!.y), 0, 0.06, "spurious lateral force");
     assert.match(warnings.join("\n"), /contact of 2 geoms and flexes was MuJoCo's default/);
@@ -165,7 +164,8 @@ describe("while it runs", () => {
     assert.match(limited.warnings.join(), /the tool lags/);
     near(limited.last, 7.39, 0.05, "at rest");
     assert.ok(limited.most < 2 * limited.last && limited.least >= 0, JSON.stringify(limited));
-    // Without the limit the tool is through the surface at once, which then closes over it and pulls it down with 69 N.
+    // Without the limit the tool passes the surface at once. The surface then closes over it and pulls it down with
+    // 69 N.
     const free = await dive({ maxToolSpeed: 1e3 });
     assert.ok(free.lagging === 0 && free.least < -30, JSON.stringify(free));
   });

@@ -1,18 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
-// MJCF that the tests share.
+// MJCF for several tests.
 
 export const kStiff = 'solref="0.004 1" solimp="0.99 0.999 0.0001"';
 
 export interface Block {
-  /** Cells along 100 mm: n × n × n/2 of them. */
+  /** Cells along 100 mm; there are n × n × n/2 cells. */
   readonly n: number;
   readonly option?: string;
   readonly poisson?: number;
-  /** Of the block's contact and of the tool's. */
+  /** Contact parameters of the block and of the tool. */
   readonly contact?: string;
 }
 
-/** B1: 100 × 100 × 50 mm of 10 kPa, held below; a sphere of 10 mm hangs 5.5 mm over it. */
+/** Block B1: 100 × 100 × 50 mm, 10 kPa, fixed at the bottom. A sphere of 10 mm radius starts 5.5 mm above it. */
 export function block({ n, option = 'timestep="0.002" integrator="discrete"', poisson = 0.45, contact = kStiff }: Block): string {
   const spacing = 0.1 / n;
   return `<mujoco>

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// node steps.mjs: what a step costs and what a sphere 2 mm deep in B1 feels, by fineness; the tables in
-// clients/mujoco/README.md. Then how stiff B1 is under a patch, at rest, as in tests/tools/lab/ACCURACY.md; and what an
-// answer of the peg costs, wedged in its hole. Wants tests/clients/typescript/run mujoco build.
+// Measures the tables in clients/mujoco/README.md: the cost of a step and the force on a sphere 2 mm deep in B1, for
+// several meshes. Then it measures the static stiffness of B1 under a patch (tests/tools/lab/ACCURACY.md) and the
+// cost of an answer for the peg wedged in its hole. Run tests/clients/typescript/run mujoco build first.
 import { readFileSync } from "node:fs";
 import { TouchableScene, zUp } from "../../../clients/mujoco/build/clients/mujoco/src/index.js";
 import { press } from "../../../clients/mujoco/build/tests/clients/mujoco/pressed_block.js";
@@ -22,7 +21,7 @@ for (const n of [4, 8, 12, 16]) {
   scene.delete();
 }
 
-const kSteps = 150; // of 20 ms, after which B1 is at rest under its load
+const kSteps = 150; // of 20 ms each; B1 is then at rest
 for (const n of [4, 6, 8, 12]) {
   const told = [];
   let ms = 0;

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// tendon-bridge between WebSockets and a UDP socket of our own.
+// tendon-bridge between WebSockets and a UDP socket of the test.
 import assert from "node:assert/strict";
 import { createSocket, type RemoteInfo, type Socket } from "node:dgram";
 import { once } from "node:events";
@@ -40,7 +39,7 @@ async function openPage(test: TestContext, url: string, options: ClientOptions =
   return page;
 }
 
-/** The status with which the bridge answers. */
+/** Returns the status of the bridge's response. */
 async function refusal(url: string, options: ClientOptions): Promise<number> {
   const page = new WebSocket(url, options);
   page.on("error", () => {});
@@ -158,7 +157,7 @@ it("webSocket() opens another WebSocket after the bridge was gone", async (test)
   await until("the first has arrived", () => arrived.length === 1);
   await bridge.close();
   await until("it is gone", () => bridge.counts.peers === 0);
-  transport.send(datagram(2)); // lost: nobody listens
+  transport.send(datagram(2)); // lost: no socket is there
   const again = await Bridge.open({ listen: url.slice("ws://".length), to: `127.0.0.1:${server.address().port}` });
   test.after(() => again.close());
   await until("another has arrived", () => {

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// Devices, channels and leases of a ForceClient, against a server on virtual time.
+// Devices, channels and leases of a ForceClient, with a server on virtual time.
 import assert from "node:assert/strict";
 import { describe, it } from "node:test";
 import { ChannelRule, Code, Hand, Role, type DeviceDescription, type HandleDescription, type Request } from "../../../clients/typescript/src/messages.js";
@@ -18,7 +17,7 @@ describe("devices and channels", () => {
   };
   const ok = { code: Code.OK, detail: "" };
   const busy = (waitMs: number) => ({ code: Code.BUSY, detail: "another holds it", waitMs });
-  /** Like that to `takeLease`, yes to everything else. */
+  /** Answers `takeLease` with lease() and accepts all other requests. */
   const answering = (lease: () => ReturnType<ServerConduct["answer"]>): Partial<ServerConduct> => ({
     answer: ({ kind }: Request) => (kind === "takeLease" ? lease() : kind === "describe" ? { ...ok, device: kRight } : ok),
   });
@@ -193,7 +192,7 @@ describe("devices and channels", () => {
     assert.equal(asked(world, "takeLease"), 2);
     world.runMs(600);
     const often = asked(world, "takeLease");
-    assert.ok(often >= 9 && often <= 13, `${often}`); // 50 ms and the way there and back
+    assert.ok(often >= 9 && often <= 13, `${often}`); // 50 ms and the round trip each
     assert.equal(seen.length, 0);
     answer = ok;
     world.runMs(100);

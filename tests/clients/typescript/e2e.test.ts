@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// Real processes: tendond (TENDON_PROGRAMS names its folder), the examples as npm builds them, and the bridge.
+// Real processes: tendond, the compiled examples, and the bridge. TENDON_PROGRAMS is tendond's folder.
 import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
 import { createSocket } from "node:dgram";
@@ -20,7 +19,7 @@ import { kRoot } from "./support/paths.js";
 import { Random } from "./support/random.js";
 import { kWelcome, Server } from "./support/world.js";
 
-/** A line of echo_motion in which the hand is inside the wall and pushed out of it. */
+/** Returns whether the hand is inside the wall and is pushed out, in a line of echo_motion. */
 function isPush(line: string): boolean {
   if (!line.includes('"tick"')) return false;
   const { position_m: position, force_n: force } = JSON.parse(line);
@@ -98,7 +97,7 @@ describe("of several", () => {
     if (!tendond) return;
     let silent = false;
     const first = guest(test, connect(udp(tendond.address), { channel: "tissue" }, {
-      physics: (hand) => (silent ? { x: NaN, y: 0, z: 0 } : wall(hand)), // what is not finite is not sent
+      physics: (hand) => (silent ? { x: NaN, y: 0, z: 0 } : wall(hand)), // a force that is not finite is not sent
     }));
     await until("the first holds it", () => first.holds && first.stats().forces > 0);
     const options = ["--server", tendond.address, "--channel", "tissue", "--take-lease"];
@@ -202,7 +201,7 @@ describe("a guest", () => {
     const here = guest(test, connect(udp(`127.0.0.1:${server.address().port}`), {}, {
       watch: ({ tick }) => {
         seen.push(tick);
-        // While this takes its time, 100 more states come in. libuv reads 32 of them at once.
+        // 100 more states arrive while this callback runs. libuv reads 32 datagrams at once.
         if (seen.length === 1) for (let i = 0; i < 100; ++i) send();
       },
     }));

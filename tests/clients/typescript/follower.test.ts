@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A robot that follows a hand: the cases that Python and C++ pass too.
+// The cases in tests/clients/follower_cases.json, which the Python and C++ clients run as well.
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import { join } from "node:path";

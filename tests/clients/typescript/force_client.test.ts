@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// ForceClient against a server on virtual time, over a network that a seed makes.
+// ForceClient with a server on virtual time, over a network with seeded loss and delay.
 import assert from "node:assert/strict";
 import { describe, it } from "node:test";
 import { kHasAes } from "../../../clients/typescript/src/aes.js";
@@ -123,7 +122,7 @@ describe("the handshake", () => {
     const [first, second, third, next] = sent;
     assert.deepEqual(second, first);
     assert.deepEqual(third, first);
-    assert.equal(sent.length, 5); // at 0, 100 and 200 ms; given up at 250, again at 350 and 450 ms
+    assert.equal(sent.length, 5); // at 0, 100 and 200 ms; abandoned at 250, then at 350 and 450 ms
     assert.ok(sent.every((datagram) => datagram.length === 1200));
     const differs = (from: number, to: number): boolean =>
       Buffer.compare(first!.subarray(from, to), next!.subarray(from, to)) !== 0;
@@ -355,8 +354,8 @@ describe("the callback", () => {
     };
     assert.equal(validity({}), 20_000);
     assert.equal(validity({ rateHz: 50 }), 60_000);
-    assert.equal(validity({}, 30), 90_000); // the physics answers states that are 30 ms apart
-    assert.equal(validity({}, 500), 300_000); // 100 ms at most count as a period
+    assert.equal(validity({}, 30), 90_000); // the states answered are 30 ms apart
+    assert.equal(validity({}, 500), 300_000); // the period is at most 100 ms
     assert.equal(validity({ validForMs: 12.5, rateHz: 50 }), 12_500);
   });
 
@@ -470,7 +469,7 @@ describe("an impossible configuration", () => {
 
 describe("what need not be sent", () => {
   const stateDeadband = { share: 0.1, floor: 1e-3, maxSilenceUs: 20_000 };
-  /** At 0.1 m/s; one tick in `every` is sent. */
+  /** The hand moves at 0.1 m/s, and one tick in `every` is sent. */
   const moving = (every: bigint): Partial<ServerConduct> => ({
     every,
     state: (tick) => ({
@@ -575,7 +574,7 @@ describe("diagnostics", () => {
     world.runMs(100);
     assert.deepEqual(world.client.deviceReport, loop(7n).value);
     assert.equal(world.client.peerReports.get(1)!.link.number, 4n);
-    assert.equal(engines.get(1)!.link.number, 3n); // what was handed out does not change
+    assert.equal(engines.get(1)!.link.number, 3n); // results returned earlier do not change
     assert.equal(world.client.stats().link!.stale, 1);
     world.server.session!.close(Code.SHUTDOWN, "");
     world.runMs(1000);

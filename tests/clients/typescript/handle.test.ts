@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a handle can do more than move: orientation, torque, gripper.
+// Orientation, torque and gripper of a handle.
 import assert from "node:assert/strict";
 import { describe, it } from "node:test";
 import { Deadband, foretell } from "../../../clients/typescript/src/deadband.js";

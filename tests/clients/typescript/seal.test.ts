@@ -18,7 +18,7 @@ interface Pair {
   readonly z: NoiseSeal;
 }
 
-/** Two ends that renew their keys after so many datagrams. */
+/** Two peers that renew their keys after this number of datagrams. */
 function pairOf(suite: CipherSuite, datagrams: bigint): Pair {
   const random = new Random(4);
   const [first, second] = [random.bytes(32), random.bytes(32)];
@@ -128,7 +128,7 @@ describe("ReplayWindow", () => {
         assert.equal(window.highest, highest);
         assert.equal(window.missing, highest + 1n - BigInt(inserted.size));
         if (i % 10 === 0) {
-          // Of the newest, and of one before it: a datagram that was authentic and malformed is not echoed.
+          // For the newest and an earlier number: an authentic but malformed datagram is not echoed.
           for (const of of [highest, highest - BigInt(random.below(40))]) {
             let mask = 0;
             for (let bit = 0; bit < 32; ++bit) {

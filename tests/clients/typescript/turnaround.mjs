@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-//
 // node turnaround.mjs RECORDING FOXGLOVE_CHECK
 //
-// For each guest in a recording of tendond: the time from a state's leaving the server to the arrival of the force that
+// Prints for each client in a recording of tendond the time from sending a state to the arrival of the force that
 // answers it, on the server's clock. FOXGLOVE_CHECK is build/<preset>/foxglove_check, whose packages read MCAP.
 import { readFile } from "node:fs/promises";
 import { createRequire } from "node:module";
@@ -19,7 +18,7 @@ const descriptor = require("protobufjs/ext/descriptor");
 const reader = new McapStreamReader();
 reader.append(await readFile(recording));
 const [schemas, channels, types] = [new Map(), new Map(), new Map()];
-const names = new Map(); // of a client random
+const names = new Map(); // by client random
 const guests = new Map(); // by connection id
 
 function take(logTime, { connection_id: connectionId, payload, type }) {

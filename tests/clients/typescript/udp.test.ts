@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// The way to a server by its name: what the system knows, what it does not, and where it has several addresses.
+// Host names as server addresses: known names, unknown names, and names with several addresses.
 import assert from "node:assert/strict";
 import { createSocket } from "node:dgram";
 import { describe, it, type TestContext } from "node:test";
@@ -8,7 +7,7 @@ import { connect } from "../../../clients/typescript/src/connect.js";
 import { lookUp, NoSuchHost, parseServer, udp } from "../../../clients/typescript/src/udp.js";
 import { startNode } from "./support/program.js";
 
-/** A socket on 127.0.0.1 that answers each datagram with it. */
+/** Opens a socket on 127.0.0.1 that echoes each datagram. */
 async function echo(test: TestContext): Promise<number> {
   const socket = createSocket("udp4");
   await new Promise<void>((resolve) => socket.bind(0, "127.0.0.1", resolve));
@@ -39,7 +38,7 @@ describe("the name of a server", () => {
     const way = udp(`LOCALHOST:${port}`)((datagram) => came.push(datagram[0]!), assert.fail);
     test.after(() => way.close());
     for (let i = 0; i < 20; ++i) way.send(Uint8Array.of(i));
-    // Where the system has ::1 first, nobody answers there, as in a session.
+    // If the system resolves to ::1 first, no server answers there and the next address is tried, as in a session.
     for (let round = 0; came.length === 0 && round < 50; ++round) {
       await new Promise((resolve) => setTimeout(resolve, 100));
       if (came.length > 0) break;

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// protocol/vectors: our own bytes for every message, in the clear and sealed.
+// Checks that the client produces the bytes of protocol/vectors for every message, plain and sealed.
 import assert from "node:assert/strict";
 import { describe, it } from "node:test";
 import { fromJson, toBinary, type JsonValue } from "@bufbuild/protobuf";
@@ -44,10 +43,10 @@ for (const file of ["plain.json", "sealed.json", ...(kHasAes ? ["sealed_aes.json
   const vectors = readVectors(file);
   const aes: boolean = vectors.suite === 2;
   const suites = aes ? [CipherSuite.AesGcm, CipherSuite.Noise] : [CipherSuite.Noise];
-  /** Of the handshake. */
+  /** The cipher suite of the handshake. */
   const opening: CipherSuite = vectors.suite === 0 ? CipherSuite.Plain : CipherSuite.Noise;
   const key: Uint8Array | undefined = vectors.psk && fromHex(vectors.psk);
-  /** The client's random numbers, in the order in which it asks for them. */
+  /** Returns the random bytes in the order in which the client draws them. */
   const random = (size: number): Uint8Array => fromHex(size === 16 ? vectors.client_random : vectors.client_ephemeral);
   const datagram = (of: { readonly datagram: string }): Uint8Array => fromHex(of.datagram);
 
@@ -118,7 +117,7 @@ for (const file of ["plain.json", "sealed.json", ...(kHasAes ? ["sealed_aes.json
       });
     }
 
-    /** One that is about to close the vector's datagram, and one that is to open it. */
+    /** Returns the seal that closes the vector's datagram and the one that opens it. */
     function seals(vector: DataVector): [Seal, Seal] {
       if (!key) return [new PlainSeal(), new PlainSeal()];
       const first = fromHex(vectors.welcome[`${vector.direction}_key`]);
@@ -194,7 +193,7 @@ describe("key_files.json", () => {
 });
 
 describe("bounds.json", () => {
-  /** Whether the codec takes a body with every value that is in it. */
+  /** Returns whether the codec accepts all values in the body. */
   const isTaken = ({ message, body }: { readonly message: string; readonly body: string }): boolean => {
     const bytes = fromHex(body);
     if (message === "Hello") return decodeHelloMessage(bytes) !== undefined;
@@ -203,7 +202,7 @@ describe("bounds.json", () => {
   };
 
   it("the bounds of tendon.proto are those of the codec", () => {
-    // A client of one device does not ask for states in columns.
+    // This client never requests states in columns.
     const bounds = readVectors("bounds.json").bounds.filter((vector: any) => !vector.field.startsWith("DeviceStates."));
     assert.ok(bounds.length > 300);
     const wrong = bounds.filter((vector: any) => isTaken(vector) !== vector.accepted);

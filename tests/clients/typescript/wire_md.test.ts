@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// The golden datagrams of protocol/WIRE.md, read from the page itself, both ways.
+// Decodes and encodes the golden datagrams in protocol/WIRE.md.
 import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
 import { mkdtempSync, readFileSync, rmSync } from "node:fs";
@@ -23,7 +22,7 @@ import { PlainSeal } from "../../../clients/typescript/src/seal.js";
 import { toHex } from "./support/bytes.js";
 import { kRoot } from "./support/paths.js";
 
-/** The bytes of each block: "00 x9" is nine zeros, what follows ";" is for people. */
+/** Parses the golden blocks: "00 x9" is nine zeros, ";" begins a comment. */
 function goldenDatagrams(page: string): Map<string, Uint8Array> {
   const found = new Map<string, Uint8Array>();
   for (const [, name, block] of page.matchAll(/^```golden (\S+)\n([\s\S]*?)^```$/gm)) {
@@ -53,7 +52,7 @@ function contentOf(name: string): DataContent {
   return content;
 }
 
-/** Decodes the datagram and encodes what came out. */
+/** Decodes and re-encodes a datagram. */
 function roundTrip(datagram: Uint8Array): Uint8Array {
   const header = decodeHeader(datagram);
   assert.ok(header);
@@ -97,8 +96,8 @@ describe("WIRE.md", () => {
   });
 
   for (const [name, datagram] of kGolden) {
-    if (decodeHeader(datagram)?.suite === 1) continue; // sealed: vectors.test.ts
-    if (name === "state-columns") continue; // below
+    if (decodeHeader(datagram)?.suite === 1) continue; // tested in vectors.test.ts
+    if (name === "state-columns") continue; // tested below
     it(`${name}: decoding and encoding gives the very bytes of the page`, () => {
       assert.equal(toHex(roundTrip(datagram)), toHex(datagram));
     });
@@ -366,7 +365,7 @@ describe("WIRE.md", () => {
       assert.equal(content?.invalid, 1, `frame ${i}`);
       assert.deepEqual(content?.frames, [{ kind: "port", value: kPort }], `frame ${i}`);
     }
-    // With an id it has to be answered.
+    // A request with an id must be answered.
     for (const request of [...couples.map((change): Request => ({ kind: "couple", ...kCouple, ...change })), ...requests]) {
       const frame = encodeFrame({ kind: "control", value: { id: 7, request } });
       const content = decodeData(concat(encodeHead(1n, undefined), frame, good));

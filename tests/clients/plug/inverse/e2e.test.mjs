@@ -149,7 +149,7 @@ test("broken frames and half requests end nobody else's connection", async (t) =
   const { bridge } = await startBoth(t);
   const other = await come(t, bridge.url);
   const [host, port] = bridge.address.split(":");
-  let random = 22;  // a linear congruential generator, so that each run has the same bytes
+  let random = 22; // a linear congruential generator, so that each run has the same bytes
   const byte = () => (random = (random * 1103515245 + 12345) % 2147483648) >> 16 & 255;
   const hello = [
     "GET / HTTP/1.1",
@@ -207,7 +207,7 @@ test("one client at 1 kHz costs little of a core", async (t) => {
   const client = await come(t, bridge.url);
   const ticks = () => {
     const fields = readFileSync(`/proc/${bridge.program.process.pid}/stat`, "utf8").split(") ")[1].split(" ");
-    return Number(fields[11]) + Number(fields[12]);  // utime + stime, in units of 10 ms
+    return Number(fields[11]) + Number(fields[12]); // utime + stime, in units of 10 ms
   };
   const begin = ticks();
   const start = performance.now();

@@ -8,7 +8,7 @@ import { kRoot } from "./paths.js";
 
 const kPatienceMs = 30_000;
 
-/** A running program, and every line that it says on either stream. Gone at the end of the test. */
+/** A running program and the lines of its stdout and stderr. It is killed at the end of the test. */
 export class Program {
   readonly lines: string[] = [];
   readonly #process: ChildProcess;
@@ -23,7 +23,7 @@ export class Program {
       this.#process.once("close", (code) => {
         this.#over = true;
         resolve(code);
-        this.#news.emit("line"); // whoever waits for another line learns that none will come
+        this.#news.emit("line"); // wakes the callers of line(), which then throw
       }),
     );
     for (const stream of [this.#process.stdout!, this.#process.stderr!]) {
@@ -38,7 +38,7 @@ export class Program {
     });
   }
 
-  /** The first line, from now on or before, that `matches`. Throws when the program ends, or 30 s pass, without one. */
+  /** Returns the first line that `matches`, including earlier lines. Throws if the program ends or after 30 s. */
   async line(matches: (line: string) => boolean): Promise<string> {
     const signal = AbortSignal.timeout(kPatienceMs);
     const said = () => this.lines.slice(-20).join("\n");
@@ -53,14 +53,14 @@ export class Program {
     }
   }
 
-  /** Its exit code. */
+  /** Sends the signal, if any, and returns the exit code. */
   async end(signal?: NodeJS.Signals): Promise<number | null> {
     if (signal) this.#process.kill(signal);
     return this.#ended;
   }
 }
 
-/** The path of tendond; the empty text, and the test is skipped, where there is none. */
+/** Returns the path of tendond. Skips the test and returns "" if TENDON_PROGRAMS is not set. */
 export function findTendond(test: TestContext): string {
   const programs = process.env["TENDON_PROGRAMS"];
   if (!programs) test.skip("set TENDON_PROGRAMS to the folder that holds tendond");
@@ -70,7 +70,10 @@ export function findTendond(test: TestContext): string {
 export const scene = (name: string): string => join(kRoot, "deploy/scenes", `${name}.toml`);
 export const kDemoScene = scene("demo");
 
-/** tendond on a port of its own, with a device for each scene; undefined, and the test is skipped, where there is none. */
+/**
+ * Starts tendond on a free port with one device per scene. Skips the test and returns undefined without
+ * TENDON_PROGRAMS.
+ */
 export async function startTendond(
   test: TestContext,
   { listen = "127.0.0.1:0", scenes = [kDemoScene] } = {},
@@ -82,11 +85,11 @@ export async function startTendond(
   return { program, address: JSON.parse(said).address };
 }
 
-/** One of the client's own programs, as npm builds it: "examples/virtual_wall". */
+/** Starts a compiled program of the client, such as "examples/virtual_wall". */
 export const startNode = (test: TestContext, name: string, ...args: string[]): Program =>
   new Program(test, process.execPath, [join(kRoot, "clients/typescript/dist", `${name}.js`), ...args]);
 
-/** Waits for what another part of this process brings about. */
+/** Waits for a condition that other code of this process causes. */
 export async function until(what: string, done: () => boolean): Promise<void> {
   const deadline = performance.now() + kPatienceMs;
   while (!done()) {

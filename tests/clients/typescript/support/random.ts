@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-/** SplitMix64: the same numbers for the same seed, everywhere. */
+/** SplitMix64, reproducible on all platforms. */
 export class Random {
   #state: bigint;
 

@@ -3,12 +3,12 @@ import { x25519 } from "@noble/curves/ed25519";
 import { concat } from "../../../../clients/typescript/src/datagram.js";
 import { SymmetricState, type Finished } from "../../../../clients/typescript/src/noise.js";
 
-/** The responder of NNpsk0, which a client never is. */
+/** The responder of NNpsk0, which the client does not implement. */
 export interface Answered extends Omit<Finished, "payload"> {
   readonly message2: Uint8Array;
 }
 
-/** The payload of message 1, and how to answer it; undefined when it does not open. */
+/** Returns the payload of message 1 and a function that answers it, or undefined if it is not authentic. */
 export function readMessage1(
   psk: Uint8Array,
   prologue: Uint8Array,

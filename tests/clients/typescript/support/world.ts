@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Two ends and what lies between them, on virtual time: A is the guest under test, Z a server put together from the
-// protocol's own parts, and the network loses, delays, reorders and doubles by one seed.
+// A client (A), a server (Z) and a network between them on virtual time. A is the ForceClient under test. Z is
+// assembled from the parts of the protocol. The network loses, delays, reorders and duplicates datagrams according to
+// a seed.
 import { decodeHelloMessage, encodeAnswerMessage, type ControlAck } from "../../../../clients/typescript/src/codec.js";
 import {
   CipherSuite, concat, decodeHello, encodeAnswer, encodeRetry, equal, helloHeader, type HelloDatagram,
@@ -21,16 +22,16 @@ import { readMessage1, type Answered } from "./responder.js";
 
 export interface Weather {
   readonly loss: number;
-  /** Above zero. */
+  /** Must be above zero. */
   readonly delayMs: number;
-  /** Uniform, added to the delay. */
+  /** Uniform in [0, jitterMs), added to the delay. */
   readonly jitterMs: number;
   readonly duplicates: number;
 }
 export const kFair: Weather = { loss: 0, delayMs: 5, jitterMs: 0, duplicates: 0 };
 export const kFoul: Weather = { loss: 0.3, delayMs: 5, jitterMs: 20, duplicates: 0.1 };
 
-/** One direction. */
+/** One direction of the network. */
 class Way {
   #flying: { readonly at: Nanoseconds; readonly datagram: Uint8Array }[] = [];
   constructor(readonly world: World) {}
@@ -53,21 +54,21 @@ class Way {
   }
 }
 
-/** What the server does; a test may change it while it runs. */
+/** Behavior of the server, which a test may change at any time. */
 export interface ServerConduct {
-  /** Present at all. */
+  /** Whether the server runs. */
   up: boolean;
   refuse: Refused | undefined;
   features: string[];
   grants: readonly Grant[];
-  /** Sealed with this key; undefined: suite 0. */
+  /** The key of the session; undefined: suite 0. */
   key: Uint8Array | undefined;
-  /** … by suite 2, where it is offered. */
+  /** Use suite 2 if the client offers it. */
   aes: boolean;
-  /** When it renews its key, so often that a test sees it. */
+  /** When the server renews its key. */
   renewAfter: { datagrams: bigint; time: Nanoseconds };
   state: (tick: bigint) => DeviceState;
-  /** One tick in so many is sent. */
+  /** One tick in this many is sent. */
   every: bigint;
   answer: (request: Request) => Omit<ControlAck, "id">;
 }
@@ -78,7 +79,7 @@ export const kWelcome: Omit<Welcome, "role" | "features"> = {
 
 const kCookie = ascii("sixteen byte jar");
 
-/** A server at 1 kHz. Its clock is another than ours: offset, and 200 ppm fast. */
+/** A server at 1 kHz. Its clock has an offset and runs 200 ppm fast. */
 export class Server {
   readonly conduct: ServerConduct = {
     up: true,
@@ -99,11 +100,11 @@ export class Server {
   readonly hellos: { readonly datagram: HelloDatagram; readonly hello: Hello }[] = [];
   readonly forces: { readonly at: Nanoseconds; readonly command: ForceCommand }[] = [];
   readonly requests: Request[] = [];
-  /** To the server's own requests. */
+  /** Answers to the server's own requests. */
   readonly answers: { readonly code: Code; readonly detail: string }[] = [];
   session: Session | undefined;
   #nextId = 1;
-  /** The answer to the attempt of this random, repeated when it comes again. */
+  /** The answer to the attempt with this client random, sent again if the Hello is repeated. */
   #answered: { readonly random: Uint8Array; readonly datagram: Uint8Array } | undefined;
   #tick = 1n;
 
@@ -125,7 +126,7 @@ export class Server {
     else this.#meet(now, hello, send);
   }
 
-  /** Once each millisecond. */
+  /** Called once per millisecond. */
   step(now: Nanoseconds, send: (datagram: Uint8Array) => void): void {
     const { session, conduct } = this;
     const halfOpen = conduct.key !== undefined && session?.stats.received === 0;
@@ -217,7 +218,7 @@ export class World {
     this.runUntil(() => false, ms);
   }
 
-  /** Whether `done` came to be within `ms`. */
+  /** Runs until done() is true. Returns false after `ms`. */
   runUntil(done: () => boolean, ms: number): boolean {
     const end = this.now + fromMilliseconds(ms);
     const toClient = (datagram: Uint8Array): void => this.toClient.send(datagram);
@@ -246,7 +247,7 @@ export class World {
 
 export const kPush = { x: -1, y: 0, z: 0 };
 
-/** A controller that keeps the states it has seen. */
+/** Creates a controller that collects the received states. */
 export function controller(seed: number, weather: Weather, config: ClientConfig = {}, conduct: Partial<ServerConduct> = {}) {
   const seen: DeviceState[] = [];
   const physics = (hand: DeviceState) => {
