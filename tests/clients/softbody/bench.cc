@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// The cost of an answer, beside its error: the pressed block B1 at ν = 0.45, and a tool that moves up and down and to
-// and fro and is sampled 100 times a second. A body with time takes the steps in between. The counter error_percent is
-// that of the stiffness at rest, against 420.2 N/m.
+// Measures the cost of an answer and its error on the pressed block B1 at ν = 0.45.
+//
+// The tool moves vertically and sideways and is sampled at 100 Hz. Dynamic bodies take the time steps in between. The
+// counter error_percent is the error of the static stiffness against 420.2 N/m.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
@@ -52,22 +53,22 @@ void still(benchmark::State& state, ModelKind model, Element element) {
   answer(state, config);
 }
 
-/// Answers that may be wrong by half a percent of the force.
+/// With a tolerance of 0.5 % of the force.
 void within_half_a_percent(benchmark::State& state, ModelKind model) {
   BodyConfig config = testing::pressed_body(model, Element::kHex8Sri, static_cast<int>(state.range(0)));
   config.tolerance = 5e-3;
   answer(state, config);
 }
 
-/// ms of processor time of this thread.
+/// CPU time of this thread, ms.
 double processor_time() {
   timespec time{};
   clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
   return 1e3 * static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_nsec);
 }
 
-/// The other thread of a body, as if it had a processor of its own, and an answer were due in each millisecond: what it is
-/// given is done as many answers later as the last field took milliseconds.
+/// Simulates the second thread of a body as if it had its own processor and the answers were 1 ms apart: a field is
+/// finished after as many answers as the previous one took milliseconds.
 struct Beside {
   explicit Beside(Body& body) {
     body.prepare_by([this](std::packaged_task<void()> work) { given.push_back(std::move(work)); });
@@ -80,13 +81,13 @@ struct Beside {
     waited = 0;
   }
   std::vector<std::packaged_task<void()>> given{};
-  std::vector<double> times{20};  ///< ms; the first is a guess
+  std::vector<double> times{20};  ///< CPU time of each field, ms; the first is a guess
   double waited = 0;
 };
 
-/// 5 mm down, 20 mm aside and back again, by state.range(1) µm with each answer, asked for to half a percent. Answers that
-/// make pieces of a near field count as all others do; the slowest of them is told apart, too. With
-/// `with_thread` another thread makes the fields.
+/// Presses 5 mm deep and strokes 20 mm sideways and back, in steps of state.range(1) µm, with a tolerance of 0.5 %.
+/// Reports all answers together, and the slowest of those that compute a piece of a near field. With `with_thread` a
+/// simulated second thread computes the fields.
 void path(benchmark::State& state, ModelKind model, Law law, bool with_thread) {
   BodyConfig config = testing::pressed_body(model, Element::kHex8Sri, static_cast<int>(state.range(0)));
   config.near.law = law;
@@ -137,9 +138,9 @@ void path(benchmark::State& state, ModelKind model, Law law, bool with_thread) {
   state.counters["model_mb"] = static_cast<double>(body.size().bytes) / 1e6;
 }
 
-/// What was learned of B1 within 12 mm of (10, 0) mm: 5 mm deep, 20 mm aside and back, by 0.2 mm with each answer, asked for
-/// to 2 percent; another thread makes the near fields that follow the hand. Beside it the true error at every millimetre,
-/// against Newton's method on the whole mesh to 1e-9.
+/// Measures learned shapes or tables for B1 within 12 mm of (10, 0) mm: 5 mm deep, 20 mm sideways and back, in steps
+/// of 0.2 mm, with a tolerance of 2 %. A simulated second thread computes the near fields. The true error is measured
+/// at every millimeter, against Newton's method on the whole mesh with a tolerance of 1e-9.
 void learned(benchmark::State& state, Law law, bool tabulate) {
   BodyConfig config = testing::pressed_body(ModelKind::kNear, Element::kHex8Sri, static_cast<int>(state.range(0)));
   config.near.law = law;
@@ -189,7 +190,7 @@ void learned(benchmark::State& state, Law law, bool tabulate) {
   state.counters["mb"] = static_cast<double>(step.size.bytes) / 1e6;
 }
 
-/// A rigid tool of 20 mm: its contact grows and shrinks as it moves.
+/// Measures a rigid tool of 20 mm. Its contact area changes as it moves.
 void rigid(benchmark::State& state, const Tool& tool) {
   BodyConfig config = testing::pressed_body(ModelKind::kCondensed, Element::kHex8Sri, static_cast<int>(state.range(0)));
   config.tool = tool;
@@ -204,7 +205,7 @@ void rigid(benchmark::State& state, const Tool& tool) {
   state.counters["model_mb"] = static_cast<double>(body.size().bytes) / 1e6;
 }
 
-/// Measures models that are only compared. Models with time take steps of state.range(1) µs, with one iteration each.
+/// Measures models that exist for comparison. Dynamic models take steps of state.range(1) µs with one iteration each.
 void compared_with(benchmark::State& state, compared::Kind kind) {
   compared::Config config = compared::testing::soon_at_rest(kind);
   if (compared::info(kind).has_time) {
@@ -216,8 +217,8 @@ void compared_with(benchmark::State& state, compared::Kind kind) {
   answer_with(state, body);
 }
 
-/// What a cut through half of the width and state.range(1) mm deep costs the model: with the system that it had, and
-/// with a new one. The mesh, the solid and the surface are made anew in either case, and are not counted.
+/// Measures the cost of a cut through half of the width, state.range(1) mm deep, with the existing factorization or a
+/// new one. Building the new mesh, solid and surface is not included.
 template <class CutModel>
 void cut(benchmark::State& state, Law law, bool anew) {
   const int n = static_cast<int>(state.range(0));

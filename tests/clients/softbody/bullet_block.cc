@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// tendon-bench-bullet: the pressed block B1 as a deformable body of Bullet, on the tetrahedra of clients/softbody and
-// under the same patch. How stiff it is at rest, and what a step costs; tests/tools/lab/ACCURACY.md has the results.
-// It is built where Bullet is installed (Debian: libbullet-dev).
+// tendon-bench-bullet: the pressed block B1 as a deformable body of Bullet, with the tetrahedra of clients/softbody
+// and the same patch. It measures the static stiffness and the cost of a step; see tests/tools/lab/ACCURACY.md. It is
+// only built if Bullet is installed (Debian: libbullet-dev).
 #include <BulletCollision/BroadphaseCollision/btDbvtBroadphase.h>
 #include <BulletSoftBody/btDeformableBodySolver.h>
 #include <BulletSoftBody/btDeformableLinearElasticityForce.h>
@@ -23,11 +23,11 @@ namespace tendon::softbody {
 namespace {
 
 constexpr btScalar kStep = 0.01F;     // s
-constexpr int kSteps = 400;           // after which nothing moves
-constexpr btScalar kDamping = 0.05F;  // Pa·s, of both moduli
+constexpr int kSteps = 400;           // the block is then at rest
+constexpr btScalar kDamping = 0.05F;  // Pa·s, for both moduli
 constexpr btScalar kMass = 0.5F;      // kg
 
-/// A force on the patch, downwards, whatever the body does.
+/// A constant downward force on the patch.
 class Press final : public btDeformableLagrangianForce {
  public:
   Press(const Patch& patch, double newtons) : patch_(patch), newtons_(newtons) {}
@@ -50,8 +50,8 @@ class Press final : public btDeformableLagrangianForce {
   double newtons_;
 };
 
-/// Bullet's neo-Hookean law is that of Smith, de Goes and Kim, "Stable Neo-Hookean Flesh Simulation", ACM TOG 2018,
-/// whose parameters are 4/3 µ and λ + 5/6 µ (section 3.4). Bullet's setYoungsModulus() leaves that out.
+/// Bullet implements the neo-Hookean law of Smith, de Goes and Kim, "Stable Neo-Hookean Flesh Simulation", ACM TOG
+/// 2018. Its parameters are 4/3 µ and λ + 5/6 µ (section 3.4), a conversion that Bullet's setYoungsModulus() omits.
 std::unique_ptr<btDeformableLagrangianForce> force_of(Law law, const Material& material) {
   const auto mu = static_cast<btScalar>(material.mu());
   const auto lambda = static_cast<btScalar>(material.lambda());
@@ -93,7 +93,7 @@ void press(Law law, int n, double newtons) {
     const auto tetrahedron = mesh.element(e);
     body.appendTetra(tetrahedron[0], tetrahedron[1], tetrahedron[2], tetrahedron[3]);
   }
-  body.m_tetraScratches.resizeNoInitialize(body.m_tetras.size());  // as Bullet's own readers of meshes do
+  body.m_tetraScratches.resizeNoInitialize(body.m_tetras.size());  // as in Bullet's mesh readers
   body.m_tetraScratchesTn.resizeNoInitialize(body.m_tetras.size());
   body.initializeDmInverse();
   body.setTotalMass(kMass);
@@ -103,7 +103,7 @@ void press(Law law, int n, double newtons) {
   body.m_cfg.kDP = 0;
   body.m_cfg.collisions = 0;
   body.m_sleepingThreshold = 0;
-  body.setActivationState(DISABLE_DEACTIVATION);  // it would fall asleep before it moves
+  body.setActivationState(DISABLE_DEACTIVATION);  // otherwise Bullet deactivates it before it moves
   world.addSoftBody(&body);
   const auto elastic = force_of(law, material);
   Press load(patch, newtons);

@@ -19,7 +19,7 @@
 
 namespace tendon::softbody::testing {
 
-/// A block in the hands of a model that is asked, and of Newton's method on the whole mesh, which knows.
+/// A block with the tested model, and Newton's method on the whole mesh as the reference.
 struct AskedAndExact {
   explicit AskedAndExact(Solid block)
       : solid(std::move(block)),
@@ -33,14 +33,14 @@ struct AskedAndExact {
 
 struct ErrorsSaid {
   int answers = 0;
-  int covered = 0;                 ///< answers whose error is at least the true one
-  std::vector<double> times = {};  ///< the error said over the true one, where that is above 0.5 % of the force; sorted
+  int covered = 0;                 ///< answers whose reported error is at least the true error
+  std::vector<double> times = {};  ///< reported over true error if the latter is above 0.5 % of the force; sorted
   double median() const { return times.empty() ? 0 : times[times.size() / 2]; }
 };
 
-/// Asks for ten answers on each path: random presses and strokes, with steps of at most 0.1 to 10 mm, down to `deepest` (m).
-/// `block_of(path, tolerance)` returns the block of a path; the tolerance is 0.3 to 30 %. There are four paths, one of each
-/// kind, or twenty with ten thousand property cases. Seed 1.
+/// Asks for ten answers on each of several random paths of presses and strokes, with steps of up to 0.1 to 10 mm and
+/// depths down to `deepest` (m). `block_of(path, tolerance)` returns the block for a path; the tolerance is 0.3 to 30
+/// %. There are four paths, or twenty with ten thousand property cases. The seed is 1.
 template <class BlockOf>
 ErrorsSaid errors_said(double deepest, const BlockOf& block_of) {
   const int paths = property_cases() >= 10'000 ? 20 : 4;
@@ -49,7 +49,7 @@ ErrorsSaid errors_said(double deepest, const BlockOf& block_of) {
   ErrorsSaid said;
   for (int path = 0; path < paths; ++path) {
     const std::unique_ptr<AskedAndExact> block = block_of(path, dice.decades(-2.5, -0.5));
-    const double widest = dice.decades(-4, -2);  // m, between two answers
+    const double widest = dice.decades(-4, -2);  // longest step between two answers, m
     Vec2 place(dice.within(-0.02, 0.02), dice.within(-0.02, 0.02));
     double depth = 0;
     for (int i = 0; i < kAnswers; ++i) {
@@ -71,7 +71,7 @@ ErrorsSaid errors_said(double deepest, const BlockOf& block_of) {
   return said;
 }
 
-/// The error said is at least the true one of 99 in 100 answers, and not more than 20 times as large.
+/// The reported error covers the true error in 99 of 100 answers, and its median is at most 20 times as large.
 inline void expect_covered(const ErrorsSaid& said) {
   EXPECT_GE(said.answers, 40);
   EXPECT_GE(said.covered, said.answers * 99 / 100);

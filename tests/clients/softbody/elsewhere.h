@@ -9,7 +9,7 @@
 
 namespace tendon::softbody::testing {
 
-/// What is given to the other thread; it does it when it is told to.
+/// Stands in for the second thread: collects its work until work() runs it.
 struct Elsewhere {
   Background background() {
     return [this](std::packaged_task<void()> work) { given.push_back(std::move(work)); };

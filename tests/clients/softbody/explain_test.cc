@@ -27,7 +27,7 @@ using testing::listing;
 using testing::pressed_body;
 using testing::with;
 
-/// A clock that says one after the other of `times`, and then the last.
+/// A clock that returns `times` in order and then repeats the last.
 std::function<double()> saying(std::vector<double> times) {
   return [times, next = std::size_t{0}]() mutable { return times[std::min(next++, times.size() - 1)]; };
 }
@@ -110,7 +110,7 @@ TEST(SoftbodyExplain, SixtyModesAreTheExactInterfaceToHalfAPercentWhenAsked) {
     Scene scene{.body = pressed_body(ModelKind::kNear, Element::kHex8Sri, n)};
     scene.body.material.poisson = poisson;
     const double off = off_the_exact_interface(scene.body);
-    EXPECT_GT(off, 1e-6) << n;  // they are not the same
+    EXPECT_GT(off, 1e-6) << n;
     EXPECT_LT(off, 0.005) << n;
     if (n > 8) continue;
     Explanation explanation = explain(scene, saying({0, 1e6}));
@@ -154,7 +154,8 @@ TEST(SoftbodyExplain, WhatAnEffectAddsIsTheDifferenceToTheBodyWithoutIt) {
   const std::int64_t bare = bytes(scene.body);
   scene.body.effects.density = 1000;
   scene.body.effects.gravity = Vec3(0, 0, -9.81);
-  // The scene takes 10 s, then 12 s, the one without gravity 4 s; 40 answers each; after that it is late.
+  // The scene takes 10 s and 12 s, and the one without gravity 4 s, for 40 answers each. Then the time limit ends the
+  // measurement.
   const Explanation explanation = explain(scene, saying({0, 0, 10, 10, 22, 22, 26, 26}));
   EXPECT_NEAR(explanation.all.answer_s, 0.25, 1e-12);
   EXPECT_NEAR(explanation.resolution_s, 0.05, 1e-12);

@@ -55,7 +55,7 @@ TEST(PlacedBody, TwoHandsAreAnsweredAtOnceEachInItsOwnDevicesFrame) {
   rigid.replace(rigid.find("patch_radius_mm"), 0, "tool = \"sphere\"\ntool_radius_mm = 10\n");
   PlacedBody body(parse_scene(rigid, "s.toml", "."));
   std::vector<std::optional<DeviceState>> hands(2);
-  hands[0].emplace().position = Vec3(0.003, 0, 0);  // 3 mm in
+  hands[0].emplace().position = Vec3(0.003, 0, 0);  // 3 mm deep
   hands[1].emplace().position = Vec3(0.003, 0.001, 0);
   const std::vector<Touch> both = body.answer(hands);
   for (const Touch& touch : both) {
@@ -64,9 +64,9 @@ TEST(PlacedBody, TwoHandsAreAnsweredAtOnceEachInItsOwnDevicesFrame) {
     EXPECT_GT((*touch.stiffness)(0, 0), 50);
     ASSERT_TRUE(touch.contact);
     EXPECT_LT(touch.contact->normal.x(), -0.9);
-    EXPECT_NEAR(touch.contact->gap, -0.0031, 4e-4);  // points are 3 mm apart here
+    EXPECT_NEAR(touch.contact->gap, -0.0031, 4e-4);  // the surface nodes are 3 mm apart
   }
-  EXPECT_LT(both[0].force.y() * both[1].force.y(), 0);  // one is on the left, one on the right
+  EXPECT_LT(both[0].force.y() * both[1].force.y(), 0);  // opposite sides
   hands[1].reset();
   const std::vector<Touch> one = body.answer(hands);
   EXPECT_TRUE(one[1].unknown);
@@ -80,7 +80,7 @@ TEST(PlacedBody, ABodyThatSticksSendsNoSurfaceThatOnlyPushes) {
   EXPECT_FALSE(body.answer(hand).contact);
 }
 
-/// What a server takes the answer of `body` at `x` to mean `deeper` down.
+/// The force that the server extrapolates from the answer at `x` to a point `deeper` (m) along x.
 Vec3 meant(PlacedBody& body, const Vec3& x, double deeper) {
   DeviceState hand;
   hand.position = x;
@@ -100,7 +100,7 @@ TEST(PlacedBody, ATableFollowsASpheresGrowingContactWhereAStiffnessDoesNot) {
   };
   PlacedBody plain(scene(""));
   PlacedBody tabled(scene("table_mm = 8\n"));
-  const double surface = 0.01 - 0.02;  // the sphere's middle, when it touches
+  const double surface = 0.01 - 0.02;  // center of the sphere at the first contact
   double of_table = 0;
   double of_stiffness = 0;
   for (const double from : {-0.001, 0.002, 0.004}) {
@@ -124,7 +124,7 @@ Scene with_tool(std::string_view tool) {
   return parse_scene(text, "s.toml", ".");
 }
 
-/// A hand whose handle is turned by `turn`, so that the middle of its tool, `offset` (m) away, is at `tool`.
+/// A hand with orientation `turn` whose tool, at `offset` (m) from the handle, is at `tool`.
 DeviceState hand_with(const Vec3& tool, const Vec3& offset, const Quat& turn) {
   DeviceState hand;
   hand.position = tool - rotated(turn, offset);
@@ -150,7 +150,7 @@ TEST(PlacedBody, ASphereAtAnOffsetIsThatSphereAndItsForceHasALever) {
     EXPECT_LT((*touch.torque - rotated(turn, offset).cross(alone.force)).norm(), 1e-9);
     EXPECT_GT(touch.torque->norm(), 1e-3);
   }
-  // A device that does not measure its handle's orientation: the handle is as in the scene.
+  // If the device does not measure the orientation, the handle has the orientation of the scene.
   DeviceState unturned = hand_with(tool, offset, Quat{});
   unturned.turning.reset();
   const Touch touch = held.answer(unturned);
@@ -165,7 +165,7 @@ TEST(PlacedBody, ACapsuleTurnsWithTheHandleAndAnswersWithATorque) {
   PlacedBody body(scene);
   EXPECT_EQ(std::get<CapsuleTool>(scene.body.tool).half_length, 0.015);
   const Vec3 offset(0.05, 0, 0.01);
-  // In the device's frame the hand comes from −x. A capsule across touches 15 mm early, one that points ahead 30 mm.
+  // The hand approaches from −x in the device's frame. A transverse capsule touches 15 mm early, one along x 30 mm.
   const auto gap = [&](const Quat& turn) {
     return body.answer(hand_with(Vec3(-0.04, 0, 0), offset, turn)).contact->gap;
   };
@@ -176,12 +176,12 @@ TEST(PlacedBody, ACapsuleTurnsWithTheHandleAndAnswersWithATorque) {
   const Touch touch = body.answer(hand);
   EXPECT_LT(touch.force.x(), -0.1);
   ASSERT_TRUE(touch.torque && touch.angular_stiffness);
-  // The force passes through the surface somewhere in the contact.
+  // The line of action of the force passes through the contact area.
   const Vec3 arm(-rotated(turn, offset));
   const Vec3 about_tool = *touch.torque + arm.cross(touch.force);
   EXPECT_LT(about_tool.norm(), 0.03 * touch.force.norm());
   EXPECT_GT(about_tool.norm(), 0.001 * touch.force.norm());
-  // The torque is the slope of the energy that the stiffness bends: a small turn changes it by that.
+  // The change of the torque under a small rotation must match the angular stiffness.
   const Vec3 small(0, 0, 1e-5);
   DeviceState turned = hand;
   turned.turning->orientation = product(rotation_by(small), turn);
@@ -202,7 +202,7 @@ TEST(PlacedBody, APatchAtAnOffsetGivesATorqueOnEveryModel) {
   EXPECT_LT((*touch.torque - offset.cross(touch.force)).norm(), 1e-14);
 }
 
-/// A scene of one of the models, with the effects that it cannot do without.
+/// A scene with the given model and the effects that it requires.
 std::string scene_of(const ModelInfo& model) {
   std::string text = with("\"condensed\"", "\"" + std::string(model.name) + "\"");
   std::string names;
@@ -225,7 +225,7 @@ TEST(PlacedBody, AnswersForEveryModelThatASceneCanName) {
   for (const ModelInfo& model : models()) {
     PlacedBody body(parse_scene(scene_of(model), "s.toml", "."));
     double stiffness = 0;
-    for (int i = 0; i < 60; ++i) {  // 0.6 s
+    for (int i = 0; i < 60; ++i) {
       stiffness = -body.answer(hand_at(1e-4, std::chrono::milliseconds(10 * i))).force.x() / 1e-4;
     }
     const double expected =
@@ -247,7 +247,7 @@ TEST(PlacedBody, ABodyOfSeveralWaysSaysWhichOneItWas) {
   EXPECT_EQ(body.answer(hand).way, 0U) << "nothing touches the body";
 }
 
-/// On its closed ways the hand goes far enough aside to leave the near field, and comes back.
+/// The closed paths of the self-test leave the region of the near field and return.
 TEST(PlacedBody, ANearFieldThatFollowsTheHandPassesTheSelfTest) {
   std::string text = scene_of(info(ModelKind::kNear));
   text.replace(text.find("[4, 4, 2]"), 9, "[8, 8, 4]");
@@ -277,7 +277,7 @@ TEST(PlacedBody, WhatIsPlannedOverTimeCountsFromTheFirstAnswersSample) {
   EXPECT_EQ(force(72'000), cut);
   EXPECT_NEAR(force(73'000) / cut, 2, 1e-9);
   EXPECT_NEAR(force(75'000) / cut, 3, 1e-9);
-  EXPECT_NEAR(force(60'000) / cut, 1, 1e-9);  // set back: the modulus of before, but no cut heals
+  EXPECT_NEAR(force(60'000) / cut, 1, 1e-9);  // the clock is set back: the modulus follows, the cut stays
 }
 
 TEST(PlacedBody, ABodyWithTimeAdvancesByTheTimeBetweenSamples) {
@@ -289,14 +289,14 @@ TEST(PlacedBody, ABodyWithTimeAdvancesByTheTimeBetweenSamples) {
   PlacedBody often(scene);
   PlacedBody seldom(scene);
   Vec3 force;
-  for (int i = 0; i <= 40; ++i) {  // 10 ms in quarters of a millisecond, at an even speed
+  for (int i = 0; i <= 40; ++i) {  // 10 ms in steps of 0.25 ms at constant speed
     force = often.answer(hand_at(1e-5 * i, std::chrono::microseconds(250 * i))).force;
   }
   seldom.answer(hand_at(0, Duration(0)));
   const Vec3 at_once = seldom.answer(hand_at(4e-4, std::chrono::milliseconds(10))).force;
   EXPECT_LT((force - at_once).norm(), 1e-9);
   EXPECT_LT(force.x(), -0.01);
-  // A pause is not made up for, and time that goes back stops nothing.
+  // A long pause counts as the maximum step, and time that goes backward does not stop the body.
   const Vec3 after_a_pause = often.answer(hand_at(4e-4, std::chrono::seconds(100))).force;
   EXPECT_EQ(after_a_pause, seldom.answer(hand_at(4e-4, std::chrono::seconds(1))).force);
   EXPECT_TRUE(often.answer(hand_at(4e-4, Duration(0))).force.allFinite());
@@ -309,7 +309,7 @@ std::string text_of(const std::string& file) {
   return text.str();
 }
 
-/// What `tendon-softbody selftest` finds, with as many states per second.
+/// The result of `tendon-softbody selftest` at this rate.
 SelfTest expect_passed(const Scene& scene, double rate_hz = 1000) {
   PlacedBody body(scene);
   SelfTestScript script;
@@ -328,7 +328,7 @@ TEST(PlacedBody, TheShippedOrgansPassTheSelfTest) {
     expect_passed(read_scene(TENDON_SCENES "/" + name + ".toml"));
 }
 
-/// At this rate the last depth is one of those that the self-test can judge.
+/// At this rate the self-test can judge the stiffness at the largest depth.
 TEST(PlacedBody, AnswersOfTheNearLiverWithoutAStepHaveTheirStiffness) {
   const SelfTest result = expect_passed(read_scene(TENDON_SCENES "/liver_near.toml"), 200);
   const auto judged = std::ranges::find_if(result.findings, [](const SelfTest::Finding& finding) {

@@ -9,9 +9,9 @@
 
 namespace tendon::softbody::testing {
 
-/// The pressed block B1: 100 × 100 × 50 mm, clamped below, 10 kPa, pressed in the middle of its top by a patch of
-/// 20 mm. What its stiffness is, to ± 0.1 %, by finite elements of other people's (deal.II 9.4, Q2 n = 32 and Q3 n =
-/// 12).
+/// The pressed block B1: 100 × 100 × 50 mm, 10 kPa, clamped at the bottom, pressed at the center of its top by a
+/// patch of 20 mm radius. Its stiffness is known to ± 0.1 % from an independent finite-element code (deal.II 9.4, Q2
+/// with n = 32 and Q3 with n = 12).
 inline constexpr double kB1 = 420.2;                      // N/m, ν = 0.45
 inline constexpr double kB1NearlyIncompressible = 450.9;  // N/m, ν = 0.499
 inline constexpr double kB1PatchRadius = 0.02;            // m
@@ -22,7 +22,7 @@ inline Solid pressed_block(Element element, int n, double poisson, Law law = Law
   return {std::move(mesh), element, {.young = 1e4, .poisson = poisson}, law, fixed};
 }
 
-/// The configuration of the same block with any model.
+/// The configuration of B1 for any model.
 inline BodyConfig pressed_body(ModelKind model, Element element, int n) {
   BodyConfig config;
   config.shape = BlockShape{Vec3(0.1, 0.1, 0.05), {n, n, n / 2}};
@@ -33,7 +33,7 @@ inline BodyConfig pressed_body(ModelKind model, Element element, int n) {
   return config;
 }
 
-/// B1 in the hands of Newton's method, and the patch in the middle of its top.
+/// Block B1 with Newton's method, and the patch at the center of its top.
 struct PressedByNewton {
   explicit PressedByNewton(Element element, int n, Law law, int max_iterations = 30)
       : solid(pressed_block(element, n, 0.45, law)),

@@ -10,7 +10,7 @@
 
 namespace tendon::softbody::testing {
 
-/// A body that always answers the same.
+/// A model that always returns the same reaction.
 class SameAnswer : public Model {
  public:
   explicit SameAnswer(Reaction reaction) : reaction_(std::move(reaction)) {}
@@ -22,7 +22,7 @@ class SameAnswer : public Model {
   Reaction reaction_;
 };
 
-/// An answer all parts of whose stiffness are there: 2 N, 4 mm deep.
+/// A reaction of 2 N at 4 mm with all parts of the stiffness set.
 inline Reaction whole_answer() {
   Reaction answer;
   answer.force = 2;
@@ -37,7 +37,7 @@ inline Reaction whole_answer() {
   return answer;
 }
 
-/// What is sent of an answer where the surface slants.
+/// The contact's result for a reaction on an inclined surface.
 inline Feel felt(const Reaction& answer) {
   const Solid solid = pressed_block(Element::kHex8Sri, 8, 0.45);
   const TouchSurface slanting(solid.mesh(), Vec3(0.3, -0.2, 1).normalized(), kB1PatchRadius);

@@ -6,7 +6,7 @@
 
 namespace tendon::softbody::testing {
 
-/// A scene with nothing wrong in it, and the same with one piece of it replaced.
+/// A valid scene. Tests replace parts of it.
 inline const std::string kGood = R"(effects = ["contact"]
 [body]
 shape = "block"
@@ -29,11 +29,11 @@ inline std::string with(std::string_view old, std::string_view replacement) {
   return text;
 }
 
-/// A cut, but for when it is made.
+/// A cut without its time.
 inline constexpr std::string_view kCut =
     "[[cutting]]\ncorner_mm = [0, -60, 25]\nalong_mm = [0, 120, 0]\ndeep_mm = [0, 0, 30]\n";
 
-/// kGood with a model and effects, and tables behind it.
+/// kGood with another model and effects, followed by `tables`.
 inline std::string listing(const std::string& model, const std::string& effects, const std::string& tables) {
   std::string text = with("condensed", model);
   text.replace(text.find("[\"contact\"]"), 11, effects);

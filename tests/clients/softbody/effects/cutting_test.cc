@@ -22,22 +22,22 @@ using testing::kB1PatchRadius;
 using testing::pressed_block;
 using testing::pressed_body;
 
-/// Across the whole block at x, from the top down; longer than the block on both sides.
+/// A cut through the whole width of the block at x, from the top down.
 Cut across(double x, double depth) {
   return {Vec3(x, -0.06, 0.05 - depth), Vec3(0, 0.12, 0), Vec3(0, 0, depth + 0.01)};
 }
 
-/// In the middle of the top, half as wide as the block.
+/// A cut in the center of the top, half as wide as the block.
 Cut narrow(double depth) { return {Vec3(0, -0.025, 0.05 - depth), Vec3(0, 0.05, 0), Vec3(0, 0, depth)}; }
 
-/// Below the whole block at the height z.
+/// A horizontal cut through the whole block at height z.
 Cut below(double z) { return {Vec3(-0.06, -0.06, z), Vec3(0.12, 0, 0), Vec3(0, 0.12, 0)}; }
 
 Solid after(const Solid& solid, const Division& division) {
   return {division.mesh, solid.element(), solid.material(), solid.law(), division.fixed};
 }
 
-/// A body that is cut while it is pressed in the middle of its top, or wherever else.
+/// A body that is cut while it is pressed at `where`, by default at the center of its top.
 template <class PressedModel, class... Options>
 struct Cuttable {
   Cuttable(Element element, int n, Law law, const Options&... options, const Vec2& where = Vec2::Zero())
@@ -66,7 +66,7 @@ struct Cuttable {
 using CutLinear = Cuttable<LinearModel>;
 using CutNewton = Cuttable<QuasiStaticModel, QuasiStaticModel::Config>;
 
-/// The same body with its cuts from the start.
+/// The reaction of a body that is built with the cuts.
 template <class PressedModel, class... Options>
 Reaction cut_from_the_start(Element element, int n, Law law, const std::vector<Cut>& cuts, double depth,
                             const Options&... options) {
@@ -93,12 +93,12 @@ TEST(Divide, OpensTheFacesBetweenAndPartsTheNodesOnThemButThoseAtTheTip) {
       EXPECT_EQ(division.fixed[3 * i], fixed[3 * at(division.node_before[i])]);
     }
     EXPECT_NEAR(check(division.mesh, "cut"), 5e-4, 1e-15);
-    EXPECT_EQ(surface(division.mesh).size(), surface(mesh).size());  // a tool touches no side of a closed cut
+    EXPECT_EQ(surface(division.mesh).size(), surface(mesh).size());  // the faces of a closed cut cannot be touched
   }
 }
 
 TEST(Divide, CutsOneAfterTheOtherPartWhatAllAtOncePart) {
-  // The first alone opens two faces inside the body, whose nodes all are at its tip.
+  // The first cut opens two faces inside the body, whose nodes are all at the cut's tip and therefore not split.
   const Mesh mesh = block(Shape::kHex8, Vec3(0.1, 0.1, 0.05), {4, 4, 4});
   const Fixed fixed = fix_where(mesh, [](const Vec3& node) { return node.z() < 1e-9; });
   const Cut little{Vec3(0, -0.02, 0.014), Vec3(0, 0.04, 0), Vec3(0, 0, 0.01)};
@@ -124,14 +124,14 @@ TEST(Divide, APieceThatNothingHoldsIsGone) {
   const TouchSurface top(division.mesh, Vec3::UnitZ(), 0.02);
   EXPECT_EQ(top.nodes().size(), 25U);
   for (const int node : top.nodes()) EXPECT_NEAR(top.height(node), 0.025, 1e-12);
-  // Held by the two nodes of one edge it could still turn.
+  // Held by the two nodes of one edge, it could still rotate.
   Fixed hinge = fix_where(mesh, [](const Vec3& node) { return node.z() > 0.05 - 1e-9 && node.x() < -0.05 + 1e-9; });
   for (std::size_t i = 0; i < fixed.size(); ++i) hinge[i] = hinge[i] || fixed[i];
   EXPECT_EQ(divide(mesh, hinge, under).lost, 16);
 }
 
 TEST(CutUnderLoad, AHalfThatIsCutOffGivesWayAsOneThatWasAlwaysAlone) {
-  // No part of this answer comes of the code that cuts: a smaller block.
+  // The expected answer is that of a smaller block, without any cutting code.
   const Vec2 where(-0.025, 0);
   for (const Element element : {Element::kHex8Sri, Element::kHex27}) {
     CutLinear body(element, 4, Law::kLinear, where);
@@ -167,7 +167,7 @@ TEST(CutUnderLoad, WhatIsLeftBelowALostPieceGivesWayAsOneThatWasAlwaysAlone) {
 }
 
 TEST(CutUnderLoad, ACutLinearBodyAnswersAsOneBuiltWithItsCuts) {
-  // Little cuts in the finer mesh keep the factor, the last two and all in the others ask for a new one.
+  // Small cuts in the finer mesh update the factorization. The other cuts need a new one.
   for (const auto& [element, n] : {std::pair(Element::kTet4, 4), std::pair(Element::kHex8Sri, 8),
                                    std::pair(Element::kHex8Sri, 4), std::pair(Element::kHex27, 4)}) {
     CutLinear body(element, n, Law::kLinear);
@@ -183,7 +183,7 @@ TEST(CutUnderLoad, ACutLinearBodyAnswersAsOneBuiltWithItsCuts) {
       EXPECT_LT((found.slope - expected.slope).norm(), 1e-9);
       EXPECT_LT(found.stiffness, before * (1 - 1e-6));
       before = found.stiffness;
-      // Held nodes carry what the tool pushes, and nothing else acts.
+      // The supports carry the tool's load, and no other force acts.
       VectorXd u = VectorXd::Zero(body.solid.size());
       body.solid.add_free(found.force * body.model.displacements(body.patch), u);
       const VectorXd forces = body.solid.forces(u).force;
@@ -203,7 +203,7 @@ TEST(CutUnderLoad, TheCutItselfPutsInNoEnergyAndTheBodyThenGivesWay) {
       double energy = body.solid.energy(body.model.displacements());
       for (const Cut& next : {across(0, 0.025), across(0.025, 0.05), across(0, 0.05)}) {
         body.cut(next);
-        EXPECT_NEAR(body.solid.energy(body.model.displacements()) / energy, 1, 1e-12);  // in the same shape
+        EXPECT_NEAR(body.solid.energy(body.model.displacements()) / energy, 1, 1e-12);  // the shape is the same
         const Reaction found = body.press(4e-3);
         EXPECT_LT(found.force, before.force);
         EXPECT_GT(found.force, 0.1 * before.force);
@@ -291,7 +291,7 @@ TEST(Factor, SplitsAreSolvedAsByANewFactorOrRefused) {
   const MatrixXd expected = fresh.solve(right);
   EXPECT_LT((kept.solve(right) - expected).norm(), 1e-10 * expected.norm());
 
-  // A twin that nothing holds; and one for every unknown.
+  // A split node without support, and a split of every unknown.
   SymmetricMatrix loose = before;
   loose.rows.push_back(loose.size);
   loose.values.push_back(0);
@@ -301,10 +301,10 @@ TEST(Factor, SplitsAreSolvedAsByANewFactorOrRefused) {
   ASSERT_TRUE(again.factorize(before));
   EXPECT_FALSE(again.split(loose, {0}));
   EXPECT_FALSE(again.split(matrix, std::vector<int>(static_cast<std::size_t>(matrix.size), 0)));
-  const MatrixXd back = again.solve(right.topRows(before.size));  // and is as it was
+  const MatrixXd back = again.solve(right.topRows(before.size));  // the factor has not changed
   EXPECT_LT((before.times(back.col(0)) - right.col(0).head(before.size)).norm(), 1e-9);
 
-  // New values: the grown pattern's order is found, and the splits are in it.
+  // With new values, the ordering of the grown pattern is reused and the splits are included.
   for (double& value : matrix.values) value *= 2;
   ASSERT_TRUE(kept.factorize(matrix));
   EXPECT_LT((kept.solve(right) - expected / 2).norm(), 1e-10 * expected.norm());
@@ -321,7 +321,7 @@ TEST(Cutting, IsMadeInItsOrderAtItsTimeOrForceAndSaidOnce) {
     const Feel feel = body.touch(Vec3(0, 0, 0.05 - depth));
     return std::pair(feel.force.z() / depth, feel.topology_changed);
   };
-  const auto [whole, nothing_yet] = stiffness(2e-3);  // more than 0.5 N, but its turn has not come
+  const auto [whole, nothing_yet] = stiffness(2e-3);  // more than 0.5 N, but the cut before it is not made yet
   EXPECT_FALSE(nothing_yet);
   body.tick(0.9);
   EXPECT_EQ(stiffness(2e-3).first, whole);
@@ -330,7 +330,7 @@ TEST(Cutting, IsMadeInItsOrderAtItsTimeOrForceAndSaidOnce) {
   EXPECT_LT(once, 0.999 * whole);
   EXPECT_TRUE(said_once);
   EXPECT_EQ(stiffness(1e-4), std::pair(once, false));
-  body.tick(0);  // is not undone
+  body.tick(0);  // does not undo the cut
   const auto [pressed, not_yet] = stiffness(2e-3);
   EXPECT_NEAR(pressed / once, 1, 1e-9);
   EXPECT_FALSE(not_yet);
@@ -344,7 +344,7 @@ TEST(Cutting, IsMadeInItsOrderAtItsTimeOrForceAndSaidOnce) {
 
 TEST(PreparedCut, AnswersGoOnUncutAndFlaggedAndThenAreThoseOfTheCutBody) {
   for (const ModelInfo& model : models()) {
-    // The model near has other answers until it has a field of the cut body: near_cut_test.cc.
+    // near_cut_test.cc tests the near model, whose answers differ until a near field of the cut body exists.
     if (!model.may.has(EffectKind::kCutting) || model.kind == ModelKind::kNear) continue;
     BodyConfig config = pressed_body(model.kind, Element::kHex8Sri, 4);
     config.tolerance = 1e-9;
@@ -384,7 +384,7 @@ TEST(PreparedCut, AnswersGoOnUncutAndFlaggedAndThenAreThoseOfTheCutBody) {
     const Feel expected = at_once.touch(tool);
     EXPECT_TRUE(both.topology_changed);
     EXPECT_LT(both.force.z(), first.force.z());
-    // The drag too: the spring of friction goes on from where it was.
+    // The friction spring keeps its state, so the drag agrees as well.
     EXPECT_LT((both.force - expected.force).norm(), 1e-5 * expected.force.norm()) << model.name;
     EXPECT_LT(both.error, 1e-3 * both.force.norm());
     EXPECT_FALSE(body.touch(tool).topology_changed);
@@ -406,7 +406,7 @@ TEST(PreparedCut, PutsInNoEnergy) {
     model.go_on_from(before, division.node_before);
     EXPECT_NEAR(parted.energy(model.displacements()) / whole.energy(before.displacements()), 1, 1e-12);
     EXPECT_LT(model.press(*there.patch(Vec2::Zero()), Given::kDepth, 4e-3).force, 0.99 * force);
-    EXPECT_EQ(model.factors(), factors);  // that of the cut body at rest serves
+    EXPECT_EQ(model.factors(), factors);  // the factorization of the cut body at rest is used
     EXPECT_LT(parted.energy(model.displacements()), whole.energy(before.displacements()));
   }
 }

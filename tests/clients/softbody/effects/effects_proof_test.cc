@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// What a scene does not list costs nothing: instructions for each step, by callgrind, of a body without effects in the
-// whole program, against a program that was built without them (CMakeLists.txt says how).
+// Effects that a scene does not list must cost nothing. Callgrind counts the instructions per step of a body without
+// effects in the complete program and in one that is built without the effects (see CMakeLists.txt).
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -23,13 +22,13 @@ namespace tendon::softbody::effects_proof_test {
 namespace {
 
 constexpr int kSteps = 6 - 2;  // between the two run lengths of softbody-proof
-/// Copying many numbers takes so many instructions a step more or fewer, by where on the heap they are.
+/// Instructions per step by which the cost of copying arrays varies with their heap address.
 constexpr double kCopies = 200;
 
 struct Cost {
-  double instructions = 0;  ///< for each step
+  double instructions = 0;  ///< per step
   std::int64_t heap = 0;    ///< bytes
-  std::int64_t bytes = 0;   ///< that the body says it keeps
+  std::int64_t bytes = 0;   ///< memory that the body reports
 };
 struct Body {
   std::string model;
@@ -65,7 +64,7 @@ bool cost_the_same(const Body& a, const Body& b) {
   return std::abs(a.cost.instructions - b.cost.instructions) <= 1e-3 * b.cost.instructions + kCopies;
 }
 
-/// The README's table.
+/// Formats the table in the README.
 std::string table(const std::vector<Body>& bodies) {
   std::ostringstream text;
   text << "| model | without | gravity | inertia | damping | viscosity | friction | cutting | stiffening | "
@@ -80,7 +79,7 @@ std::string table(const std::vector<Body>& bodies) {
     return one.str();
   };
   for (const auto& [model, cost] : bare) {
-    if (model == "neo-hookean") continue;  // how many steps its Newton's method takes is another for another shape
+    if (model == "neo-hookean") continue;  // the number of Newton iterations depends on the shape
     text << "\n| " << model << " | " << number(cost.instructions) << ", " << cost.bytes << " B |";
     for (const std::string effect :
          {"gravity", "inertia", "damping", "viscosity", "friction", "cutting", "stiffening", "plasticity"}) {
@@ -118,9 +117,9 @@ TEST_F(EffectsProof, WhatIsNotListedCostsNoInstructionAndNoByte) {
   }
 }
 
-/// The names of the bodies whose effect costs no visible instruction. It skips effects that are too cheap to measure: the
-/// shape changes the work of Newton's method by 0.01 %, and the place of a block on the heap changes the cost of a copy by
-/// about a hundred instructions.
+/// Returns the bodies whose effect costs no measurable instructions. Effects that are too cheap to measure are
+/// skipped: the shape changes the work of Newton's method by 0.01 %, and the heap address changes the cost of a copy
+/// by about a hundred instructions.
 std::string free_of_charge(const std::vector<Body>& bodies) {
   std::string found;
   std::map<std::string, Cost> none;

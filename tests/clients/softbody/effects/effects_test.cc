@@ -37,12 +37,12 @@ TEST(Effects, MassesAreThoseOfTheVolumeWhateverTheElement) {
 }
 
 TEST(Gravity, AColumnSagsUnderItsOwnWeightAsMuchAsItShould) {
-  // Free to become thicker or not, with ν = 0 it does not: u(top) = ρ g h²/2E.
+  // With ν = 0 the block does not widen: u(top) = ρ g h²/2E.
   for (const ModelKind model : kImplicit) {
     BodyConfig config = pressed_body(model, Element::kHex8, 4);
     config.material.poisson = 0;
     config.effects.density = 1000;
-    config.effects.gravity = Vec3(0, 0, -0.1);  // so little that all are linear
+    config.effects.gravity = Vec3(0, 0, -0.1);  // so small that all models are linear
     const Reaction untouched = Body(config).press(Given::kForce, 0);
     EXPECT_NEAR(untouched.depth, 1000 * 0.1 * 0.05 * 0.05 / 2e4, 1e-3 * untouched.depth) << static_cast<int>(model);
     EXPECT_EQ(untouched.force, 0);
@@ -67,7 +67,8 @@ TEST(Gravity, TheToolMeetsTheSurfaceWhereItHasSunkTo) {
   }
 }
 
-/// A cube of 100 mm between walls without friction: one mass of 0.5 kg (the other half is held) on a spring of 1 kN/m.
+/// A cube of 100 mm between frictionless walls: a mass of 0.5 kg (the other half is at the fixed nodes) and a spring
+/// of 1 kN/m.
 Solid one_mass() {
   Mesh mesh = block(Shape::kHex8, Vec3(0.1, 0.1, 0.1), {1, 1, 1});
   Fixed fixed = fix_where(mesh, [](const Vec3& node) { return node.z() < 1e-9; });
@@ -84,7 +85,7 @@ TEST(Inertia, OneMassSwingsDampedAndViscousAndUnderItsWeightAsOnPaper) {
   const double dt = 2e-3;
   const double damping = 7;
   const double relaxation = 0.003;
-  const double weight = kMass * 9.81;  // down is deeper
+  const double weight = kMass * 9.81;  // positive: downward is deeper
   const EffectsConfig all{.density = 1000,
                           .step = dt,
                           .gravity = Vec3(0, 0, -9.81),
@@ -137,7 +138,7 @@ TEST(Damping, TakesTheEnergyThatASwingHas) {
 }
 
 TEST(Viscosity, ABodyCreepsWithTheRelaxationTimeOfItsMaterial) {
-  // K (u + τ u̇) = f: by implicit Euler u after n steps is u∞ (1 − (1 + dt/τ)⁻ⁿ), for every shape alike.
+  // K (u + τ u̇) = f. With implicit Euler, u = u∞ (1 − (1 + dt/τ)⁻ⁿ) after n steps, for every shape.
   for (const ModelKind model : kImplicit) {
     BodyConfig config = pressed_body(model, Element::kTet4, 4);
     const double in_the_end = Body(config).press(Given::kForce, 1e-3).depth;
@@ -169,7 +170,7 @@ TEST(Effects, WhatIsNotListedKeepsNothing) {
   for (const ModelKind model : kImplicit) {
     BodyConfig config = pressed_body(model, Element::kTet4, 4);
     const std::size_t bare = Body(config).size().bytes;
-    config.effects.density = 1000;  // said, but used by nothing
+    config.effects.density = 1000;  // set, but not used by any effect
     config.effects.step = 0.01;
     EXPECT_EQ(Body(config).size().bytes, bare);
     EXPECT_EQ(Body(config).step(), 0);
@@ -202,7 +203,7 @@ TEST(Friction, HoldsTheToolUntilTheConeAndThenPullsAlongIt) {
   EXPECT_NEAR(sliding.force.x() / sliding.force.y(), 0.75, 1e-12);
   EXPECT_EQ(sliding.stiffness, 0);
   EXPECT_EQ(friction.move(Vec2(0.01, 0), 0).force, Vec2::Zero());  // lifted
-  EXPECT_EQ(friction.move(Vec2(0.02, 0), 1).force, Vec2::Zero());  // and put down elsewhere
+  EXPECT_EQ(friction.move(Vec2(0.02, 0), 1).force, Vec2::Zero());  // pressed again elsewhere
   EXPECT_THROW(Friction(-0.1, 1000), std::invalid_argument);
   EXPECT_THROW(Friction(std::numeric_limits<double>::quiet_NaN(), 1000), std::invalid_argument);
   EXPECT_THROW(Friction(0.1, 0), std::invalid_argument);
@@ -212,13 +213,13 @@ TEST(Friction, TakesEnergyOnEveryClosedWayAndGivesNone) {
   Dice dice(3);
   for (int way = 0; way < 200; ++way) {
     Friction friction(0.4, 1000);
-    double work = 0;  // done on the hand
+    double work = 0;  // on the hand
     Vec2 place(0, 0);
     friction.move(place, 1);
     for (int i = 0; i < 100; ++i) {
       const Vec2 next = i == 99 ? Vec2(0, 0) : Vec2(dice.within(-0.003, 0.003), dice.within(-0.003, 0.003));
       const double normal = dice.within(0.01, 3);
-      // Along a straight line, in steps so short that the force is as good as constant.
+      // Along a straight line, in steps so short that the force is nearly constant.
       for (int k = 1; k <= 50; ++k) {
         const Vec2 to = place + (next - place) * k / 50.0;
         const Vec2 from = place + (next - place) * (k - 1) / 50.0;

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// In place of cutting.cc, effects.cc, friction.cc, self_collision.cc and stiffening.cc, in a program that is built
-// without effects (CMakeLists.txt).
+// Replaces cutting.cc, effects.cc, friction.cc, self_collision.cc and stiffening.cc in a program that is built
+// without effects (see CMakeLists.txt).
 #include <cstdlib>
 
 #include "clients/softbody/effects/cutting.h"
@@ -13,7 +12,7 @@
 namespace tendon::softbody {
 namespace {
 
-/// Takes what would else be members that nobody reads.
+/// Uses the members that would otherwise be unused.
 [[noreturn]] void abort_with(double) { std::abort(); }
 
 }  // namespace

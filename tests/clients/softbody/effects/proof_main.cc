@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
+// The program whose instructions effects_proof_test.cc counts: bodies that a tool presses and strokes in turn.
+// Callgrind counts within `touch_in_turn` and writes a file each time it returns, so that one run measures all
+// bodies.
 //
-// What effects_proof_test.cc counts instructions of: bodies that a tool presses and strokes, one after the other.
-// Callgrind counts within `touch_in_turn` and writes a file each time it returns, so that one run counts them all.
+//    softbody-proof none     each model with only the effects that it requires
+//    softbody-proof each     some of them with one additional effect at a time
 //
-//     softbody-proof none     each model with nothing listed that it can do without
-//     softbody-proof each     some of them with one effect more at a time
-//
-// A line for each body: its name, the bytes of heap that it holds, and those that it says it keeps.
+// Prints a line for each body: its name, its heap memory in bytes, and the memory that it reports.
 #include <iostream>
 #include <memory>
 #include <string>
@@ -21,7 +21,7 @@ namespace {
 
 BodyConfig body_of(const ModelInfo& model) {
   BodyConfig config = testing::pressed_body(model.kind, Element::kHex8Sri, 4);
-  config.max_iterations = 1;  // how many are wanted is a matter of the forces, and not of what computing them costs
+  config.max_iterations = 1;  // the number of iterations depends on the forces, but the test compares the cost of one
   config.effects.step = 1e-3;
   return config;
 }
@@ -44,7 +44,7 @@ void list(EffectKind effect, BodyConfig& config) {
     case EffectKind::kFriction:
       config.friction = 0.3;
       break;
-    case EffectKind::kCutting:  // one that does not come about
+    case EffectKind::kCutting:  // a cut that is never made
       config.cuts = {{{Vec3(0, -0.06, 0.025), Vec3(0, 0.12, 0), Vec3(0, 0, 0.03)}, PlannedCut::When::kForce, 1e6}};
       break;
     case EffectKind::kStiffening:
@@ -63,7 +63,7 @@ void list(EffectKind effect, BodyConfig& config) {
 
 }  // namespace
 
-/// A name that callgrind finds: not inlined, not mangled.
+/// The symbol for callgrind, neither inlined nor mangled.
 extern "C" [[gnu::noinline]] void touch_in_turn(Body& body, int steps) {
   for (int i = 0; i < steps; ++i) {
     body.tick(0.01 * i);

@@ -23,12 +23,12 @@ namespace {
 using testing::pressed_body;
 
 constexpr double kYoung = 1e4;       // Pa
-constexpr double kBed = 1e4 / 1e-4;  // Pa/m: at a pressure of Young's modulus 0.1 mm
+constexpr double kBed = 1e4 / 1e-4;  // Pa/m: 0.1 mm at a pressure of Young's modulus
 constexpr Law kLaws[] = {Law::kCorotational, Law::kStVenantKirchhoff, Law::kNeoHookean};
 
-/// A C of 40 × 20 × 41 mm: a slot of 1 mm height, open to +x, between two jaws. The lower one stands on the floor.
+/// A C-shaped body of 40 × 20 × 41 mm with a slot 1 mm high, open to +x, between two jaws. The lower jaw is fixed.
 struct Jaws {
-  static constexpr double kFloor = 0.020;  // m, the slot's
+  static constexpr double kFloor = 0.020;  // m, of the slot
   static constexpr double kRoof = 0.021;
 
   explicit Jaws(Law law, std::optional<double> bed = kBed, Element element = Element::kHex8Sri,
@@ -59,7 +59,7 @@ struct Jaws {
   }
   Reaction press(double depth) { return model.press(patch, Given::kDepth, depth); }
 
-  /// m, how far the roof is below the floor of the slot, at most: below the line through the floor's nodes of the same
+  /// Largest penetration of the slot's roof below its floor, m. The floor is the line through its nodes with the same
   /// y at rest.
   double overlap() const {
     double deepest = -std::numeric_limits<double>::infinity();
@@ -108,7 +108,7 @@ TEST(SelfCollision, AJawGoesThroughTheOtherWithoutItAndIsHeldByItsBedWithIt) {
       EXPECT_LE(with.error, 2e-3 * with.force) << depth;
     }
     EXPECT_GT(through.overlap(), 1e-3);
-    // The pressure is some times the force over the patch's area: 1 kPa, of which the bed gives way by 10 µm.
+    // The pressure is of the order of the force over the patch area, about 1 kPa, which compresses the bed by 10 µm.
     EXPECT_LT(held.overlap(), 1e-4);
     EXPECT_GT(held.overlap(), 0);
     EXPECT_LT(held.model.self_collision()->overlap(held.model.displacements()), 1e-4);
@@ -133,7 +133,7 @@ TEST(SelfCollision, WhereNothingTouchesEveryAnswerIsTheSameToTheLastBit) {
   }
 }
 
-/// Jaws with the upper one in the lower one, crookedly.
+/// Displacements that push the upper jaw unevenly into the lower one.
 VectorXd bitten(const Solid& solid, std::uint64_t seed) {
   Dice dice(seed);
   VectorXd u = VectorXd::Zero(solid.size());
@@ -153,7 +153,7 @@ TEST(SelfCollision, TheForcesOfTheTwoSidesAreEqualAndOppositeAndHaveNoMoment) {
     const SelfCollision bed(solid, kBed, u);
     Elastic::Forces felt{0, VectorXd::Zero(solid.free_count())};
     bed.add_forces(u, felt);
-    VectorXd all = VectorXd::Zero(solid.size());  // none of the held nodes is near the slot
+    VectorXd all = VectorXd::Zero(solid.size());  // no held node is near the slot
     solid.add_free(felt.force, all);
     Vec3 force = Vec3::Zero();
     Vec3 moment = Vec3::Zero();
@@ -200,7 +200,7 @@ TEST(SelfCollision, ASystemIsSolvedWithTheBedAsIfItWereInTheMatrix) {
   ASSERT_TRUE(factor.factorize(k));
   const VectorXd b = VectorXd::LinSpaced(solid.free_count(), -1e-3, 2e-3);
   const VectorXd x = bed.solve(factor, b);
-  // What the bed adds to K x, by its forces beside u: they are linear as long as the same nodes are behind.
+  // The contribution of the bed to K x, from its forces near u. They are linear while the same nodes penetrate.
   const auto forces = [&](const VectorXd& there) {
     Elastic::Forces sum{0, VectorXd::Zero(solid.free_count())};
     bed.add_forces(there, sum);
@@ -214,8 +214,7 @@ TEST(SelfCollision, ASystemIsSolvedWithTheBedAsIfItWereInTheMatrix) {
   EXPECT_GT((k.times(x) - b).norm(), 0.1 * b.norm());
 }
 
-/// A bar of 20 × 20 × 40 mm without Poisson ratio, pressed evenly on all of its top, with a slit across at half its
-/// height.
+/// A bar of 20 × 20 × 40 mm with ν = 0 under a uniform load on its top, with a slit across its middle.
 struct SlitBar {
   explicit SlitBar(std::optional<double> bed, bool slit)
       : solid(solid_of(slit)), top(solid.mesh(), Vec3::UnitZ(), 0.01), model(solid, top, {.self_collision = bed}) {
@@ -310,7 +309,7 @@ TEST(SelfCollision, StiffnessIsTheSlopeOfTheForceAlsoWithTheJawsShut) {
 }
 
 TEST(SelfCollision, AHeavyJawFallsOnTheOtherAndStaysThere) {
-  // So heavy that it would hang below the other.
+  // So heavy that it would pass through the lower jaw.
   const EffectsConfig heavy{
       .density = 1200, .step = 0.01, .gravity = Vec3(0, 0, -9.81), .inertia = true, .damping = 20};
   EffectsConfig at_rest = heavy;
@@ -321,7 +320,7 @@ TEST(SelfCollision, AHeavyJawFallsOnTheOtherAndStaysThere) {
   EXPECT_GT(resting.overlap(), 0);
   EXPECT_LT(resting.overlap(), 1e-4);
   Jaws falling(Law::kCorotational, kBed, Element::kHex8Sri, heavy);
-  falling.model.set_displacements(VectorXd::Zero(falling.solid.size()));  // lifted
+  falling.model.set_displacements(VectorXd::Zero(falling.solid.size()));  // the jaw begins at its undeformed position
   double deepest = 0;
   for (int i = 0; i < 40; ++i) {
     falling.model.press({}, Given::kForce, 0);
@@ -333,7 +332,7 @@ TEST(SelfCollision, AHeavyJawFallsOnTheOtherAndStaysThere) {
 
 TEST(SelfCollision, TheSidesOfACutThatIsMadeUnderTheToolStayApart) {
   BodyConfig config = pressed_body(ModelKind::kCorotational, Element::kHex8Sri, 8);
-  config.middle = Vec3(0.0125, 0, 0);  // beside the cut
+  config.middle = Vec3(0.0125, 0, 0);  // next to the cut
   config.cuts = {{{Vec3(0, -0.06, 0.025), Vec3(0, 0.12, 0), Vec3(0, 0, 0.03)}, PlannedCut::When::kForce, 0.5}};
   const auto felt = [](const BodyConfig& each) {
     Body body(each);
@@ -346,7 +345,7 @@ TEST(SelfCollision, TheSidesOfACutThatIsMadeUnderTheToolStayApart) {
   const double apart = felt(config);
   config.cuts.clear();
   const double whole = felt(config);
-  EXPECT_GT(apart, 1.01 * through);  // the flap that is pressed leans on the other
+  EXPECT_GT(apart, 1.01 * through);  // the pressed flap leans on the other one
   EXPECT_LT(apart, whole);
 }
 

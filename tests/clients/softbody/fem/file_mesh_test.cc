@@ -31,10 +31,10 @@ struct At {
 
 /// Writes a block of 100 × 100 × 50 mm with 8 × 8 × 4 elements in format 2.2 of gmsh.
 struct BlockFile {
-  std::function<int(At)> times = [](At) { return 1; };     ///< the number of copies of an element
-  std::function<int(At)> side = [](At) { return 0; };      ///< elements with different values do not share nodes
-  std::function<double(At)> shift = [](At) { return 0; };  ///< mm, along x
-  std::vector<std::array<int, 8>> orders{{0, 1, 2, 3, 4, 5, 6, 7}};  ///< the order of the nodes in each copy
+  std::function<int(At)> times = [](At) { return 1; };               ///< copies of an element
+  std::function<int(At)> side = [](At) { return 0; };                ///< elements with different values share no nodes
+  std::function<double(At)> shift = [](At) { return 0; };            ///< along x, mm
+  std::vector<std::array<int, 8>> orders{{0, 1, 2, 3, 4, 5, 6, 7}};  ///< node order of each copy
 
   std::string text() const {
     std::ostringstream nodes;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Four elements at once are each what it is alone.
+// Four elements computed together must give the results of each element alone.
 #include "clients/softbody/fem/kernel.h"
 
 #include <gtest/gtest.h>
@@ -20,7 +20,7 @@ constexpr std::array kLaws{Law::kLinear, Law::kCorotational, Law::kStVenantKirch
 constexpr double kMu = 3;
 constexpr double kLambda = 27;
 
-/// One F that is nearly a rotation, one stretched, one nearly flat and one inside out.
+/// A near rotation, a stretch, a nearly flat and an inverted deformation gradient.
 std::array<Mat3, kLanes> four(Dice& dice) {
   std::array<Mat3, kLanes> all;
   const std::array<double, kLanes> spread{0.2, 0.5, 0.3, 1.5};
@@ -72,7 +72,8 @@ TEST(Kernel, ForcesOfASolidAreTheSumOverThePointsOfItsElements) {
   Dice dice(2);
   for (const ElementInfo& each : elements()) {
     for (const Law law : kLaws) {
-      Mesh mesh = block(each.shape, Vec3(0.1, 0.08, 0.05), {3, 1, 2});  // six hexahedra: the last four are not full
+      // six hexahedra: the last group of four is not full
+      Mesh mesh = block(each.shape, Vec3(0.1, 0.08, 0.05), {3, 1, 2});
       const Fixed fixed = fix_where(mesh, [](const Vec3& node) { return node.z() < 1e-9; });
       const Solid solid(std::move(mesh), each.element, {.young = 1e4, .poisson = 0.45}, law, fixed);
       VectorXd u(solid.size());

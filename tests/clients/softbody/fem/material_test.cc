@@ -27,7 +27,8 @@ TEST(Materials, StressIsTheSlopeOfTheEnergyAndTheTangentThatOfTheStress) {
   for (const Law law : kLaws) {
     for (int i = 0; i < 50; ++i) {
       const Mat3 f = drawn(dice, 0.4);
-      if (f.determinant() < 0.2) continue;  // where rotations jump, corotational slopes do
+      // the polar rotation is discontinuous there, and so is the corotational stress
+      if (f.determinant() < 0.2) continue;
       const Mat3 along = drawn(dice, 1) - Mat3::Identity();
       const double h = 1e-5;
       const Stress plus = stress(law, f + h * along, kSoft.mu(), kSoft.lambda());

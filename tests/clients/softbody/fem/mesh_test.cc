@@ -96,7 +96,7 @@ TEST(Meshes, CylindersApproachTheirVolumeFromBelowWithMoreCells) {
 
 TEST(Meshes, AnEvenBlockOfTetrahedraIsItsOwnMirrorImage) {
   const Mesh mesh = block(Shape::kTet4, Vec3(2, 2, 1), {2, 2, 1});
-  // The middle of every tetrahedron, and of its mirror image.
+  // The centroid of every tetrahedron and its mirror image.
   std::vector<std::array<double, 3>> middles;
   std::vector<std::array<double, 3>> mirrored;
   for (int e = 0; e < mesh.element_count(); ++e) {
@@ -126,7 +126,7 @@ TEST(Gmsh, ReadsWhatTheThreeFormatsSay) {
       "$Elements\n1 1 9 9\n3 0 4 1\n9 1 2 3 4\n$EndElements\n";
   for (const std::string& text : {one, two, four}) {
     const Mesh mesh = parse_gmsh(text, "good.msh", 1e-3).mesh;
-    EXPECT_EQ(mesh.nodes.size(), 4U);  // the fifth belongs to no volume
+    EXPECT_EQ(mesh.nodes.size(), 4U);  // the fifth node belongs to no volume element
     EXPECT_EQ(mesh.element_count(), 1);
     EXPECT_NEAR(check(mesh, "good.msh"), 1e-9 / 6, 1e-20);
   }

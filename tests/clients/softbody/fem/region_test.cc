@@ -65,7 +65,7 @@ TEST(Regions, ABarOfTwoMaterialsIsTwoSpringsInSeries) {
     std::vector<Material> of_elements = materials_of(bar, soft, std::vector{upper});
     const Fixed fixed = fix_where(bar, [](const Vec3& node) { return node.z() < 1e-9; });
     const Solid solid(std::move(bar), element.element, soft, Law::kLinear, fixed, std::move(of_elements));
-    // The shape of two springs in series under 1 N: 40 mm of the soft one, then 60 mm of the stiff one.
+    // Two springs in series under 1 N: 40 mm of the soft material, then 60 mm of the stiff one.
     VectorXd u = VectorXd::Zero(solid.size());
     for (std::size_t i = 0; i < solid.mesh().nodes.size(); ++i) {
       const double z = solid.mesh().nodes[i].z();
@@ -80,7 +80,7 @@ TEST(Regions, ABarOfTwoMaterialsIsTwoSpringsInSeries) {
       const double z = solid.mesh().nodes[i].z();
       if (z > 0.1 - 1e-9) pulls += force.z();
       if (z < 1e-9 || z > 0.1 - 1e-9) continue;
-      EXPECT_LT(force.norm(), 1e-12) << element.name << z;  // at rest, without a load
+      EXPECT_LT(force.norm(), 1e-12) << element.name << z;  // at rest and without load
     }
     EXPECT_NEAR(pulls, 1, 1e-12) << element.name;
   }
@@ -88,7 +88,7 @@ TEST(Regions, ABarOfTwoMaterialsIsTwoSpringsInSeries) {
 
 TEST(Regions, AfterACutEveryElementThatIsLeftIsOfItsMaterial) {
   const Solid whole = testing::pressed_block(Element::kHex8Sri, 8, 0.45);
-  // A piece without support, in the middle of the side: elements after it stay.
+  // The cuts detach a piece at the side, so elements after it in the mesh keep their order.
   const std::vector<Cut> around{{Vec3(0.025, -0.06, 0.0125), Vec3(0, 0.12, 0), Vec3(0, 0, 0.0125)},
                                 {Vec3(0.025, -0.06, 0.0125), Vec3(0, 0.12, 0), Vec3(0.03, 0, 0)},
                                 {Vec3(0.025, -0.06, 0.025), Vec3(0, 0.12, 0), Vec3(0.03, 0, 0)}};
@@ -128,7 +128,7 @@ TEST(Regions, TheLaterOneCountsAndOneWithoutAnElementIsRefused) {
     balls += each.young == 2 ? 1 : 0;
     insides += each.young == 3 ? 1 : 0;
   }
-  EXPECT_EQ(balls, 5);  // its neighbours
+  EXPECT_EQ(balls, 5);  // the neighbors of the innermost element
   EXPECT_EQ(insides, 1);
   try {
     materials_of(mesh, soft, std::vector{inside, ball});

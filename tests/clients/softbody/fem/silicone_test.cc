@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Cylinders of silicone that were pressed together between two plates ($TENDON_DATA, silicone-tissue-phantoms: Dawood
-// et al. 2026, CC BY 4.0), and what was published of them.
+// Silicone cylinders compressed between two plates ($TENDON_DATA, silicone-tissue-phantoms: Dawood et al. 2026, CC BY
+// 4.0), and the constitutive laws published with them.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -25,11 +25,11 @@ constexpr double kHeight = 0.03;   // m
 constexpr double kArea = std::numbers::pi * kRadius * kRadius;
 constexpr std::array kCompressions{0.002, 0.01};  // m
 
-/// N, at a compression in m, between the samples beside it.
+/// Force at a compression in m, interpolated between samples, N.
 double measured(const std::filesystem::path& file, double compression) {
   std::ifstream in(file);
   std::string line;
-  for (int i = 0; i < 8; ++i) std::getline(in, line);  // what it is, and the names of the columns
+  for (int i = 0; i < 8; ++i) std::getline(in, line);  // the description and the column names
   double mm_before = 0;
   double load_before = 0;
   while (std::getline(in, line)) {
@@ -47,8 +47,8 @@ double measured(const std::filesystem::path& file, double compression) {
   return 0;
 }
 
-/// Yeoh's law of an incompressible cylinder that may grow wider: F = −2 A (λ − λ⁻²) Σ i Cᵢ (I₁ − 3)ⁱ⁻¹, Cᵢ in kPa. With
-/// one constant it is the Neo-Hookean, µ = 2 C₁.
+/// Yeoh's law for an incompressible cylinder that can widen: F = −2 A (λ − λ⁻²) Σ i Cᵢ (I₁ − 3)ⁱ⁻¹, Cᵢ in kPa. With
+/// one constant it is the neo-Hookean law with µ = 2 C₁.
 double yeoh(const std::vector<double>& constants, double compression) {
   const double stretch = 1 - compression / kHeight;
   const double invariant = stretch * stretch + 2 / stretch - 3;
@@ -59,12 +59,13 @@ double yeoh(const std::vector<double>& constants, double compression) {
   return -2 * kArea * (stretch - 1 / (stretch * stretch)) * slope;
 }
 
-/// A Neo-Hookean cylinder between two plates, N. Oiled plates let it grow wider, dry ones hold it.
+/// Force on a neo-Hookean cylinder between two plates, N. It can slide on oiled plates and sticks to dry ones.
 double pressed_cylinder(double mu, double compression, bool oiled) {
   constexpr double kPoisson = 0.4995;  // silicone
   const Material material{.young = 2 * (1 + kPoisson) * mu, .poisson = kPoisson};
   Mesh mesh = cylinder(Shape::kHex8, kRadius, kHeight, 4, oiled ? 2 : 6);
-  const double round = kArea * kHeight / check(mesh, "cylinder");  // its mantle has corners
+  // the polygonal cross section is smaller than the circle
+  const double round = kArea * kHeight / check(mesh, "cylinder");
   Fixed fixed(3 * mesh.nodes.size(), false);
   std::vector<std::size_t> top;
   for (std::size_t i = 0; i < mesh.nodes.size(); ++i) {
@@ -74,7 +75,7 @@ double pressed_cylinder(double mu, double compression, bool oiled) {
     if (above) top.push_back(i);
     const bool on_axis = std::hypot(node.x(), node.y()) < 1e-9;
     fixed[3 * i] = plate && (!oiled || on_axis);
-    fixed[3 * i + 1] = plate && (!oiled || on_axis || std::abs(node.y()) < 1e-9);  // it does not turn either
+    fixed[3 * i + 1] = plate && (!oiled || on_axis || std::abs(node.y()) < 1e-9);  // no rotation about the axis
     fixed[3 * i + 2] = plate;
   }
   const Solid solid(std::move(mesh), Element::kHex8Sri, material, Law::kNeoHookean, fixed);
@@ -104,11 +105,11 @@ TEST(Silicone, DryPlatesThatHoldItMakeItStiffer) {
   EXPECT_GT(pressed_cylinder(22e3, 0.002, false), 1.15 * pressed_cylinder(22e3, 0.002, true));
 }
 
-/// Yeoh's three constants follow the whole curve, to 66 %, and at 10 mm they are within what two specimens of one
-/// silicone differ by (2 %). At 2 mm they are a tenth too soft: the fit was one of stresses, where those of small
-/// strains hardly count. One Neo-Hookean constant for all of it is too stiff up to 10 mm, because silicone stiffens
-/// beyond and the fit has to be stiff enough there. So it is the law with its published constant, not the mesh,
-/// by which the engine's only law for large strains misses: by 10 to 60 %.
+/// Yeoh's three constants fit the whole curve up to 66 % compression. At 10 mm they agree within the scatter of two
+/// specimens of the same silicone (2 %). At 2 mm they are 10 % too soft, because the published fit of stresses gives
+/// little weight to small strains. A single neo-Hookean constant fitted to the whole curve is too stiff up to 10 mm,
+/// because silicone stiffens beyond. So the 10 to 60 % error of the engine is due to this law with its published
+/// constant, not to the mesh.
 TEST(Silicone, MeasuredCylindersAreThePublishedYeohLawAndNotTheNeoHookeanOne) {
   const char* const data = std::getenv("TENDON_DATA");  // NOLINT(concurrency-mt-unsafe): one thread
   if (data == nullptr) GTEST_SKIP() << "TENDON_DATA is not set: the measured cylinders are not part of this repository";
@@ -120,7 +121,7 @@ TEST(Silicone, MeasuredCylindersAreThePublishedYeohLawAndNotTheNeoHookeanOne) {
   };
 
   const double scatter = measured(folder / "EF10_0T_A1.csv", 0.002) / measured(folder / "EF10_0T_B2.csv", 0.002) - 1;
-  EXPECT_NEAR(scatter, 0.038, 0.005);  // two specimens of one silicone
+  EXPECT_NEAR(scatter, 0.038, 0.005);  // two specimens of the same silicone
   for (const std::string silicone : {"EF10_0T", "EF30_0T", "EF10_50T"}) {
     const auto file = folder / (silicone + "_A1.csv");
     const std::vector<double> three = constants(silicone, "Yeoh_o3");
@@ -131,7 +132,7 @@ TEST(Silicone, MeasuredCylindersAreThePublishedYeohLawAndNotTheNeoHookeanOne) {
       const double ratio = pressed_cylinder(mu, compression, true) / measured(file, compression);
       EXPECT_GT(ratio, 1.1) << silicone << " at " << compression;
       EXPECT_LT(ratio, 1.6) << silicone << " at " << compression;
-      // As far as its law is the published one, the engine reproduces it.
+      // The engine reproduces its own law.
       EXPECT_NEAR(ratio * measured(file, compression) / yeoh({0.5e-3 * mu}, compression), 1, 2e-3);
     }
   }

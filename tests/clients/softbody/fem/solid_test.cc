@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What finite elements must get right before anything else of them is believed.
+// Basic verification of the finite elements: patch test, bar, and cantilever.
 #include "clients/softbody/fem/solid.h"
 
 #include <gtest/gtest.h>
@@ -16,7 +16,7 @@ namespace {
 
 constexpr double kPi = std::numbers::pi;
 
-/// A block whose inner nodes are out of line.
+/// A block with irregularly displaced inner nodes.
 Mesh crooked_block(Shape shape) {
   Mesh mesh = block(shape, Vec3(0.1, 0.08, 0.05), {3, 3, 2});
   for (Vec3& node : mesh.nodes) {
@@ -27,7 +27,7 @@ Mesh crooked_block(Shape shape) {
   return mesh;
 }
 
-/// Solves for the free displacements, from those that are given and the forces on the free nodes.
+/// Solves for the free displacements, given the prescribed ones in `u` and the loads on the free nodes.
 VectorXd at_rest(const Solid& solid, VectorXd u, const VectorXd& loads) {
   SymmetricMatrix k = solid.pattern();
   solid.stiffness(u, Solid::Curvature::kExact, k);
@@ -64,7 +64,7 @@ TEST(Reference, PatchTestAConstantStrainOnTheSurfaceIsConstantInside) {
 TEST(Reference, ABarIsStretchedByStressOverYoung) {
   for (const ElementInfo& each : elements()) {
     const Mesh mesh = crooked_block(each.shape);
-    // Rollers on three sides; the fourth, x = 50 mm, is drawn out by 1 %.
+    // Rollers on three sides. The side at x = 50 mm is pulled by 1 %.
     Fixed fixed(3 * mesh.nodes.size(), false);
     for (std::size_t i = 0; i < mesh.nodes.size(); ++i) {
       fixed[3 * i] = std::abs(mesh.nodes[i].x()) > 0.05 - 1e-9;
@@ -86,13 +86,13 @@ TEST(Reference, ABarIsStretchedByStressOverYoung) {
   }
 }
 
-/// The tip's deflection of a beam of 10 × 1 × 1 over Timoshenko's, F·L³/(3EI) + F·L/(κGA), ν = 0, for which a clamp
-/// keeps nothing from contracting and the beam's theory holds up to the clamp.
+/// Ratio of the tip deflection of a 10 × 1 × 1 beam to Timoshenko's solution F·L³/(3EI) + F·L/(κGA). With ν = 0 a
+/// clamp does not restrain lateral contraction, so the theory holds up to the clamp.
 double cantilever(Element element, int along, int across) {
   Mesh mesh = block(info(element).shape, Vec3(10, 1, 1), {along, across, across});
   Fixed fixed = fix_where(mesh, [](const Vec3& node) { return node.x() < -5 + 1e-9; });
   const Solid solid(std::move(mesh), element, {.young = 1000, .poisson = 0}, Law::kLinear, std::move(fixed));
-  // 1 N along z as a uniform shear on the far side.
+  // A shear load of 1 N along z, uniform over the free end.
   VectorXd loads = VectorXd::Zero(solid.size());
   const auto& nodes = solid.mesh().nodes;
   double area = 0;
@@ -101,8 +101,8 @@ double cantilever(Element element, int along, int across) {
     bool far = true;
     for (const int node : on) far = far && nodes[static_cast<std::size_t>(node)].x() > 5 - 1e-9;
     if (!far) continue;
-    // Corners of a triangle or square share alike; on a quadratic face only the middle (4/9), the edges (1/9) and the
-    // corners (1/36) of the nine do.
+    // Consistent nodal loads: equal for the corners of a linear face; for a 9-node face 4/9 at the center, 1/9 on the
+    // edges and 1/36 at the corners.
     const double share = 1.0 / (across * across) / (on.size() == 3 ? 2 : 1);
     for (std::size_t i = 0; i < on.size(); ++i) {
       double part = 1.0 / static_cast<double>(on.size());
@@ -122,7 +122,7 @@ double cantilever(Element element, int along, int across) {
 TEST(Reference, ACantileverBendsAsTimoshenkoSays) {
   EXPECT_NEAR(cantilever(Element::kHex27, 10, 1), 1, 0.005);
   EXPECT_NEAR(cantilever(Element::kHex8Sri, 40, 4), 1, 0.04);
-  EXPECT_LT(cantilever(Element::kTet4, 10, 1), 0.5);  // locks
+  EXPECT_LT(cantilever(Element::kTet4, 10, 1), 0.5);  // shear locking
 }
 
 TEST(Solid, ForcesAreTheSlopeOfTheEnergyAndTheStiffnessThatOfTheForces) {

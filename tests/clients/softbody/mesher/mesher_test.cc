@@ -23,7 +23,7 @@
 namespace tendon::softbody::mesher_test {
 namespace {
 
-/// A block of 100 × 100 × 50 mm, its middle above the origin, in mm.
+/// A block of 100 × 100 × 50 mm in mm. The center of its bottom is the origin.
 Triangles block_surface() {
   Triangles surface;
   for (const double z : {0.0, 50.0}) {
@@ -53,7 +53,8 @@ std::string obj_of(const Triangles& surface) {
   text << "# by hand\no thing\n";
   for (const Vec3& point : surface.points) text << "v " << point.x() << " " << point.y() << " " << point.z() << "\n";
   for (const auto& facet : surface.facets) {
-    text << "f " << facet[0] + 1 << "/1/1 " << facet[1] + 1 << "//2 " << facet[2] - 8 << "\n";  // from the end
+    // index relative to the end
+    text << "f " << facet[0] + 1 << "/1/1 " << facet[1] + 1 << "//2 " << facet[2] - 8 << "\n";
   }
   return text.str();
 }
@@ -137,7 +138,7 @@ TEST(Triangles, ASurfaceWithoutAnInsideIsRefusedByTheFacet) {
   EXPECT_EQ(thrown_by([&] { check(inside_out, "a"); }),
             "a: the surface is turned inside out: its facets must run anticlockwise, seen from outside");
 
-  Triangles crossing = block_surface();  // and the same once more, moved by half of itself in every direction
+  Triangles crossing = block_surface();  // with a copy that is shifted by half its size in each direction
   const int first = 8;
   for (int i = 0; i < first; ++i) crossing.points.emplace_back(crossing.points[at(i)] + Vec3(50, 43, 25));
   for (const auto& facet : block_surface().facets) {
@@ -186,7 +187,7 @@ class Meshing : public ::testing::Test {
     if (!has_gmsh()) GTEST_SKIP() << "gmsh is not installed (package gmsh)";
   }
   std::string path(const char* name) const { return (scratch_.path() / name).string(); }
-  /// Exit code; all that it says is in said().
+  /// Returns the exit code. said() returns the output.
   int run(const std::string& arguments) const {
     const std::string command = std::string(TENDON_MESH) + " " + arguments + " > " + path("said") + " 2>&1";
     return WEXITSTATUS(std::system(command.c_str()));  // NOLINT(concurrency-mt-unsafe): one thread
@@ -211,7 +212,7 @@ class Meshing : public ::testing::Test {
   tendon::testing::ScratchFolder scratch_;
 };
 
-// B1 of clients/softbody/README.md: 420.2 N/m. Cubes of 12.5 mm are 9.5 % off, of 6.25 mm 2.5 %.
+// Block B1 of clients/softbody/README.md has 420.2 N/m. Cubes of 12.5 mm have an error of 9.5 %, of 6.25 mm 2.5 %.
 TEST_F(Meshing, ABlockOfHexahedraIsNearlyAsStiffAsOneOfCubes) {
   std::ofstream(path("block.off")) << off_of(block_surface());
   ASSERT_EQ(run(path("block.off") + " --size 8 --at 0,0,50 --reach 30 --coarsest 2 --json --out " + path("block.msh")),
@@ -307,7 +308,7 @@ TEST_F(Meshing, NothingThatIsThereIsOverwrittenAndABadSurfaceMakesNothing) {
   EXPECT_EQ(run(path("block.off") + " --size 10 --at 0,0,50 --out " + path("new.msh")), 2) << "how far from there?";
 }
 
-/// An ellipsoid of 110 × 58 × 44 mm with a hollow in its side, in mm: a kidney, more or less.
+/// An ellipsoid of 110 × 58 × 44 mm with an indentation in its side, in mm; roughly a kidney.
 Triangles bean_surface() {
   constexpr int kRound = 36;
   constexpr int kUp = 18;
@@ -337,7 +338,7 @@ Triangles bean_surface() {
   return surface;
 }
 
-// All the way the worst of these elements has −0.2, and not at all a tenth of the volume is missing.
+// If all nodes move fully to the surface, the worst quality is −0.2. If none moves, a tenth of the volume is missing.
 TEST_F(Meshing, OnACurvedSurfaceNodesGoAsFarAsElementsStayWellShaped) {
   const Triangles bean = bean_surface();
   check(bean, "bean");
@@ -358,7 +359,7 @@ TEST_F(Meshing, TheKidneysMeshIsWhatItsSurfaceMakes) {
   ASSERT_EQ(run(surface + " --size 6 --at 0,0,22 --reach 25 --coarsest 1.5 --out " + path("kidney.msh")), 0) << said();
   const Mesh made = read_gmsh(path("kidney.msh"), 1e-3).mesh;
   const Mesh kept = read_gmsh(scenes + "/kidney.msh", 1e-3).mesh;
-  // Another gmsh places other nodes.
+  // The node positions depend on the version of gmsh.
   EXPECT_NEAR(check(made, "made") / check(kept, "kept"), 1, 0.01);
   EXPECT_NEAR(static_cast<double>(made.nodes.size()) / static_cast<double>(kept.nodes.size()), 1, 0.2);
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Presses that break solvers of this kind; rigid tools have theirs in touch/hard_tools_test.cc.
+// Presses that are difficult for such solvers. touch/hard_tools_test.cc has those with rigid tools.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -17,7 +17,7 @@ namespace {
 
 constexpr double kPatch = testing::kB1PatchRadius;
 
-/// A side of a body, in the hands of the whole model and of the near one.
+/// A side of a body with the whole model and the near model.
 struct Side {
   Side(Solid of, const Vec3& towards_tool, const Vec3& first, double tolerance = 1e-9)
       : solid(std::move(of)),
@@ -31,7 +31,7 @@ struct Side {
   NearModel near;
 };
 
-/// −∂force/∂place, by differences.
+/// −∂force/∂place by central differences.
 Mat3 slope(PatchContact& contact, const Vec3& place) {
   constexpr double kStep = 2e-6;  // m
   Mat3 all;
@@ -47,8 +47,8 @@ TEST(HardPress, InACornerAndAtTheRimStiffnessIsTheSlopeAndNearIsWhole) {
     Vec3 towards_tool;
     Vec3 tool;
   };
-  for (const Place& place : {Place{Vec3::UnitZ(), Vec3(0.042, 0.041, 0.047)},   // in the corner of the top
-                             Place{Vec3::UnitX(), Vec3(0.047, 0.003, 0.004)}})  // beside where it is held
+  for (const Place& place : {Place{Vec3::UnitZ(), Vec3(0.042, 0.041, 0.047)},   // near a corner of the top
+                             Place{Vec3::UnitX(), Vec3(0.047, 0.003, 0.004)}})  // near the clamped bottom
     for (const Law law : {Law::kCorotational, Law::kNeoHookean}) {
       Side side(testing::pressed_block(Element::kHex8Sri, 8, 0.45, law), place.towards_tool, place.tool);
       PatchContact contact(side.whole, side.surface, 0, PatchContact::Side::kUnilateral, nullptr);
@@ -69,7 +69,7 @@ TEST(HardPress, EightMillimetresDeepIsTheSameAtOnceAndInSteps) {
     Side side(testing::pressed_block(Element::kHex8Sri, n, 0.45, Law::kCorotational), Vec3::UnitZ(), Vec3::Zero());
     const Patch patch = *side.surface.patch(Vec2::Zero());
     const Reaction at_once = side.whole.press(patch, Given::kDepth, 0.008);
-    EXPECT_LT(at_once.stiffness, 0.7 * at_once.force / 0.008);  // it gives way: the patch's limit load is not far
+    EXPECT_LT(at_once.stiffness, 0.7 * at_once.force / 0.008);  // softening: close to the patch's limit load
     EXPECT_LT(at_once.error, 1e-6 * at_once.force);
     QuasiStaticModel slow(side.solid, side.surface, {.tolerance = 1e-9});
     for (double depth = 0.0005; depth < 0.0096; depth += 0.0005) slow.press(patch, Given::kDepth, depth);
@@ -91,7 +91,7 @@ Solid block_of_two(int n, Law law, const Material& inner, const Material& outer)
   return {std::move(mesh), Element::kHex8Sri, outer, law, fixed, std::move(of_elements)};
 }
 
-/// Newton's method solves the whole body exactly; the error that `near` says covers what its far field leaves out.
+/// Newton's method solves the whole body. The error that the near model reports must cover its approximate far field.
 TEST(HardPress, AMillionTimesStifferFarFieldIsCoveredByTheErrorSaid) {
   const Material tissue{.young = 1e4, .poisson = 0.45};
   for (const double ratio : {1e6, 1e-6}) {
@@ -102,10 +102,11 @@ TEST(HardPress, AMillionTimesStifferFarFieldIsCoveredByTheErrorSaid) {
         const Patch patch = *side.surface.patch(Vec2::Zero());
         const Reaction whole = side.whole.press(patch, Given::kDepth, depth);
         const Reaction near = side.near.press(patch, Given::kDepth, depth);
-        // Rounding of the stiff part's forces is seen in the soft one's.
+        // Rounding errors of the stiff part affect the soft part.
         EXPECT_LT(whole.error, 1e-3 * whole.force) << ratio << ' ' << depth;
         EXPECT_LE(std::abs(near.force - whole.force), near.error) << ratio << ' ' << depth;
-        // A rigid far field is right at once; one that is softer than the near field moves as far as that, and turns.
+        // A rigid far field is exact at once. A far field softer than the near field moves as much as the near field,
+        // and rotates.
         const double share = ratio > 1 ? 1e-5 : 0.05;
         EXPECT_LT(std::abs(near.force - whole.force), share * whole.force) << ratio << ' ' << depth;
         EXPECT_LT(near.error, 0.2 * near.force) << ratio << ' ' << depth;
@@ -128,7 +129,7 @@ TEST(HardPress, NearlyIncompressibleAtOnceIsTheSameAsInSteps) {
       }
       EXPECT_LT(in_steps.error, 1e-6 * in_steps.force) << n;
       EXPECT_LE(std::abs(at_once.force - in_steps.force), at_once.error + in_steps.error) << n;
-      EXPECT_LT(at_once.error, 2e-3 * at_once.force) << n;  // The solver stops after the maximum number of iterations.
+      EXPECT_LT(at_once.error, 2e-3 * at_once.force) << n;  // the iteration limit ends the solver
       const Reaction near = side.near.press(patch, Given::kDepth, 0.005);
       EXPECT_LE(std::abs(near.force - in_steps.force), near.error) << n;
       EXPECT_NEAR(near.force, in_steps.force, 0.01 * in_steps.force) << n;

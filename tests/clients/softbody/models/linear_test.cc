@@ -19,7 +19,7 @@ using testing::kB1NearlyIncompressible;
 using testing::kB1PatchRadius;
 using testing::pressed_block;
 
-/// N/m under the patch in the middle of the top.
+/// Stiffness under the patch at the center of the top, N/m.
 double stiffness(Element element, int n, double poisson) {
   const Solid solid = pressed_block(element, n, poisson);
   const TouchSurface top(solid.mesh(), Vec3::UnitZ(), kB1PatchRadius);
@@ -46,7 +46,7 @@ TEST(Reference, NearlyIncompressibleMaterialLocksSomeElementsOnly) {
 }
 
 TEST(Reference, ErrorsShrinkAtTheElementsOwnOrder) {
-  // Twice as many cells: a quarter of the error with linear elements. Coarse meshes of tetrahedra have not come so far.
+  // Half the cell size gives a quarter of the error, but not yet on coarse meshes of tetrahedra.
   const double coarse = error_percent(Element::kHex8Sri, 8, 0.45, kB1);
   const double fine = error_percent(Element::kHex8Sri, 16, 0.45, kB1);
   EXPECT_NEAR(fine, 2.3, 1);
@@ -54,7 +54,8 @@ TEST(Reference, ErrorsShrinkAtTheElementsOwnOrder) {
 }
 
 TEST(Reference, AHalfSpaceGivesWayUnderThePatchAsBoussinesqSays) {
-  // The mean depth under the patch's own pressure, by Hankel's transform of both (Sonine's integral):
+  // Compliance of the half space under the patch, weighted with its own pressure, by Hankel transform (Sonine's
+  // integral):
   //     C = (1 − ν²)/(πEa) ∫₀^∞ (48 J₃(k)/k³)² dk
   double integral = 0;
   for (double k = 0.01; k < 30; k += 0.02) {
@@ -115,8 +116,8 @@ TEST(Patches, WeightsAreAMeanAndTheirSlopesTheirChange) {
       mean += patch.weights[i] * place;
       change += patch.slopes.col(i) * place.transpose();
     }
-    EXPECT_LT((mean - middle).norm(), 2e-5);                         // the middle is where it was asked for
-    EXPECT_LT((change - Eigen::Matrix2d::Identity()).norm(), 0.02);  // and moves as much as it is moved
+    EXPECT_LT((mean - middle).norm(), 2e-5);                         // its centroid is at the requested place
+    EXPECT_LT((change - Eigen::Matrix2d::Identity()).norm(), 0.02);  // and moves with it
     const Patch moved = *top.patch(middle + Vec2(1e-6, 0));
     ASSERT_EQ(moved.nodes, patch.nodes);
     EXPECT_LT(((moved.weights - patch.weights) / 1e-6 - patch.slopes.row(0).transpose()).norm(),

@@ -20,7 +20,7 @@ VectorXd drawn(Dice& dice) {
   return all;
 }
 
-/// A stiffness, and the inverse of an older one.
+/// A stiffness matrix, an older one, and the inverse of the older one.
 struct Drawn {
   explicit Drawn(Dice& dice) : older(kSize, kSize), now(kSize, kSize) {
     for (double& one : older.reshaped()) one = dice.within(-1, 1);
@@ -47,7 +47,7 @@ TEST(Pairs, AreTheInverseOfTheFactorBroughtAlongByTheLastEight) {
     const VectorXd change = drawn_one.now * step;
     pairs.add(step, change, drawn_one.inverse * change);
     all.emplace_back(step, change);
-    MatrixXd expected = drawn_one.inverse;  // BFGS as it is written down
+    MatrixXd expected = drawn_one.inverse;  // textbook BFGS
     for (std::size_t k = all.size() < Pairs::kMost ? 0 : all.size() - Pairs::kMost; k < all.size(); ++k) {
       const auto& [s, y] = all[k];
       const MatrixXd one = MatrixXd::Identity(kSize, kSize) - s * y.transpose() / y.dot(s);

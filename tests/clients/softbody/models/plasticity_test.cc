@@ -21,9 +21,9 @@ using testing::pressed_block;
 using testing::pressed_body;
 
 constexpr Law kLaws[] = {Law::kLinear, Law::kCorotational};
-constexpr Yield kSoft{.stress = 200, .hardening = 3e3};  // Pa, of 10 kPa
+constexpr Yield kSoft{.stress = 200, .hardening = 3e3};  // Pa; Young's modulus is 10 kPa
 
-/// A bar along z, 20 × 20 × 40 mm, held below and free to become thicker; its top is drawn and pressed as one.
+/// A bar of 20 × 20 × 40 mm along z, held at the bottom and free to widen. All nodes of its top move together.
 struct Bar {
   explicit Bar(Law law, Element element = Element::kHex8Sri)
       : solid(solid_of(law, element)),
@@ -45,7 +45,7 @@ struct Bar {
     }
     return {std::move(mesh), element, {.young = kYoung, .poisson = 0.3}, law, fixed};
   }
-  double stress_at(double strain) {  // Pa, drawn > 0
+  double stress_at(double strain) {  // Pa, tension positive
     return -model.press(patch, Given::kDepth, -strain * kLength).force / kArea;
   }
   double strain_without_force() { return -model.press(patch, Given::kForce, 0).depth / kLength; }
@@ -59,7 +59,7 @@ struct Bar {
   Patch patch;
 };
 
-/// The same on paper, in one dimension: kinematic hardening.
+/// The one-dimensional reference: kinematic hardening.
 struct PaperBar {
   double plastic = 0;
   double lost = 0;  // J/m³
@@ -78,7 +78,7 @@ struct PaperBar {
   }
 };
 
-constexpr double kFirst = kSoft.stress / Bar::kYoung;  // the strain at which it yields
+constexpr double kFirst = kSoft.stress / Bar::kYoung;  // yield strain
 
 TEST(Plasticity, ABarFollowsTheBilinearCurveDrawnBackPressedAndDrawnAgain) {
   for (const Law law : kLaws) {
@@ -89,7 +89,7 @@ TEST(Plasticity, ABarFollowsTheBilinearCurveDrawnBackPressedAndDrawnAgain) {
         EXPECT_NEAR(bar.stress_at(strain * kFirst), paper.stress_at(strain * kFirst), 1e-7 * kSoft.stress)
             << strain << ' ' << static_cast<int>(law);
       }
-      // The slopes of the curve, as one writes them down: E, then E H/(E + H), then E again.
+      // The slopes of the curve: E, then E H/(E + H), then E again.
       Bar fresh(law, element);
       const double at_2 = fresh.stress_at(2 * kFirst);
       const double at_3 = fresh.stress_at(3 * kFirst);
@@ -108,9 +108,9 @@ TEST(Plasticity, UnloadedItKeepsTheStrainLessWhatTheStressGivesBack) {
     EXPECT_NEAR(stress, kSoft.stress + 1e4 * 3e3 / 1.3e4 * 3 * kFirst, 1e-6 * stress);
     const double kept = 4 * kFirst - stress / Bar::kYoung;
     EXPECT_NEAR(bar.strain_without_force() / kept, 1, 1e-7);
-    EXPECT_NEAR(bar.strain_without_force() / kept, 1, 1e-7);  // and stays there
+    EXPECT_NEAR(bar.strain_without_force() / kept, 1, 1e-7);
     EXPECT_NEAR(bar.model.solid().plastic_strain(0, 0)(2, 2) / kept, 1, 1e-7);
-    EXPECT_NEAR(bar.model.solid().plastic_strain(0, 0).trace(), 0, 1e-15);  // it changes the shape, not the volume
+    EXPECT_NEAR(bar.model.solid().plastic_strain(0, 0).trace(), 0, 1e-15);  // plastic flow preserves volume
   }
 }
 
@@ -163,7 +163,7 @@ TEST(Plasticity, BelowTheYieldTheAnswersAreThoseOfTheElasticBody) {
   }
 }
 
-/// A block with a history of its own, and a shape beside it.
+/// A block with random plastic strains and a random shape and direction.
 struct Crumpled {
   explicit Crumpled(Law law, std::uint64_t seed) : solid(pressed_block(Element::kHex8Sri, 2, 0.4, law), kSoft) {
     Dice dice(seed);
@@ -197,7 +197,7 @@ TEST(Plasticity, ForcesAreTheSlopeOfAStepsEnergyAndStiffnessThatOfTheForces) {
       body.solid.stiffness(body.u, Solid::Curvature::kExact, k);
       const VectorXd change = body.solid.to_free(high.force - low.force) / (2 * kStep);
       EXPECT_LT((k.times(d) - change).norm(), 2e-5 * change.norm()) << static_cast<int>(law);
-      // The dents are not a detail of it.
+      // The plastic strains contribute significantly.
       const PlasticSolid fresh(pressed_block(Element::kHex8Sri, 2, 0.4, law), {.stress = 1e9, .hardening = 1});
       EXPECT_GT((fresh.forces(body.u).force - here.force).norm(), 0.1 * here.force.norm());
     }
@@ -220,7 +220,7 @@ TEST(Plasticity, ADentTurnsWithABodyThatTurns) {
   }
 }
 
-/// B1 of a material that yields under a press of some mm.
+/// Block B1 with a material that yields under a press of a few mm.
 BodyConfig soft_body(ModelKind model) {
   BodyConfig config = pressed_body(model, Element::kHex8Sri, 4);
   config.plasticity = Yield{.stress = 300, .hardening = 2e3};
@@ -233,14 +233,14 @@ TEST(Plasticity, ADentedBodyIsMetLowerAndKeepsItsDentUntouched) {
     Body elastic(pressed_body(model, Element::kHex8Sri, 4));
     const double pressed = body.touch(Vec3(0, 0, 0.042)).force.z();
     EXPECT_LT(pressed, 0.8 * elastic.touch(Vec3(0, 0, 0.042)).force.z());
-    const Feel above = body.touch(Vec3(0, 0, 0.0501));  // from now on the tool is clear of it
+    const Feel above = body.touch(Vec3(0, 0, 0.0501));  // the tool leaves the body
     EXPECT_FALSE(above.touching);
     const double dent = above.gap - 1e-4;
     EXPECT_GT(dent, 1e-3);
     EXPECT_LT(dent, 8e-3);
     EXPECT_FALSE(body.touch(Vec3(0, 0, 0.05 - 0.95 * dent)).touching);
     EXPECT_TRUE(body.touch(Vec3(0, 0, 0.05 - 1.05 * dent)).touching);
-    // Elastic up to where it was pressed, and there the same force.
+    // Elastic up to the deepest press, where the force is the same as before.
     EXPECT_NEAR(body.touch(Vec3(0, 0, 0.042)).force.z() / pressed, 1, 0.02);
     EXPECT_GT(body.size().bytes, elastic.size().bytes);
   }
@@ -252,7 +252,7 @@ TEST(Plasticity, OnEveryClosedWayTheHandGivesMoreThanItGets) {
     Body body(soft_body(model));
     double depth = 0;
     double force = 0;
-    double given = 0;  // J, by the hand since the beginning
+    double given = 0;  // work of the hand since the beginning, J
     double largest = 0;
     for (int way = 0; way < 8; ++way) {
       const double before = given;

@@ -68,7 +68,7 @@ TEST(QuasiStatic, AFactorServesManyAnswersOfAHandThatMovesAsHandsDo) {
   for (const Law law : {Law::kCorotational, Law::kNeoHookean}) {
     PressedByNewton kept(Element::kHex8Sri, 4, law);
     int answers = 0;
-    for (double time = 0; time < 2; time += 0.01) {  // 100 answers a second, 0.5 to 2.5 mm deep
+    for (double time = 0; time < 2; time += 0.01) {  // 100 answers per second, 0.5 to 2.5 mm deep
       const double depth = 0.0015 + 0.001 * std::sin(5 * time);
       const Reaction found = kept.model.press(kept.patch, Given::kDepth, depth);
       EXPECT_LE(kept.model.iterations(), 12);
@@ -98,7 +98,8 @@ TEST(QuasiStatic, OneIterationPerAnswerFollowsTheToolAndTellsItsError) {
   }
 }
 
-/// B1, pressed 5 mm deep and stroked 20 mm aside in steps of 1 mm: some ten times as fast as a hand at 1 kHz.
+/// Block B1, pressed 5 mm deep and stroked 20 mm sideways in steps of 1 mm, about ten times as fast as a hand at 1
+/// kHz.
 TEST(QuasiStatic, HalfAPercentIsWorthFewStepsAndNoFactorOnAHardPath) {
   for (const Law law : {Law::kNeoHookean, Law::kCorotational}) {
     const Solid solid = pressed_block(Element::kHex8Sri, 8, 0.45, law);
@@ -126,8 +127,8 @@ TEST(QuasiStatic, HalfAPercentIsWorthFewStepsAndNoFactorOnAHardPath) {
   }
 }
 
-/// A hand that hardly moves is answered without a step of Newton's method. The force is then one of the place asked for,
-/// along the normal as well as aside.
+/// If the hand hardly moves, no Newton step is taken. The force must still follow the requested place, in normal and
+/// tangential direction.
 TEST(QuasiStatic, AnswersWithoutAStepHaveTheStiffnessSentAsTheirSlope) {
   for (const Law law : {Law::kNeoHookean, Law::kCorotational}) {
     const Solid solid = pressed_block(Element::kHex8Sri, 8, 0.45, law);
@@ -153,7 +154,7 @@ TEST(QuasiStatic, AnswersWithoutAStepHaveTheStiffnessSentAsTheirSlope) {
   }
 }
 
-/// Of bodies that are asked for 0.3 to 30 %, or given one step.
+/// Tolerances of 0.3 to 30 %, or a single Newton step.
 TEST(QuasiStatic, TheErrorSaidCoversTheTrueOneOfDrawnAnswers) {
   const testing::ErrorsSaid said = testing::errors_said(4e-3, [](int path, double tolerance) {
     const double poisson = path % 2 == 0 ? 0.45 : 0.499;

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// tendon-fem under mpirun, against the engine of one process.
+// Compares tendon-fem under mpirun with the engine in a single process.
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <sys/wait.h>
@@ -39,7 +38,7 @@ class Fem : public ::testing::Test {
     }
   }
   std::string path(const std::string& name) const { return (scratch_.path() / name).string(); }
-  /// B1 with n cells along its sides, of which the middle can be touched.
+  /// Block B1 with n cells along its sides, whose center can be touched.
   std::string scene(const std::string& element, int n, double poisson, const std::string& model = "condensed") const {
     const std::string file = path("scene.toml");
     std::ofstream(file) << "effects = [\"contact\"]\n[body]\nshape = \"block\"\nsize_mm = [100, 100, 50]\n"
@@ -58,7 +57,7 @@ class Fem : public ::testing::Test {
   }
   std::string said() const { return contents(path("said")); }
 
-  /// The largest difference, of the largest entry.
+  /// Largest difference relative to the largest entry.
   static double off(const SurfaceTable& table, const SurfaceTable& truth) {
     return (table.compliance - truth.compliance).cwiseAbs().maxCoeff() / truth.compliance.maxCoeff();
   }
@@ -129,8 +128,8 @@ TEST_F(Fem, RefusesASceneOfAnotherModelInOneSentence) {
   EXPECT_EQ(text.find("tendon-fem-worker:", at + 1), std::string::npos) << "said once";
 }
 
-/// A rank that is killed while it starts may hold a lock in memory that it shares with mpirun, which then never ends
-/// (seen here once, PMIx 4.2; openpmix #1233). Without that memory there is no such lock.
+/// A rank that is killed during its start may hold a lock in shared memory, and mpirun then never ends (observed once
+/// with PMIx 4.2; openpmix #1233). Without the shared memory there is no such lock.
 TEST_F(Fem, ARankThatIsKilledLeavesNoTable) {
   const std::string file = scene("hex27", 12, 0.45);
   const std::string command = "PMIX_MCA_gds=hash " + mpirun(2) + " condense " + file + " " + path("killed.table") +
@@ -184,11 +183,11 @@ TEST_F(Fem, TheErrorSentCoversTheTrueOne) {
     const std::string file = scene(body.element, body.n, 0.45, "linear");
     PlacedBody alone(read_scene(file));
     LiveWorker worker(mpirun(2) + " --way multigrid " + file, 60);
-    std::vector<double> shares;  // of the error sent, over the true one
+    std::vector<double> shares;  // reported over true error
     Vec3 place = Vec3::Zero();
     const auto draw = [&](double most) { return most * (static_cast<double>(dice() >> 11U) * 0x1p-52 - 1); };
     for (int i = 0; i < body.presses; ++i) {
-      const double step = i % 50 == 0 ? 0.005 : 0.0005;  // a patch that wanders, and now and then jumps
+      const double step = i % 50 == 0 ? 0.005 : 0.0005;  // the patch wanders and sometimes jumps
       place = Vec3(std::clamp(place.x() + draw(step), -0.005, 0.005), std::clamp(place.y() + draw(step), -0.005, 0.005),
                    -0.001 - std::abs(draw(0.003)));
       DeviceState hand;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// tendon-bench-fem: how long a worker's answers take, and how wrong they say that they are. For people: times are this
-// machine's.
+// tendon-bench-fem: measures the duration and the reported error of a worker's answers. The times depend on the
+// machine.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
@@ -45,7 +45,7 @@ int measure(const std::string& scene_file, const std::string& command, int answe
   const Touch middle = worker.answer(Vec3(scene.at + 0.001 * into));
   std::vector<double> times;
   std::vector<double> errors;
-  for (int i = 0; i < answers; ++i) {  // a patch that wanders by 1 mm an answer on a circle of 4 mm
+  for (int i = 0; i < answers; ++i) {  // the patch moves by 1 mm per answer on a circle of 4 mm radius
     const double angle = 2 * std::numbers::pi * i / 25;
     const Vec3 aside = frame * Vec3(0.004 * std::cos(angle), 0.004 * std::sin(angle), 0);
     const auto asked = Clock::now();

@@ -10,10 +10,10 @@
 
 namespace tendon::softbody {
 
-/// A worker that is asked one state after the other, and waited for.
+/// Sends states to a worker one at a time and waits for each answer.
 class LiveWorker {
  public:
-  /// Throws std::runtime_error when it is not ready after `patience_s`.
+  /// Throws std::runtime_error if the worker is not ready after `patience_s`.
   LiveWorker(const std::string& command, int patience_s) : crew_({.command = command}), patience_s_(patience_s) {
     crew_.launch(std::string(worker::kSecretDigits, '7'));
     if (!std::holds_alternative<worker::Crew::Opened>(next())) throw std::runtime_error(command + ": " + why_);

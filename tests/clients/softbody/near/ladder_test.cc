@@ -39,13 +39,13 @@ Reaction press(const PressedBefore& block, Model& model, const Vec2& place, doub
   return model.press(*block.top.patch_with_curvatures(place), Given::kLeastDepth, depth);
 }
 
-/// What a hand on a closed way gives and has back, J.
+/// Energy balance of the hand on a closed path, J.
 struct ClosedWay {
-  double work = 0;   ///< that it has gained
-  double given = 0;  ///< the most that it has given
+  double work = 0;   ///< net gain of the hand
+  double given = 0;  ///< largest amount given by the hand
 };
 
-/// From corner to corner in steps of `step` (m) at most. `answered` is called after each answer.
+/// Moves from corner to corner in steps of at most `step` (m). Calls `answered` after each answer.
 template <class Answered>
 ClosedWay go_around(PatchContact& contact, const std::vector<Vec3>& corners, double step, const Answered& answered) {
   ClosedWay way;
@@ -66,8 +66,8 @@ ClosedWay go_around(PatchContact& contact, const std::vector<Vec3>& corners, dou
   return way;
 }
 
-/// Knows the whole body as far as 15 mm from its middle and to a depth of 4 mm, and hands over as a grid does. It may say
-/// that the body is `times` as stiff.
+/// A rung that knows the whole body within 15 mm of the center and 4 mm of depth, and fades out like a grid. It can
+/// report a body that is `times` as stiff.
 class Knows : public Rung {
  public:
   Knows(AskedAndExact& block, double times) : block_(block), times_(times) {}
@@ -94,7 +94,7 @@ class Knows : public Rung {
   double times_;
 };
 
-/// B1, so fine that it is larger than its near field, under such a rung.
+/// Block B1 with this rung. Its mesh is larger than the near field.
 struct KnownBlock : AskedAndExact {
   explicit KnownBlock(Law law, double times = 1) : AskedAndExact(pressed_block(Element::kHex8Sri, 8, 0.45, law)) {
     auto made = std::make_unique<NearModel>(solid, top, *top.patch(Vec2::Zero()),
@@ -119,7 +119,7 @@ TEST(Ladder, TheFirstRungThatIsGoodEnoughAnswers) {
   EXPECT_EQ(both->steps()[0].answers, 1);
   EXPECT_EQ(both->steps()[1].answers, 0);
   EXPECT_EQ(both->steps()[0].size.name, "tabulated");
-  // Between what the table is wrong by there and what the shapes are.
+  // A tolerance between the error of the table and that of the shapes.
   const auto exact = ladder_with(block, true, 1e-3);
   EXPECT_EQ(press(block, *exact, Vec2(0.001, 0.002), 0.003).way, Way::kLearned);
   EXPECT_EQ(exact->steps()[0].answers, 0);
@@ -157,7 +157,7 @@ TEST(Ladder, WhereAnotherRungTakesOverNothingJumps) {
       }
       last = found.force;
     }
-    for (int i = 0; i <= 60; ++i) {  // down, through the last depths
+    for (int i = 0; i <= 60; ++i) {  // down through the deepest levels
       const double depth = 3e-3 + 1e-4 * i;
       const double truth = block.truth(Vec2::Zero(), depth);
       const Reaction found = press(block, *ladder, Vec2::Zero(), depth);
@@ -170,7 +170,8 @@ TEST(Ladder, WhereAnotherRungTakesOverNothingJumps) {
   }
 }
 
-/// A rung that says a tenth more than the body has: a hand feels it go by the place, to and fro alike.
+/// The rung reports 10 % more force than the body has. The transition depends on the position only, so it is the same
+/// in both directions.
 TEST(Ladder, FromARungThatIsStifferTheForceGoesOverByThePlace) {
   KnownBlock block(Law::kNeoHookean, 1.1);
   constexpr double kStep = 1e-4;
@@ -216,7 +217,7 @@ TEST(Ladder, ClosedWaysAcrossRungsGiveNoMoreThanAHundredthOfWhatTheyTook) {
     PressedBefore& block = small_block(law);
     const auto ladder = ladder_with(block, true, 0.02);
     PatchContact contact(*ladder, block.top, 0, PatchContact::Side::kUnilateral);
-    // Down in the middle, out over the rim, and back at another depth or beside; to and fro.
+    // Down at the center, out beyond the edge, and back at another depth or sideways, in both directions.
     for (const double aside : {0.0, 0.004}) {
       for (const bool back : {false, true}) {
         std::vector<Vec3> corners{Vec3(0, 0, 0.0505),          Vec3(0, 0, 0.046),  Vec3(0.012, aside, 0.0455),
@@ -239,7 +240,7 @@ TEST(Ladder, ClosedWaysOnWhichFieldsTakeOverUnderARungGiveNoMoreEither) {
       Elsewhere thread;
       if (beside) block.near->make_fields_by(thread.background());
       PatchContact contact(*block.ladder, block.top, 0, PatchContact::Side::kUnilateral);
-      // Out of what the rung knows at one depth and back at another, and out below.
+      // Leaves the region of the rung at one depth, returns at another, and leaves it downward.
       const std::vector<Vec3> corners{Vec3(0, 0, 0.0505),         Vec3(0, 0, 0.047),  Vec3(0.019, 0.004, 0.0465),
                                       Vec3(0.021, 0, 0.0478),     Vec3(0, 0, 0.0478), Vec3(-0.004, 0.01, 0.0475),
                                       Vec3(-0.004, 0.01, 0.0455), Vec3(0, 0, 0.0505)};
@@ -257,10 +258,11 @@ TEST(Ladder, ClosedWaysOnWhichFieldsTakeOverUnderARungGiveNoMoreEither) {
   }
 }
 
-/// Under the rung all the way, and out of what it knows.
+/// First within the region of the rung, then beyond it.
 TEST(Ladder, WhereTheNearFieldTakesOverAfterAFarWayNoAnswerMakesAWholeField) {
   for (const Law law : kBothLaws) {
-    for (const auto& [step, most] : {std::pair(1e-4, 1), std::pair(2e-4, 2), std::pair(5e-4, 5)}) {  // m in an answer
+    // step per answer, m
+    for (const auto& [step, most] : {std::pair(1e-4, 1), std::pair(2e-4, 2), std::pair(5e-4, 5)}) {
       KnownBlock block(law);
       ASSERT_GT(block.near->size().radius, 0);
       const int pieces_at_start = block.near->size().pieces;
@@ -289,7 +291,7 @@ TEST(Ladder, WhereTheNearFieldTakesOverAfterAFarWayNoAnswerMakesAWholeField) {
 }
 
 TEST(Ladder, WhereAPressLeavesTheRungBelowTheFieldOfThatPlaceIsThere) {
-  for (const double aside : {0.0, 0.0095}) {  // the field of the start has it, or not
+  for (const double aside : {0.0, 0.0095}) {  // inside and outside of the initial field
     KnownBlock block(Law::kNeoHookean);
     const Vec2 place(aside, 0);
     const int made = aside > 0 ? 2 : 1;
@@ -362,7 +364,7 @@ TEST(Ladder, AnotherThreadMakesTheFieldsForAHandUnderARung) {
 
 TEST(Ladder, WhereNoFieldIsThereYetTheLinearBodyGoesOnFromTheForceOfTheRung) {
   KnownBlock block(Law::kCorotational);
-  Elsewhere thread;  // it has stopped
+  Elsewhere thread;  // never works
   block.near->make_fields_by(thread.background());
   const auto press = [&](const Vec2& place, double depth) {
     const double truth = block.truth(place, depth);
@@ -374,7 +376,7 @@ TEST(Ladder, WhereNoFieldIsThereYetTheLinearBodyGoesOnFromTheForceOfTheRung) {
   EXPECT_GE(block.near->size().linear, 30);
   for (int i = 110; i-- > 0;) press(Vec2(2e-4 * i, 0), i > 60 ? 1e-3 : 3e-3);
   for (int i = 0; i < 110; ++i) press(Vec2(0, 2e-4 * i), 3e-3);
-  // And a field that the hand comes back to knows nothing of the linear body.
+  // A near field to which the hand returns is not affected by the linear body.
   for (const double depth : {3e-3, 3.9e-3, 5.2e-3}) press(Vec2::Zero(), depth);
 }
 
@@ -398,7 +400,7 @@ TEST(Ladder, ARungHasRoomAmongGoodCellsAndNoneWhereItsShareFalls) {
     const double deepest = block.presses.grid.deepest();
     const double step = block.presses.grid.step;
     double before = 1;
-    for (int i = 0; i <= 100; ++i) {  // down in the middle, whose neighbours are all good
+    for (int i = 0; i <= 100; ++i) {  // at the center, whose neighbor cells are all valid
       const double depth = deepest * i / 100;
       const double room = rung->room(Vec2::Zero(), depth);
       const auto answer = rung->press(*block.top.patch(Vec2::Zero()), depth);
@@ -488,7 +490,7 @@ TEST(Ladder, ABodyThatListsNothingHasNoLadder) {
 TEST(Ladder, WhatCannotBeLearnedIsRefused) {
   BodyConfig config = testing::pressed_body(ModelKind::kNear, Element::kHex8Sri, 6);
   config.near.tabulate = true;
-  EXPECT_THROW(Body{config}, std::invalid_argument);  // no reach
+  EXPECT_THROW(Body{config}, std::invalid_argument);  // reach is not set
   config.reach = 0.031;
   EXPECT_THROW(Body{config}, std::invalid_argument);
   config.reach = 0.005;

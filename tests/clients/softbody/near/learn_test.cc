@@ -17,7 +17,7 @@ namespace {
 using testing::kB1PatchRadius;
 using testing::pressed_block;
 
-/// A block that learns little: n = 4, and 9 places in the grid's middle.
+/// A block that is quick to learn: n = 4, and nine places at the center of the grid.
 class Learn : public ::testing::Test {
  protected:
   struct Run {

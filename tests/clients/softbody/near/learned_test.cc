@@ -48,7 +48,7 @@ TEST(LearnedShapes, AnAnswerBeginsNextToItsShape) {
     for (int level = 0; level < PressGrid::kLevels - 1; ++level) {
       const Vec2 place = grid.place(1.5, 2.5);
       const double depth = (level + 0.5) * grid.step;
-      const auto begun = body.press(*block.top.patch(place), depth, *grid.find(place, depth), 1);  // no step is due
+      const auto begun = body.press(*block.top.patch(place), depth, *grid.find(place, depth), 1);  // no Newton step
       ASSERT_TRUE(begun);
       most = std::max(most, begun->error / begun->force);
     }
@@ -135,7 +135,7 @@ TEST(LearnedShapes, WhereASolutionWasNotGoodNothingIsAnswered) {
   EXPECT_EQ(rung.press(*block.top.patch(Vec2::Zero()), 0.9 * step)->share, 1);
 }
 
-/// A shape that no press has spoils what is learned only where that is seen, and it is seen.
+/// A wrong force at one knot invalidates only the eight cells around it.
 TEST(LearnedShapes, WhereTheForcesAreNotThoseThatWereSolvedNothingIsAnswered) {
   PressedBefore& block = small_block(Law::kCorotational);
   SolvedPresses presses = block.presses;

@@ -20,7 +20,7 @@ namespace {
 using testing::kB1PatchRadius;
 using testing::pressed_block;
 
-/// B1, the factor of its stiffness at rest, and a press of the middle of its top.
+/// Block B1, the factorization of its stiffness at rest, and the load of a press on the center of its top.
 struct AtRest {
   AtRest(int n, double poisson, Law law)
       : solid(pressed_block(Element::kHex8Sri, n, poisson, law)),
@@ -48,7 +48,7 @@ struct AtRest {
   VectorXd load;
 };
 
-/// The same pressed by 4 mm, and a body about this shape.
+/// The same block pressed by 4 mm, and a near body about this shape.
 struct Pressed : AtRest {
   Pressed(Law law, double radius, int modes)
       : AtRest(8, 0.45, law), whole(solid, top, {.max_iterations = 100, .tolerance = 1e-10, .glides = false}) {
@@ -69,7 +69,7 @@ struct Pressed : AtRest {
   std::unique_ptr<NearBody> body;
 };
 
-/// The load on the nodes of a near body.
+/// The part of the load on the nodes of a near body.
 VectorXd own_load(const NearBody& body, const VectorXd& load) {
   VectorXd own = VectorXd::Zero(body.size());
   for (int node = 0; 3 * node < load.size(); ++node) {
@@ -120,7 +120,7 @@ TEST(NearBody, WithItsExactInterfaceItIsTheWholeBodyAtFirstTouch) {
     return load.dot(factor.solve(load).col(0));
   };
   EXPECT_NEAR(compliance(100'000) / whole, 1, 1e-7);
-  // Fewer modes hold it back.
+  // Fewer modes make it stiffer.
   EXPECT_LT(compliance(60), whole);
   EXPECT_NEAR(compliance(60) / whole, 1, 5e-3);
   EXPECT_LT(compliance(10), compliance(60));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A body of the model "near" that is cut. The other thread's work is done where a test wants it.
+// Cuts in a body with the model "near". The tests decide when the work of the second thread is done.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -31,7 +31,7 @@ using testing::pressed_body;
 
 constexpr Law kLawsOfCut[] = {Law::kNeoHookean, Law::kCorotational};
 
-/// Across all of B1 at x, from the top down.
+/// A cut through the whole width of B1 at x, from the top down.
 Cut slit(double x, double depth) { return {Vec3(x, -0.06, 0.05 - depth), Vec3(0, 0.12, 0), Vec3(0, 0, depth + 0.01)}; }
 
 BodyConfig cut_body(Law law, const std::vector<Cut>& cuts) {
@@ -48,7 +48,7 @@ Solid with_cuts(const Solid& solid, const std::vector<Cut>& cuts) {
   return {std::move(division.mesh), solid.element(), solid.material(), solid.law(), std::move(division.fixed)};
 }
 
-/// What Newton's method says of the whole body with these cuts, N along z.
+/// The reference: Newton's method on the whole body with these cuts, N along z.
 struct Truth : AskedAndExact {
   Truth(Law law, const std::vector<Cut>& cuts)
       : AskedAndExact(with_cuts(pressed_block(Element::kHex8Sri, 8, 0.45, law), cuts)) {}
@@ -85,7 +85,7 @@ TEST(NearCut, AnswersGoOnAndAreThoseOfTheCutBodyToTheErrorSaid) {
       Truth before(law, {cuts.begin(), cuts.begin() + static_cast<std::ptrdiff_t>(made)});
       body.tick(static_cast<double>(made) + 1);
       double last = 0;
-      for (int i = 0; i < 5; ++i) {  // while it is prepared
+      for (int i = 0; i < 5; ++i) {  // while the cut is prepared
         const Feel feel = touch();
         EXPECT_FALSE(feel.topology_changed);
         EXPECT_NEAR(feel.force.z(), before.at(tool), 0.02 * before.at(tool)) << which;
@@ -117,7 +117,7 @@ TEST(NearCut, AnswersGoOnAndAreThoseOfTheCutBodyToTheErrorSaid) {
 }
 
 TEST(NearCut, WithoutAnotherThreadTheNextAnswerMakesTheFieldOfTheCutBody) {
-  const std::vector<Cut> cuts{slit(-0.025, 0.0375)};  // beside the patch
+  const std::vector<Cut> cuts{slit(-0.025, 0.0375)};  // next to the patch
   for (const Law law : kLawsOfCut) {
     Body body(cut_body(law, cuts));
     const Vec3 tool(0.0055, 0, 0.047);
@@ -131,7 +131,7 @@ TEST(NearCut, WithoutAnotherThreadTheNextAnswerMakesTheFieldOfTheCutBody) {
     EXPECT_TRUE(feel.topology_changed);
     EXPECT_LT(feel.force.z(), 0.999 * whole);
     expect_covered(feel, truth.at(tool), 0.02, "cut");
-    // And goes on: the hand takes the next field of the cut body with it.
+    // The following near fields are those of the cut body as well.
     for (int i = 0; i < 40; ++i) {
       const Vec3 there = tool + Vec3(0, 5e-4 * i, 0);
       expect_covered(body.touch(there), truth.at(there), 0.02, std::to_string(i));
@@ -139,8 +139,8 @@ TEST(NearCut, WithoutAnotherThreadTheNextAnswerMakesTheFieldOfTheCutBody) {
   }
 }
 
-/// A refresh that was asked for before the cut, and ends when it likes. The cut is beside the patch, so that a field of
-/// the body before it could have the patch.
+/// A refresh of the near field is requested before the cut and finishes at any time. The cut is next to the patch, so
+/// a field of the uncut body could still contain the patch.
 TEST(NearCut, AFieldOfTheBodyBeforeTheCutIsThrownAwayWheneverItIsDone) {
   const BodyConfig config = cut_body(Law::kNeoHookean, {slit(0.025, 0.0375)});
   const Vec3 tool(0.002, 0, 0.046);
@@ -151,7 +151,7 @@ TEST(NearCut, AFieldOfTheBodyBeforeTheCutIsThrownAwayWheneverItIsDone) {
     body.tick(1);
     ASSERT_EQ(thread.given.size(), 2U) << "the cut";
   };
-  // Never done: what the others must answer.
+  // The reference: the refresh never finishes.
   Body never(config);
   Elsewhere of_never;
   asked(never, of_never);
@@ -163,15 +163,15 @@ TEST(NearCut, AFieldOfTheBodyBeforeTheCutIsThrownAwayWheneverItIsDone) {
     Body body(config);
     Elsewhere thread;
     asked(body, thread);
-    if (when == 0) thread.given[0]();  // before the cut is
+    if (when == 0) thread.given[0]();  // before the cut
     EXPECT_EQ(body.touch(tool).force, expected[0].force) << when;
     if (when != 1) thread.given[1]();
-    if (when == 1) {  // between the cut and the answer that takes it
+    if (when == 1) {  // between the cut and the answer that uses it
       thread.given[1]();
       thread.given[0]();
     }
     EXPECT_EQ(body.touch(tool).force, expected[1].force) << when;
-    if (when == 2) thread.given[0]();  // the cut body answers already
+    if (when == 2) thread.given[0]();  // after the first answer of the cut body
     for (std::size_t i = 2; i < expected.size(); ++i) {
       const Feel feel = body.touch(tool);
       EXPECT_EQ(feel.force, expected[i].force) << when;
@@ -223,12 +223,11 @@ TEST(NearCut, AThreadOfItsOwnCutsWhileAnswersGoOn) {
   body.prepare_by([&](std::packaged_task<void()> work) { thread.give(std::move(work)); });
   Truth truth(Law::kNeoHookean, cuts);
   const auto place = [](int i) { return Vec3(1e-4 * (i % 80 < 40 ? i % 80 : 80 - i % 80), 0, 0.046); };
-  body.touch(place(0));  // a refresh has begun when the cut is asked for
+  body.touch(place(0));  // starts a refresh before the cut is requested
   body.tick(1);
   int cut_at = 0;
   int made = 0;
-  // Until a field of the cut body has taken over; each answer has a time of its own, so that the other thread comes to
-  // its turn.
+  // Runs until a field of the cut body is in use. The pause between answers gives the second thread time to work.
   for (int i = 1; i < 20'000 && (cut_at == 0 || body.near_field()->made == made); ++i) {
     const Feel feel = body.touch(place(i));
     EXPECT_GE(feel.error, std::abs(feel.force.z() - truth.at(place(i)))) << i;
@@ -303,7 +302,7 @@ TEST(NearCut, WhatWasLearnedOfTheUncutBodyAnswersNoCutOne) {
   }
 }
 
-/// Uncut for some answers, then cut once; its other thread takes `slow` answers for a field.
+/// Uncut for some answers, then cut once. The second thread takes `slow` answers for a field.
 class CutMeanwhile : public Model {
  public:
   CutMeanwhile(const AskedAndExact& cut, Solid whole, const NearModel::Config& config, int slow, int at)
@@ -323,7 +322,7 @@ class CutMeanwhile : public Model {
       for (Eigen::Index i = 0; i < patch.weights.size(); ++i)
         place += patch.weights[i] * cut_.solid.mesh().nodes[at(patch.nodes[static_cast<std::size_t>(i)])];
       reaction = before_.press(*top_.patch(top_.across(place)), given, value);
-      reaction.error = std::max(reaction.error, std::abs(reaction.force));  // as Body says it
+      reaction.error = std::max(reaction.error, std::abs(reaction.force));  // as in Body
     } else {
       if (answers_ == at_) after_->go_on_from(before_, {});
       reaction = after_->press(patch, given, value);

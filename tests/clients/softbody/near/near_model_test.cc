@@ -24,7 +24,7 @@ using testing::pressed_body;
 
 constexpr Law kLaws[] = {Law::kNeoHookean, Law::kCorotational, Law::kStVenantKirchhoff};
 
-/// B1 with a near field in its middle.
+/// Block B1 with a near field at its center.
 struct Near : AskedAndExact {
   Near(int n, double poisson, Law law, double tolerance = 1e-6, int modes = NearBody::Config{}.modes)
       : AskedAndExact(pressed_block(Element::kHex8Sri, n, poisson, law)),
@@ -41,7 +41,7 @@ TEST(Near, PressesAreThoseOfTheWholeMeshWithinTwoPercentAndTheErrorSaid) {
       Near near(n, 0.45, law, 5e-3);
       ASSERT_GT(near.model.size().radius, 0);
       for (const double depth : {1e-3, 3e-3, 5e-3}) {
-        if (law == Law::kStVenantKirchhoff && depth > 4e-3) continue;  // it collapses
+        if (law == Law::kStVenantKirchhoff && depth > 4e-3) continue;  // the block collapses
         const double truth = near.exact.press(*near.top.patch(Vec2::Zero()), Given::kDepth, depth).force;
         const Reaction found = near.press(Vec2::Zero(), depth);
         EXPECT_NEAR(found.force, truth, 0.02 * truth) << n << ' ' << static_cast<int>(law) << ' ' << depth;
@@ -84,7 +84,7 @@ TEST(Near, SixtyModesAreTheExactInterfaceWithinHalfAPercent) {
   }
 }
 
-/// Two laws, ν up to 0.499, every answer as far off as it likes.
+/// Two laws and ν up to 0.499.
 TEST(Near, TheErrorSaidCoversTheTrueOneOfDrawnAnswers) {
   const testing::ErrorsSaid said = testing::errors_said(5e-3, [](int path, double tolerance) {
     auto block = std::make_unique<AskedAndExact>(
@@ -97,7 +97,7 @@ TEST(Near, TheErrorSaidCoversTheTrueOneOfDrawnAnswers) {
   testing::expect_covered(said);
 }
 
-/// What the linear far field leaves out is seen: where it is much, much is said.
+/// The reported error grows with the nonlinearity that the linear far field neglects.
 TEST(Near, AFarFieldThatIsNotLinearIsSaid) {
   Near near(12, 0.45, Law::kNeoHookean, 1e-9);
   double before = 0;
@@ -120,7 +120,7 @@ TEST(Near, OnItsWayAsideItFollowsTheWholeMeshThroughSeveralCentres) {
       const Reaction found = near.press(place, 4e-3);
       EXPECT_NEAR(found.force, truth, 0.02 * truth) << i;
       EXPECT_GE(found.error, std::abs(found.force - truth)) << i;
-      if (i > 0) {  // no jump where a field takes over
+      if (i > 0) {  // no jump at the transition between fields
         EXPECT_NEAR(found.force, last, 0.01 * truth) << i;
       }
       last = found.force;
@@ -138,8 +138,8 @@ TEST(Near, AHandThatHoversWhereTheFieldChangesMakesOneNewField) {
   EXPECT_EQ(near.model.size().made, 2);
 }
 
-/// Of a field that is being made there is one piece in an answer, and it is whole before the old one no longer has the
-/// patch: else all that is left would be made in one answer.
+/// Each answer computes one piece of the next field. The field must be complete before the old one no longer contains
+/// the patch, because the rest would otherwise be computed in one answer.
 TEST(Near, AHandOfATenthOfAMillimetreAnAnswerNeverWaitsForAField) {
   for (const Law law : {Law::kNeoHookean, Law::kCorotational}) {
     Near near(12, 0.45, law, 5e-3);
@@ -161,7 +161,7 @@ TEST(Near, AHandOfATenthOfAMillimetreAnAnswerNeverWaitsForAField) {
 TEST(Near, AFieldIsMadeOnWhileTheHandIsStill) {
   Near near(8, 0.45, Law::kNeoHookean, 5e-3);
   const int pieces = near.model.size().pieces;
-  const Vec2 place(0.00455, 0);  // farther away than the field serves, and not as far as it has the patch
+  const Vec2 place(0.00455, 0);  // outside of the useful region of the field, but the field still contains the patch
   int answers = 0;
   for (; near.model.size().made == 1 && answers < 100; ++answers) near.press(place, 2e-3);
   EXPECT_EQ(near.model.size().made, 2);
@@ -171,7 +171,7 @@ TEST(Near, AFieldIsMadeOnWhileTheHandIsStill) {
   EXPECT_EQ(near.model.size().pieces - pieces, answers);
 }
 
-/// What differs fades over the way of the hand, and neither at once nor with time.
+/// Differences fade with the distance that the hand moves, and not with time.
 TEST(Near, WhileAHandIsStillItsForceIsToo) {
   for (const Law law : kLaws) {
     Near near(8, 0.45, law, 5e-3);
@@ -192,7 +192,7 @@ TEST(Near, AFieldThatTheHandHasLeftBeforeItIsWholeIsNotMadeToItsEnd) {
   EXPECT_NEAR(near.press(place, 3e-3).force, truth, 0.02 * truth);
   EXPECT_EQ(near.model.size().made, 2);
   EXPECT_LE(near.model.size().pieces - pieces, 31);
-  // There it is at home.
+  // The new field is centered here.
   near.press(place, 3e-3);
   EXPECT_LE(near.model.size().pieces - pieces, 31);
 }
@@ -221,7 +221,7 @@ TEST(Near, TheSameWayHasTheSameAnswersBitByBit) {
 TEST(Near, AHandThatJumpsFarIsAnsweredAtOnce) {
   Near near(12, 0.45, Law::kNeoHookean, 5e-3);
   near.press(Vec2(-0.025, -0.025), 3e-3);
-  for (const Vec2& place : {Vec2(0.025, 0.01), Vec2(0.045, 0.045)}) {  // far away; a corner, half off the body
+  for (const Vec2& place : {Vec2(0.025, 0.01), Vec2(0.045, 0.045)}) {  // far away, and a corner that is half outside
     const auto patch = near.top.patch(place, 0.2);
     ASSERT_TRUE(patch);
     const double truth = near.exact.press(*patch, Given::kDepth, 3e-3).force;
@@ -284,7 +284,7 @@ TEST(Near, WhereAFieldTakesOverForceAndStiffnessGoOnAndFadeTogether) {
     EXPECT_LT((felt(both).stiffness - times * felt(one).stiffness).norm(), 1e-9);
     EXPECT_NEAR(both.error, times * 0.01 + both.force * share * 0.05, 1e-12);
   }
-  // Less deep the ratio is kept, and deeper the difference.
+  // At a smaller depth the ratio is kept, at a larger depth the difference.
   Reaction less = one;
   less.force = 1;
   less.depth = 2e-3;
@@ -295,7 +295,7 @@ TEST(Near, WhereAFieldTakesOverForceAndStiffnessGoOnAndFadeTogether) {
   EXPECT_NEAR(kept(met, 1, more).force, 4.1, 1e-12);
   before.slope = Vec2(0.12, -0.2);
   EXPECT_EQ(kept(handover(before, one, one.depth), 1, one).slope, before.slope);
-  // Where nothing was felt, or there is nothing to feel, nothing goes on.
+  // Without a force before or after, nothing is carried over.
   EXPECT_EQ(kept(handover({}, one, one.depth), 1, one).force, one.force);
   EXPECT_EQ(kept(handover(one, {}, one.depth), 1, one).force, one.force);
 }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// NearModel with another thread: most tests do that thread's work where they want it, so that counts decide and no clock.
+// NearModel with a second thread. In most tests its work is done at a given answer, so that they do not depend on
+// time.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -27,7 +28,7 @@ using testing::kB1PatchRadius;
 using testing::pressed_block;
 using testing::pressed_body;
 
-/// B1 with a near field in its middle, and another thread.
+/// Block B1 with a near field at its center and a second thread.
 struct NearBeside : AskedAndExact {
   NearBeside(int n, Law law, double tolerance = 5e-3, double poisson = 0.45)
       : AskedAndExact(pressed_block(Element::kHex8Sri, n, poisson, law)),
@@ -75,7 +76,7 @@ TEST(NearOracle, NoAnswerMakesAPieceAndOneFieldAtATimeIsAskedFor) {
   EXPECT_EQ(near.model.size().pieces, pieces);
   EXPECT_EQ(near.model.size().linear, 0);
   EXPECT_GE(near.model.size().made, 3);
-  // And none while the hand stays where the field is about.
+  // No field is requested while the hand stays where the field was computed.
   near.thread.work();
   near.press(Vec2(0.01, 0), 4e-3);
   near.thread.work();
@@ -85,7 +86,7 @@ TEST(NearOracle, NoAnswerMakesAPieceAndOneFieldAtATimeIsAskedFor) {
 
 TEST(NearOracle, OnItsWayAsideNoForceJumpsAndErrorsAreSaid) {
   for (const Law law : kLaws) {
-    for (const int slow : {1, 4, 15}) {  // answers, until a field is made
+    for (const int slow : {1, 4, 15}) {  // answers until a field is finished
       NearBeside near(8, law);
       double last = 0;
       for (int i = 1; i <= 80; ++i) {
@@ -120,7 +121,7 @@ TEST(NearOracle, WhileAHandIsStillItsForceIsTooThroughEachRefresh) {
   }
 }
 
-/// As far as the field of the start has the patch, and to a depth of a/4, it is within 2 %.
+/// Within the initial field and to a depth of a/4, the error is at most 2 %.
 TEST(NearOracle, AThreadThatHasStoppedLeavesTheFieldAndTheLinearBody) {
   for (const int n : {8, 12}) {
     for (const Law law : kLaws) {
@@ -150,7 +151,7 @@ TEST(NearOracle, AThreadThatHasStoppedLeavesTheFieldAndTheLinearBody) {
   }
 }
 
-/// B1 without any field: the other thread never comes.
+/// Block B1 without a near field: the second thread never works.
 struct NoField : AskedAndExact {
   NoField(int n, Law law, double poisson)
       : AskedAndExact(pressed_block(Element::kHex8Sri, n, poisson, law)),
@@ -160,7 +161,7 @@ struct NoField : AskedAndExact {
   NearModel model;
 };
 
-/// The linear body is 8 % off at 3 mm, and 15 % at a/4 (corotational).
+/// For comparison, the linear body has an error of 8 % at 3 mm and 15 % at a/4 (corotational).
 TEST(NearOracle, WithoutAFieldAnswersAreNearTheLawsToAQuarterOfTheRadius) {
   for (const Law law : kLaws) {
     NoField near(8, law, 0.45);
@@ -179,7 +180,7 @@ TEST(NearOracle, WithoutAFieldAnswersAreNearTheLawsToAQuarterOfTheRadius) {
   }
 }
 
-/// Nearly incompressible: from a depth of a/15 on.
+/// In a nearly incompressible body the Newton step is useless from a depth of a/15 on.
 TEST(NearOracle, WithoutAFieldAStepThatLeadsNowhereIsLeftOutLittleByLittle) {
   for (const Law law : kLaws) {
     NoField near(8, law, 0.499);
@@ -210,7 +211,7 @@ TEST(NearOracle, AHandThatJumpsFarIsAnsweredByTheLinearBodyAndSoonByAField) {
     EXPECT_GE(at_once.error, std::abs(at_once.force - truth));
     EXPECT_GE(near.model.size().linear, 1);
     EXPECT_EQ(at_once.way, Way::kLinear);
-    near.thread.work();  // too late: for where the hand was
+    near.thread.work();  // too late: for the previous position
     near.model.press(*patch, Given::kDepth, 3e-3);
     near.thread.work();
     EXPECT_NEAR(near.model.press(*patch, Given::kDepth, 3e-3).force, at_once.force, 1e-3 * truth) << "no jump";
@@ -239,7 +240,7 @@ TEST(NearOracle, AFieldThatTheHandHasLeftIsThrownAway) {
 }
 
 TEST(NearOracle, AHandThatHoversAtTheEdgeOfAFieldStaysWithinTheErrorSaid) {
-  for (const double middle : {0.0045, 0.009}) {  // where the next is asked for, and where this one ends
+  for (const double middle : {0.0045, 0.009}) {  // where the next field is requested, and where this one ends
     NearBeside near(8, Law::kCorotational);
     for (int i = 0; i < 100; ++i) {
       const Vec2 place(middle + (i % 2 == 0 ? -6e-4 : 6e-4), 0);
@@ -258,7 +259,7 @@ TEST(NearOracle, AToolThatIsLiftedMeanwhileComesBackToTheBodyAtRest) {
   near.press(Vec2::Zero(), 5e-3);
   ASSERT_EQ(near.thread.given.size(), 1U);
   const double least = near.model.press(*near.top.patch(Vec2::Zero()), Given::kLeastDepth, 1e-5).force;
-  near.thread.work();  // about a shape that is gone
+  near.thread.work();  // for a shape that no longer exists
   for (int i = 0; i < 10; ++i) {
     const double truth = near.truth(Vec2::Zero(), 1e-4);
     const Reaction found = near.press(Vec2::Zero(), 1e-4);
@@ -303,7 +304,7 @@ TEST(NearOracle, TheErrorSaidCoversTheTrueOneOfDrawnAnswers) {
     using AskedAndExact::AskedAndExact;
     Elsewhere thread;
   };
-  /// Its other thread takes `slow` answers for a field.
+  /// The second thread takes `slow` answers for a field.
   class Slow : public Model {
    public:
     Slow(std::unique_ptr<NearModel> model, Elsewhere& thread, int slow)
@@ -335,7 +336,7 @@ TEST(NearOracle, TheErrorSaidCoversTheTrueOneOfDrawnAnswers) {
   testing::expect_covered(said);
 }
 
-/// A beam that is held at one end and pressed at the other, until it is bent: the far field turns.
+/// A cantilever that is pressed at its end until it bends strongly, so that the far field rotates.
 TEST(NearOracle, AFarFieldThatTurnsIsRefusedAtRestAndRightAboutTheShapeThere) {
   Mesh mesh = block(info(Element::kHex8Sri).shape, Vec3(0.12, 0.024, 0.024), {20, 4, 4});
   const Fixed fixed = fix_where(mesh, [](const Vec3& node) { return node.x() < -0.06 + 1e-9; });
@@ -385,7 +386,7 @@ TEST(NearOracle, AThreadOfItsOwnKeepsAnswersRight) {
   std::vector<Reaction> found;
   const auto place = [](int i) { return Vec2(1e-4 * (i % 400 < 200 ? i % 400 : 400 - i % 400), 0); };
   const auto depth = [](int i) { return std::min(4e-3, 1e-4 * (i + 1)); };
-  // Until some fields have taken over; each answer has a time of its own, so that the other thread comes to its turn.
+  // Runs until several fields have been used. The pause between answers gives the second thread time to work.
   for (int i = 0; i < 100 || (near.model.size().made < 3 && i < 20'000); ++i) {
     found.push_back(near.press(place(i), depth(i)));
     std::this_thread::sleep_for(std::chrono::milliseconds(2));

@@ -13,7 +13,7 @@
 
 namespace tendon::softbody::testing {
 
-/// B1 of n cells, and what it knows of presses within `reach` of its middle.
+/// Block B1 with n cells, and the precomputed presses within `reach` of its center.
 struct PressedBefore : AskedAndExact {
   PressedBefore(int n, double poisson, Law law, double reach)
       : AskedAndExact(pressed_block(Element::kHex8Sri, n, poisson, law)),
@@ -38,7 +38,7 @@ struct PressedBefore : AskedAndExact {
   TabulatedAnswers answers;
 };
 
-/// B1 with `n` cells that knows the presses within 5 mm of its middle. It is made at the first use of each law.
+/// Block B1 with `n` cells and the presses within 5 mm of its center. It is computed at the first use of each law.
 template <int n>
 PressedBefore& block_of(Law law) {
   static std::map<Law, PressedBefore> made;

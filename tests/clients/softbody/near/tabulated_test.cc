@@ -50,7 +50,7 @@ TEST(TabulatedAnswers, ForceAndStiffnessAreTheSlopesOfOneEnergy) {
     EXPECT_NEAR(difference(2, value), here.force, 1e-5 * here.force);
     EXPECT_NEAR(difference(0, value), here.across.x(), 1e-5 * here.force);
     EXPECT_NEAR(difference(1, value), here.across.y(), 1e-5 * here.force);
-    // In the same cell, where the second derivatives do not jump.
+    // Within one cell, because the second derivatives may jump between cells.
     EXPECT_NEAR(difference(2, force), here.stiffness, 1e-4 * here.stiffness);
     EXPECT_NEAR(difference(0, force), here.mixed.x(), 1e-4 * here.stiffness);
     EXPECT_NEAR(difference(1, force), here.mixed.y(), 1e-4 * here.stiffness);
@@ -80,8 +80,7 @@ TEST(TabulatedAnswers, PressesBetweenAreWithinTheErrorSaidAndTwoPercent) {
   }
 }
 
-/// Around closed ways through many cells, of the hand in a contact: what comes back is what was given, as far as sums of
-/// small steps tell.
+/// On closed paths through many cells, a contact returns all energy, up to the error of the numerical integration.
 TEST(TabulatedAnswers, AClosedWayGivesNothing) {
   PressedBefore& block = small_block(Law::kNeoHookean);
   std::vector<std::unique_ptr<Rung>> rungs;

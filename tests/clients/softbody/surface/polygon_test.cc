@@ -31,8 +31,8 @@ double area(const Flat& polygon) {
   return twice / 2;
 }
 
-/// Checks a triangulation: n − 2 triangles, the right orientation, the right total area, each side of the polygon in
-/// one triangle, and every other side in two triangles with opposite directions. Returns what is wrong.
+/// Checks a triangulation: n − 2 triangles, their orientation, the total area, each side of the polygon in one
+/// triangle, and every other side in two triangles with opposite directions. Returns the first violation.
 std::string wrong_with(const Flat& polygon, const std::vector<std::array<int, 3>>& triangles) {
   if (triangles.size() + 2 != polygon.size()) return std::to_string(triangles.size()) + " triangles";
   const double whole = area(polygon);

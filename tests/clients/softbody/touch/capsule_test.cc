@@ -23,9 +23,9 @@ using testing::FineBlock;
 
 constexpr double kRadius = 0.01;       // m
 constexpr double kHalfLength = 0.012;  // m
-constexpr double kStiff = 1e9;         // Pa/m: the cushion gives way by 0.2 to 0.4 % of the depths here
+constexpr double kStiff = 1e9;         // Pa/m: compresses by 0.2 to 0.4 % of the depths here
 
-/// A block, the part of its top that is fine, and a capsule to press it with.
+/// A block, the fine part of its top, and a capsule.
 struct Pressed {
   Pressed(double cell, double reach, double poisson = 0.45)
       : block(cell, reach, reach, poisson),
@@ -52,8 +52,8 @@ Pressed& coarse() {
   return pressed;
 }
 
-/// A capsule whose axis rises by `tilt` (rad) and goes `aside` (rad) from the x axis. The middle of its lower end is
-/// `deep` (m) below the place where it would only touch, above (x, y).
+/// A capsule whose axis is tilted by `tilt` (rad) and rotated by `aside` (rad) from the x axis. The center of its
+/// lower end is above (x, y), `deep` (m) below first contact.
 ContactIntegral::Tool oblique(double tilt, double aside, double deep, double x, double y) {
   const Vec3 axis(std::cos(tilt) * std::cos(aside), std::cos(tilt) * std::sin(aside), std::sin(tilt));
   return {Vec3(x, y, 0.05 + kRadius - deep) + kHalfLength * axis, axis, kRadius, kHalfLength};
@@ -72,7 +72,7 @@ TEST(Capsule, PressedObliquelyIsWithin2PercentOfAContactIntegral) {
   EXPECT_LT((feel.force - truth.force).norm(), 0.02 * truth.force.norm());
   EXPECT_LT((feel.torque->torque - truth.torque).norm(), 0.02 * truth.torque.norm());
   EXPECT_LT(feel.error, 1e-5 * feel.force.norm());
-  // The floor holds what the tool presses, force and moment.
+  // The support balances the tool's force and moment.
   EXPECT_LT((truth.support - truth.force).norm(), 1e-6 * truth.force.norm());
   EXPECT_LT((truth.support_torque - feel.torque->torque).norm(), 0.02 * truth.torque.norm());
 }
@@ -88,7 +88,7 @@ TEST(Capsule, PushesAsACushionOnTheSameNodesThatHardens) {
     EXPECT_LT((feel.torque->torque - truth.torque).norm(), 0.005 * truth.torque.norm());
   };
   compare(coarse(), oblique(0.7, 2.5, 0.003, 0.002, -0.001));  // steep, on its end
-  Pressed compressible(0.002, 0.012, 0.2);                     // where what is pushed goes aside too
+  Pressed compressible(0.002, 0.012, 0.2);                     // compressible, so the body also yields sideways
   compare(compressible, oblique(0.25, -0.8, 0.0025, -0.002, 0.002));
 }
 
@@ -97,7 +97,7 @@ TEST(Capsule, ItsTorqueAboutAnotherPointDiffersByTheForcesMoment) {
   const Feel here = coarse().at(tool, tool.middle);
   const Feel there = coarse().at(tool, tool.middle + kLever);
   EXPECT_EQ(here.force, there.force);
-  EXPECT_GT(here.torque->torque.norm(), 1e-3);  // its lower end is pressed
+  EXPECT_GT(here.torque->torque.norm(), 1e-3);  // the lower end is pressed
   EXPECT_LT((there.torque->torque - here.torque->torque + kLever.cross(here.force)).norm(),
             1e-9 * there.torque->torque.norm());
 }
@@ -108,11 +108,11 @@ TEST(Capsule, AMirroredPressGivesTheMirroredForceAndTorque) {
   const Vec3 about = tool.middle + kLever;
   const Feel feel = coarse().at(tool, about);
   tool.middle = mirror.cwiseProduct(tool.middle);
-  tool.axis = -mirror.cwiseProduct(tool.axis);  // either way along it is the same capsule
+  tool.axis = -mirror.cwiseProduct(tool.axis);  // the opposite axis is the same capsule
   const Feel mirrored = coarse().at(tool, mirror.cwiseProduct(about));
   EXPECT_GT(std::abs(feel.torque->torque.y()), 1e-3);
   EXPECT_LT((mirrored.force - mirror.cwiseProduct(feel.force)).norm(), 1e-5 * feel.force.norm());
-  // A torque is an axial vector: the mirror turns what lies in its plane.
+  // A torque is an axial vector.
   EXPECT_LT((mirrored.torque->torque + mirror.cwiseProduct(feel.torque->torque)).norm(),
             1e-5 * feel.torque->torque.norm());
 }
@@ -150,11 +150,11 @@ TEST(Capsule, AClosedWayOfPlacesAndTurnsGivesBackExactlyWhatItTook) {
   EXPECT_LT(std::abs(work), 2e-3 * most);
 }
 
-/// −∂force/∂position and −∂torque/∂θ about `about`, by differences.
+/// −∂force/∂position and −∂torque/∂θ about `about`, by central differences.
 std::pair<Mat3, Mat3> slopes(const ContactIntegral::Tool& tool, const Vec3& about) {
   Mat3 moved;
   Mat3 turned;
-  constexpr double kStep = 2e-6;  // so small that no other node is pushed
+  constexpr double kStep = 2e-6;  // small enough that the set of touching nodes stays the same
   for (int c = 0; c < 3; ++c) {
     const auto beside = [&](double way) {
       return coarse().capsule.at(tool.middle + way * Vec3::Unit(c), tool.axis, about + way * Vec3::Unit(c));
@@ -172,7 +172,7 @@ std::pair<Mat3, Mat3> slopes(const ContactIntegral::Tool& tool, const Vec3& abou
 TEST(Capsule, ItsStiffnessesAreTheSlopesOfForceAndTorque) {
   for (const double tilt : {0.2, 0.7, 1.5}) {
     const ContactIntegral::Tool tool = oblique(tilt, 0.4, 0.002, -0.003, -0.001);
-    const Vec3 about = tool.middle + Vec3(0.05, 0.02, 0);  // beside it, so that a turn presses
+    const Vec3 about = tool.middle + Vec3(0.05, 0.02, 0);  // next to the tool, so that a rotation presses it
     const Feel feel = coarse().at(tool, about);
     const auto [moved, turned] = slopes(tool, about);
     EXPECT_LT((feel.stiffness - not_negative(moved)).norm(), 0.01 * moved.norm()) << tilt;
@@ -185,7 +185,7 @@ TEST(Capsule, ItsStiffnessesAreTheSlopesOfForceAndTorque) {
 }
 
 TEST(Capsule, WhereAHandleWouldFallOverItsAngularStiffnessIsZero) {
-  const ContactIntegral::Tool tool = oblique(std::numbers::pi / 2, 0, 0.002, -0.003, 0);  // on its end
+  const ContactIntegral::Tool tool = oblique(std::numbers::pi / 2, 0, 0.002, -0.003, 0);  // standing on its end
   const Vec3 about = tool.middle + Vec3(0, 0, 0.03);
   const Eigen::SelfAdjointEigenSolver<Mat3> parts(slopes(tool, about).second);
   EXPECT_LT(parts.eigenvalues()[0], -1e-3);  // N·m/rad
@@ -204,7 +204,7 @@ TEST(Capsule, WithoutLengthItIsNearlyTheSphere) {
     const Feel feel = capsule.at(q, axis, q);
     EXPECT_NEAR(feel.force.z() / round.force.z(), 1, 0.04);
     EXPECT_NEAR(feel.gap, round.gap, 1e-12);
-    EXPECT_LT(feel.torque->torque.norm(), 1e-6 * kRadius * feel.force.norm());  // no force turns a ball
+    EXPECT_LT(feel.torque->torque.norm(), 1e-6 * kRadius * feel.force.norm());  // a ball feels no torque
   }
 }
 

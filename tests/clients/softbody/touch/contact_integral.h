@@ -15,8 +15,8 @@
 
 namespace tendon::softbody::testing {
 
-/// B1 with small cells where a tool touches it: `cell` wide (m), out to ± `fine_x` and ± `fine_y` from the middle of
-/// its top, and layers that grow from there.
+/// Block B1 with cells of width `cell` (m) within ± `fine_x` and ± `fine_y` of the center of its top, and growing
+/// cells outside.
 struct FineBlock {
   FineBlock(double cell, double fine_x, double fine_y, double poisson = 0.45)
       : xs(across(cell, fine_x)), ys(across(cell, fine_y)), zs(up(cell)), solid(make(poisson)) {}
@@ -53,10 +53,9 @@ struct FineBlock {
   }
 };
 
-/// What a rigid capsule feels of a linear body, by another way than the engine's: the surface is a stiff cushion whose
-/// pressure is `cushion` (Pa/m) times how deep a point is in the capsule; Newton's method on all unknowns of the body
-/// finds the shape of least energy; force and torque are the integrals of the pressure over the surface. No compliance,
-/// no active set and no plane of the engine's is used.
+/// Reference solution for a rigid capsule on a linear body. The surface is a stiff cushion with a pressure of
+/// `cushion` (Pa/m) times the penetration. Newton's method on all unknowns minimizes the energy, and force and torque
+/// are integrals of the pressure. The engine's compliance, active set and tangent plane are not used.
 class ContactIntegral {
  public:
   struct Tool {
@@ -67,11 +66,11 @@ class ContactIntegral {
   };
   struct Sum {
     Vec3 force = Vec3::Zero();           ///< N, on the tool
-    Vec3 torque = Vec3::Zero();          ///< N·m, about the point that was given
-    double area = 0;                     ///< m², of the contact
-    double deepest = 0;                  ///< m, what the cushion gives way
-    Vec3 support = Vec3::Zero();         ///< N, and
-    Vec3 support_torque = Vec3::Zero();  ///< N·m, about the same point: of the floor on the body
+    Vec3 torque = Vec3::Zero();          ///< N·m, about the given point
+    double area = 0;                     ///< contact area, m²
+    double deepest = 0;                  ///< largest compression of the cushion, m
+    Vec3 support = Vec3::Zero();         ///< force of the floor on the body, N
+    Vec3 support_torque = Vec3::Zero();  ///< N·m, about the same point
     double energy = 0;                   ///< J
   };
 
@@ -109,11 +108,11 @@ class ContactIntegral {
   Sum press(const Tool& tool, const Vec3& about) const {
     VectorXd u = VectorXd::Zero(solid_.size());
     Factor factor(stiffness_);
-    bool bends = false;  // near the solution Newton's method knows how the normals turn
+    bool bends = false;  // near the solution the tangent includes the rotation of the normals
     for (int round = 0;; ++round) {
       if (round == 60) throw std::runtime_error("the cushion does not come to rest");
       SymmetricMatrix tangent = stiffness_;
-      VectorXd left = stiffness_.times(solid_.to_free(u));  // what the body resists with
+      VectorXd left = stiffness_.times(solid_.to_free(u));  // elastic forces
       for (const Point& point : points_) add(point, tool, u, bends, tangent, left);
       if (!factor.factorize(tangent)) throw std::runtime_error("the cushion pushes the body aside");
       const VectorXd step = factor.solve(left);
@@ -169,7 +168,7 @@ class ContactIntegral {
     return y;
   }
 
-  /// How deep y is in the tool, and the way out.
+  /// Penetration of y into the tool, and the outward direction.
   static std::pair<double, Vec3> inside(const Tool& tool, const Vec3& y) {
     const double along = std::clamp(tool.axis.dot(y - tool.middle), -tool.half_length, tool.half_length);
     const Vec3 out = y - tool.middle - along * tool.axis;
@@ -191,7 +190,7 @@ class ContactIntegral {
     const Vec3 y = place(point, u);
     const auto [depth, normal] = inside(tool, y);
     if (depth <= 0) return;
-    // The normal turns as y goes round an end or round the axis.
+    // The normal rotates around an end or around the axis.
     Mat3 round = Mat3::Identity() - normal * normal.transpose();
     if (std::abs(tool.axis.dot(y - tool.middle)) < tool.half_length) round -= tool.axis * tool.axis.transpose();
     round /= tool.radius - depth;

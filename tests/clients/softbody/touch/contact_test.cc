@@ -40,7 +40,7 @@ TEST_F(Contacts, NothingIsFeltOutsideAndThePushIsUpwardsInside) {
   EXPECT_TRUE(inside.touching);
   EXPECT_NEAR(inside.gap, -0.002, 1e-12);
   EXPECT_NEAR(inside.force.z(), 0.002 * inside.stiffness(2, 2), 1e-9);
-  EXPECT_LT(inside.force.head<2>().norm(), 1e-9);  // in the middle nothing pulls aside
+  EXPECT_LT(inside.force.head<2>().norm(), 1e-9);  // no tangential force at the center
 }
 
 TEST_F(Contacts, ASphereTouchesARadiusEarlier) {
@@ -60,7 +60,7 @@ TEST_F(Contacts, OnlyABilateralToolPullsAndOnlyOnceItHasTouched) {
   EXPECT_EQ(loose.at(Vec3(0, 0, 0.052)).force, Vec3::Zero());
 }
 
-/// J, on a closed way the work that the hand has done. A midpoint rule in small steps.
+/// Work of the hand on a closed path by the midpoint rule, J.
 double work_around(PatchContact& contact, int steps) {
   const auto place = [](double turn) {
     const double angle = 2 * std::numbers::pi * turn;
@@ -77,7 +77,7 @@ double work_around(PatchContact& contact, int steps) {
 
 TEST_F(Contacts, AClosedWayThroughTheBodyGivesBackExactlyWhatItTook) {
   PatchContact contact(model_, top_, 0, PatchContact::Side::kUnilateral);
-  // About 5 mJ go in and out. Without the force across, 0.1 mJ would be left.
+  // About 5 mJ are exchanged. Without the tangential force, 0.1 mJ would remain.
   EXPECT_LT(std::abs(work_around(contact, 2000)), 2e-8);
 }
 
@@ -97,11 +97,11 @@ TEST_F(Contacts, StiffnessIsTheForcesOwnSlopeAlongTheNormal) {
       measured.col(c) =
           -(contact.at(tool + 1e-5 * Vec3::Unit(c)).force - contact.at(tool - 1e-5 * Vec3::Unit(c)).force) / 2e-5;
     }
-    EXPECT_LT((k - measured).norm(), 0.05 * k.norm());  // what is left out is ∂²/∂c²
+    EXPECT_LT((k - measured).norm(), 0.05 * k.norm());  // the neglected part is ∂²/∂c²
   }
 }
 
-/// −∂force/∂position by differences.
+/// −∂force/∂position by central differences.
 template <class Touched>
 Mat3 by_differences(Touched& touched, const Vec3& tool) {
   constexpr double kStep = 2e-5;
@@ -146,10 +146,10 @@ TEST(ExactStiffness, OfTheLiverIsRightToTwoNewtonsAMetreAlsoBelowZero) {
     EXPECT_LT((given - by_differences(touched, tool)).cwiseAbs().maxCoeff(), 2) << given;
     lowest = std::min(lowest, Eigen::SelfAdjointEigenSolver<Mat3>(given).eigenvalues()[0]);
   }
-  EXPECT_LT(lowest, -20);  // N/m: there the patch would rather slip away
+  EXPECT_LT(lowest, -20);  // N/m: the patch tends to slip away
 }
 
-/// The models that leave the whole stiffness out where nobody misses it.
+/// Configurations of models that may omit parts of the stiffness.
 std::vector<BodyConfig> linear_ones(BodyConfig config) {
   std::vector<BodyConfig> all;
   config.max_iterations = 100;
@@ -162,7 +162,7 @@ std::vector<BodyConfig> linear_ones(BodyConfig config) {
   config.effects = {.density = 1000, .gravity = Vec3(0.5, 0, -1)};
   all.push_back(config);
   config.effects = {};
-  config.plasticity = Yield{.stress = 1e5, .hardening = 1e4};  // it does not yield
+  config.plasticity = Yield{.stress = 1e5, .hardening = 1e4};  // never yields
   all.push_back(config);
   config.plasticity.reset();
   config.stiffening = StiffnessOverTime{.at = {0}, .factor = {3}};
@@ -175,7 +175,7 @@ void expect_slope_of_its_force(const BodyConfig& config, const Vec2& aside, doub
   body.tick(0);
   const auto touched = [&](const Vec3& tool) { return body.touch(tool); };
   const Vec3 above = body.touch_point() + Vec3(aside.x(), aside.y(), 0);
-  body.touch(above + Vec3(1e-3, 1e-3, -depth));  // what it keeps of one place serves another
+  body.touch(above + Vec3(1e-3, 1e-3, -depth));  // the state kept from another place must not matter
   const Mat3 given = body.touch(above - depth * Vec3::UnitZ()).stiffness;
   EXPECT_LT((given - by_differences(touched, above - depth * Vec3::UnitZ())).norm(), share * given.norm())
       << info(config.model).name << '\n'
@@ -207,7 +207,8 @@ TEST(ExactStiffness, IsNotPaidForOnAFlatSideUnlessItIsAskedFor) {
   EXPECT_FALSE(LinearModel(flat, top).glides());
   EXPECT_TRUE(LinearModel(flat, top, {}, true).glides());
   EXPECT_FALSE(LinearModel(flat, top, {.density = 1000, .step = 1e-3, .inertia = true}, true).glides());
-  EXPECT_TRUE(TouchSurface(flat.mesh(), Vec3(1, 0, 1).normalized(), kB1PatchRadius).curved());  // around an edge
+  // the patch spans an edge
+  EXPECT_TRUE(TouchSurface(flat.mesh(), Vec3(1, 0, 1).normalized(), kB1PatchRadius).curved());
   EXPECT_FALSE(TouchSurface(flat.mesh(), Vec3(0.1, 0, 1).normalized(), kB1PatchRadius).curved());
   const LinearModel still(flat, top);
   LinearModel asked(flat, top, {}, true);

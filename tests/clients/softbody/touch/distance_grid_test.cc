@@ -38,13 +38,13 @@ TEST(DistanceGrid, MeetsASmoothDistanceToTheFourthOrder) {
   };
   const auto coarse = errors(0.001);
   const auto fine = errors(0.0005);
-  EXPECT_LT(fine[0], 1e-7);  // m: a 5000th of a cell
+  EXPECT_LT(fine[0], 1e-7);  // m; 1/5000 of a cell
   EXPECT_GT(std::log2(coarse[0] / fine[0]), 3.6);
   EXPECT_GT(std::log2(coarse[1] / fine[1]), 2.6);
   EXPECT_GT(std::log2(coarse[2] / fine[2]), 1.6);
 }
 
-/// Halfway between two sides, and over an edge: two kinks.
+/// The distance of a plate, which has kinks halfway between two faces and at the edges.
 double plate_distance(const Vec3& x) {
   const Vec3 beyond = x.cwiseAbs() - Vec3(0.006, 0.006, 0.002);
   return beyond.cwiseMax(0.0).norm() + std::min(0.0, beyond.maxCoeff());
@@ -57,7 +57,7 @@ TEST(DistanceGrid, ItsDerivativesAreThoseOfItsValueAndNoneJumps) {
   Dice dice(12);
   for (int i = 0; i < 3000; ++i) {
     Vec3 x(dice.within(-0.0077, 0.0077), dice.within(-0.0077, 0.0077), dice.within(-0.0077, 0.0077));
-    // Every other one on a border between cells.
+    // Every second point is on a cell boundary.
     if (i % 2 == 0) x[i / 2 % 3] = -0.008 + kCell * std::round((x[i / 2 % 3] + 0.008) / kCell);
     const Distance here = grid.at(x);
     for (int axis = 0; axis < 3; ++axis) {
@@ -84,7 +84,7 @@ TEST(DistanceGrid, OverTheBordersOfItsBoxValueAndDirectionGoOn) {
     const Distance outside = grid.at(x + 1e-9 * Vec3::Unit(axis));
     EXPECT_NEAR(outside.value, inside.value, 5e-9);
     EXPECT_LT((outside.gradient - inside.gradient).norm(), 1e-3);
-    // Far away it is a little too large, never too small.
+    // Far away the distance is overestimated by at most 2 %.
     const Vec3 far = x + dice.within(0, 0.1) * Vec3::Unit(axis);
     EXPECT_GT(grid.at(far).value, ball_distance(far) - 1e-7);
     EXPECT_LT(grid.at(far).value, ball_distance(far) * 1.02);

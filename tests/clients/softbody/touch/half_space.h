@@ -9,7 +9,8 @@
 
 namespace tendon::softbody::testing {
 
-/// Layers from 0 to `length`, the first `first` thick, each thicker than the one before by the same factor.
+/// Layer boundaries from 0 to `length`. The first layer is `first` thick, and the thickness grows by a constant
+/// factor.
 inline std::vector<double> graded(double first, double length, int count) {
   double low = 1;
   double high = 4;
@@ -23,7 +24,8 @@ inline std::vector<double> graded(double first, double length, int count) {
   return layers;
 }
 
-/// A quarter of a half space, up to z = 0, touched in the corner x = y = 0; its layers from there lie at `out`.
+/// A quarter of a half space below z = 0, touched at x = y = 0. The layer boundaries are at distances `out` from
+/// there.
 inline Solid quarter_of_half_space(Element element, const std::vector<double>& out, const Material& material) {
   const double length = out.back();
   std::vector<double> down;

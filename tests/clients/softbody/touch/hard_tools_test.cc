@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Rigid tools where solvers of contact break; models/hard_presses_test.cc has the patch's.
+// Rigid tools that are difficult for contact solvers. models/hard_presses_test.cc has those for the patch.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -28,7 +28,7 @@ TEST(HardTool, OnACornerAndBesideTheHeldRimTheStiffnessIsTheForcesOwnSlope) {
     PressedByTools corner(law, one(RigidShape::sphere(0.012)), 0, kExact);
     const Pose over{.position = Vec3(0.05, 0.05, 0.05) + 0.009 * Vec3(1, 1, 1.5).normalized()};
     const Feel on_corner = corner.at(over);
-    EXPECT_GT(on_corner.force.minCoeff(), 0.005);  // away from the corner along each axis
+    EXPECT_GT(on_corner.force.minCoeff(), 0.005);  // pushed away from the corner along each axis
     EXPECT_EQ(corner.solid.inverted(corner.model.displacements()), 0);
     expect_slope(corner, over, 0.01);
 

@@ -17,7 +17,7 @@ namespace {
 constexpr double kThickness = 2e-4;  // m
 constexpr double kYoung = 1e4;       // Pa
 
-/// A box that covers the whole top of B1, flat on it, so that every point is pressed alike.
+/// A box that covers the whole top of B1, so that every point is equally deep.
 struct Covered {
   Covered() : solid(testing::pressed_block(Element::kHex8Sri, 4, 0.45)), layer(solid, config()) {}
   static Layer::Config config() {
@@ -27,7 +27,7 @@ struct Covered {
     made.piece = 0.01;
     return made;
   }
-  /// With the box so deep in the layer.
+  /// The press with this overlap of box and layer, m.
   Layer::Press at(double overlap) const {
     const std::vector<Layer::Placed> placed{{&tool, Pose{.position = Vec3(0, 0, 0.05 + 0.01 + kThickness - overlap)}}};
     const VectorXd rest = VectorXd::Zero(solid.size());
@@ -46,7 +46,7 @@ TEST(Layer, PressesWithYoungsModulusAndBeginsWithoutAStepInForceOrStiffness) {
   constexpr double kOnset = kThickness / 10;              // m
   constexpr double kStiff = kArea * kYoung / kThickness;  // N/m, past the onset
   EXPECT_EQ(covered.at(-1e-9).energy, 0);
-  for (const double share : {0.001, 0.25, 0.5, 0.999}) {  // of the onset
+  for (const double share : {0.001, 0.25, 0.5, 0.999}) {  // as a share of the onset
     const Layer::Press press = covered.at(share * kOnset);
     EXPECT_NEAR(press.felt[0].curve(2, 2), share * kStiff, 1e-6 * kStiff) << share;
     EXPECT_NEAR(-press.felt[0].slope[2], share * share * kOnset * kStiff / 2, 1e-6 * kOnset * kStiff) << share;
@@ -57,14 +57,14 @@ TEST(Layer, PressesWithYoungsModulusAndBeginsWithoutAStepInForceOrStiffness) {
     const Layer::Press press = covered.at(overlap);
     EXPECT_NEAR(press.felt[0].curve(2, 2), kStiff, 1e-6 * kStiff) << overlap;
     EXPECT_NEAR(-press.felt[0].slope[2], kStiff * (overlap - kOnset / 2), 1e-6 * kStiff * kThickness) << overlap;
-    // What the tool gets, the nodes get the other way round.
+    // The forces on tool and nodes are opposite.
     double nodes = 0;
     for (Eigen::Index i = 2; i < press.slope.size(); i += 3) nodes += press.slope[i];
     EXPECT_NEAR(nodes, -press.felt[0].slope[2], 1e-12);
   }
 }
 
-/// The layer's energy, and every point's force, by a sum over all points of the top, for a ball on it.
+/// Compares the layer's energy and forces with a sum over all points of the top, for a ball.
 TEST(Layer, PressesEachPointThatAToolTouchesAndNoOther) {
   const Solid solid = testing::pressed_block(Element::kHex8Sri, 4, 0.45);
   constexpr double kFacet = 0.025;  // m

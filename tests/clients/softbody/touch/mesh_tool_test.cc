@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tools that a file describes, on a body: rigid_contact_test.cc has the others.
+// Tools from mesh files. rigid_contact_test.cc tests the other shapes.
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
@@ -20,7 +20,7 @@ using testing::one;
 using testing::PressedByTools;
 
 constexpr double kMillimetre = 1e-3;
-constexpr double kAround = 1e-4;  // m, as thick as the layer
+constexpr double kAround = 1e-4;  // m, the layer thickness
 
 RigidShape spoon() {
   return RigidShape::mesh(read_surface(TENDON_SCENES "/spoon.off"), kMillimetre, 0.0006, kAround, "spoon.off");
@@ -49,7 +49,7 @@ TEST(MeshTool, ABallOfFacetsPressesAsTheSphereThatItIs) {
   }
 }
 
-/// The bowl's back in the block, the handle up.
+/// The bowl of the spoon presses with its back, the handle points up.
 Pose palpating(double depth, double turn) {
   const Eigen::AngleAxisd on_its_back(std::numbers::pi / 2, Vec3::UnitY());
   return {.position = Vec3(0.003, -0.004, 0.05 + 0.0038 - depth),
@@ -72,7 +72,7 @@ TEST(MeshTool, ItsStiffnessesAreTheSlopesOfForceAndTorque) {
   }
 }
 
-/// From outside to outside, with a turn.
+/// A closed path from outside to outside with a rotation.
 Pose stroke(double t) {
   const double angle = 2 * std::numbers::pi * t;
   Pose pose = palpating(0.001 - 0.0022 * std::cos(angle), std::sin(angle));
@@ -90,7 +90,7 @@ TEST(MeshTool, AClosedWayGivesNothingAndWithFrictionEveryPointLoses) {
   const testing::ClosedWay with = testing::closed_way(rough, stroke, 40);
   EXPECT_GT(with.work, 0.05 * with.most);
   EXPECT_GE(with.least, 0);
-  EXPECT_GT(with.lost, 0);  // points that let go lose more, which is not counted
+  EXPECT_GT(with.lost, 0);  // the loss of points that let go is not counted
   EXPECT_LT(with.lost, with.work);
 }
 
@@ -116,7 +116,7 @@ TEST(MeshTool, APoseThatIsNotFiniteChangesNoBit) {
     EXPECT_EQ(pressed.at(Pose{.position = place, .turn = Mat3::Constant(bad)}).force, Vec3::Zero());
   }
   EXPECT_EQ(pressed.model.displacements(), before);
-  // Far beyond the grid the gap is the way to the surface.
+  // Far beyond the grid the gap is the distance to the surface.
   EXPECT_NEAR(pressed.at(Vec3(0, 0, 1.05)).gap, 1 - 0.0015 - 1e-4, 1e-3);
 }
 

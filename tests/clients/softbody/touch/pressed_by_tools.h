@@ -13,7 +13,7 @@
 
 namespace tendon::softbody::testing {
 
-inline constexpr double kExact = 1e-11;  // of the force
+inline constexpr double kExact = 1e-11;  // relative to the force
 
 inline std::vector<HeldTool> one(const RigidShape& shape, const Vec3& offset = Vec3::Zero()) {
   return {{shape, offset}};
@@ -26,7 +26,7 @@ inline RigidContact::Config config_of(const Material& material, double friction 
   return config;
 }
 
-/// B1, and tools that press it.
+/// Block B1 and the tools that press it.
 struct PressedByTools {
   PressedByTools(Law law, std::vector<HeldTool> tools, double friction = 0, double tolerance = 1e-6)
       : solid(pressed_block(Element::kHex8Sri, 8, 0.45, law)),
@@ -43,7 +43,7 @@ struct PressedByTools {
   RigidContact contact;
 };
 
-/// −∂(force, torque)/∂(place, turn), by differences.
+/// −∂(force, torque)/∂(place, rotation) by central differences.
 inline Layer::Mat6 slopes(PressedByTools& pressed, const Pose& handle) {
   constexpr double kStep = 2e-6;  // m, rad
   Layer::Mat6 all;
@@ -60,7 +60,7 @@ inline Layer::Mat6 slopes(PressedByTools& pressed, const Pose& handle) {
   return all;
 }
 
-/// What the body's own support pushes, N.
+/// Force of the supports on the body, N.
 inline Vec3 support(const PressedByTools& pressed) {
   const VectorXd force = pressed.solid.forces(pressed.model.displacements()).force;
   Vec3 sum = Vec3::Zero();
@@ -70,15 +70,15 @@ inline Vec3 support(const PressedByTools& pressed) {
   return sum;
 }
 
-/// What a closed way of one hand costs it.
+/// Energy of a closed path of one hand, J.
 struct ClosedWay {
-  double work = 0;     ///< J, from the hand to the body, on the whole way
-  double most = 0;     ///< J, the most that it had given
-  double turning = 0;  ///< J, of turns, without signs
-  double lost = 0;     ///< J, by friction
-  double least = 0;    ///< J, the least that a tie has lost at once
+  double work = 0;     ///< from the hand to the body, total
+  double most = 0;     ///< largest intermediate value
+  double turning = 0;  ///< of rotations, sum of absolute values
+  double lost = 0;     ///< by friction
+  double least = 0;    ///< smallest loss of a friction point in one answer
 };
-/// `handle` of 0 to 1, in so many steps; each answer is the one of the middle of its step.
+/// `handle` maps [0, 1] to poses. Each answer is at the middle of its step.
 template <class Way>
 ClosedWay closed_way(PressedByTools& pressed, const Way& handle, int steps) {
   ClosedWay sum;

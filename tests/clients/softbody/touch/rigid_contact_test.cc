@@ -63,14 +63,14 @@ TEST(RigidContact, ASphereOnAHalfSpaceIsNearHertzAndTheCondensedSphere) {
   for (const double depth : {kDeepest / 2, kDeepest}) {
     const Pose place{.position = Vec3(0, 0, kRadius - depth)};
     const Feel feel = contact.press(std::vector{std::optional(place)}).front();
-    force.push_back(4 * feel.force.z());  // four quarters
+    force.push_back(4 * feel.force.z());  // a quarter is simulated
     const double hertz = 4.0 / 3 * modulus * std::sqrt(kRadius) * std::pow(depth, 1.5);
-    // The mesh's error is half of it: the condensed sphere is 3 to 5 % off.
+    // Half of the tolerance is the mesh error: the condensed sphere differs by 3 to 5 %.
     EXPECT_NEAR(force.back() / hertz, 1, 0.1) << depth;
     EXPECT_NEAR(4 * feel.stiffness(2, 2) / (1.5 * hertz / depth), 1, 0.12) << depth;
     EXPECT_NEAR(feel.force.z() / sphere.at(place.position).force.z(), 1, 0.055) << depth;
   }
-  EXPECT_NEAR(std::log2(force[1] / force[0]), 1.5, 0.03);  // a contact of fixed size would have 1
+  EXPECT_NEAR(std::log2(force[1] / force[0]), 1.5, 0.03);  // 1 for a contact of constant size
 }
 
 TEST(RigidContact, PressesALinearBodyAsAContactIntegralOfAnotherWay) {
@@ -90,7 +90,7 @@ TEST(RigidContact, PressesALinearBodyAsAContactIntegralOfAnotherWay) {
     const auto truth = integral.press(tool, about);
     RigidContact contact(model, block.solid, top,
                          one(RigidShape::capsule(0.01, half_length, axis), tool.middle - about), config);
-    // The cushion of the integral begins at the surface, the layer 0.95 of its thickness above it.
+    // The cushion begins at the surface, the layer 0.95 of its thickness above it.
     const Pose handle{.position = about + Vec3(0, 0, 0.95e-5)};
     const Feel feel = contact.press(std::vector{std::optional(handle)}).front();
     EXPECT_GT(truth.force.norm(), 0.1);
@@ -116,7 +116,7 @@ TEST(RigidContact, ItsStiffnessesAreTheSlopesOfForceAndTorque) {
       const Mat3 turned = found.bottomRightCorner<3, 3>();
       EXPECT_GT(feel.force.norm(), 0.5);
       EXPECT_LT((feel.stiffness - moved).norm(), 0.01 * moved.norm());
-      if (feel.torque->torque.norm() < 1e-9) continue;  // a sphere around the handle
+      if (feel.torque->torque.norm() < 1e-9) continue;  // a sphere centered on the handle
       EXPECT_LT((feel.torque->stiffness - not_negative(turned)).norm(), 0.01 * turned.norm());
     }
   }
@@ -137,7 +137,7 @@ TEST(RigidContact, AClosedWayOfPlacesAndTurnsGivesBackExactlyWhatItTook) {
   EXPECT_LT(std::abs(way.work), 2e-3 * way.most);
 }
 
-/// What a press of 3 mm, a slide of 3 mm along an axis and the release cost, as a share of what went in.
+/// Energy lost in a press of 3 mm, a slide of 3 mm along an axis and the release, as a share of the energy put in.
 double lost_by_sliding(const BodyConfig& config, int axis, bool to_and_fro) {
   Body body(config);
   const Vec3 outside = body.touch_point() - lowest_of_tool(config, Mat3::Identity()) + Vec3(0, 0, 2e-4);
@@ -207,7 +207,7 @@ TEST(RigidContact, AFastToolDoesNotComeOutOnTheOtherSide) {
   PressedByTools fast(Law::kNeoHookean, one(RigidShape::sphere(0.015)));
   fast.at(Vec3(0.002, 0, 0.09));
   EXPECT_LT((fast.at(deep).force - expected.force).norm(), 1e-4 * expected.force.norm());
-  // Without a way to follow it comes from where the body is touched from.
+  // Without a previous pose, the tool is assumed to come from the touched side.
   PressedByTools first(Law::kNeoHookean, one(RigidShape::sphere(0.015)));
   EXPECT_LT((first.at(deep).force - expected.force).norm(), 1e-4 * expected.force.norm());
   fast.at(Vec3(0, 0, 1000));
@@ -233,17 +233,17 @@ TEST(RigidContact, OutsideNothingIsFeltAndTheGapIsTheWayToTheLayer) {
   const Feel above = pressed.at(Vec3(0, 0, 0.07));
   EXPECT_EQ(above.force, Vec3::Zero());
   EXPECT_FALSE(above.touching);
-  EXPECT_NEAR(above.gap, 0.0049, 2e-4);  // the nearest point is not at the sphere's foot
+  EXPECT_NEAR(above.gap, 0.0049, 2e-4);  // the nearest point is not below the center
   EXPECT_NEAR(above.valid_radius, above.gap, 1e-12);
   EXPECT_GT(above.normal->z(), 0.99);
-  // From the side too.
+  // The same from the side.
   pressed.at(Vec3(0.08, 0, 0.07));
   pressed.at(Vec3(0.08, 0, 0.03));
   const Feel beside = pressed.at(Vec3(0.064, 0, 0.03));
   EXPECT_LT(beside.gap, 0);
   EXPECT_GT(beside.force.x(), 0.05);
   EXPECT_GT(beside.normal->x(), 0.9);
-  // And released it is at rest again.
+  // After release the body is at rest.
   pressed.at(Vec3(0, 0, 0.2));
   EXPECT_LT(pressed.model.displacements().lpNorm<Eigen::Infinity>(), 1e-7);
 }
@@ -265,7 +265,7 @@ TEST(RigidContact, FrictionDragsTheShapeAndEveryPointLosesEnergy) {
   constexpr double kFriction = 0.4;
   PressedByTools pressed(Law::kNeoHookean, one(RigidShape::sphere(0.015)), kFriction);
   PressedByTools smooth(Law::kNeoHookean, one(RigidShape::sphere(0.015)));
-  const auto below = [](const PressedByTools& body) {  // m, how far the surface there went along x
+  const auto below = [](const PressedByTools& body) {  // largest displacement of the surface along x, m
     double most = 0;
     for (const int node : body.top.nodes()) most = std::max(most, body.model.displacements()[3 * node]);
     return most;
@@ -277,7 +277,7 @@ TEST(RigidContact, FrictionDragsTheShapeAndEveryPointLosesEnergy) {
   const double shape_before = below(pressed);
   double lost = 0;
   int slid = 0;
-  double stuck = 0;  // N/m, along the way, of the first small step
+  double stuck = 0;  // stiffness of the first small step along the motion, N/m
   Feel feel;
   for (int i = 0; i < 40; ++i) {
     place.x() += 0.00025;
@@ -292,7 +292,7 @@ TEST(RigidContact, FrictionDragsTheShapeAndEveryPointLosesEnergy) {
   EXPECT_GT(stuck, 100);
   EXPECT_GT(slid, 100);
   EXPECT_GT(lost, 1e-4);
-  // It slides: the drag is µ of the force, and a little of what is heaped up before the tool.
+  // The tool slides: the drag is µ times the force, and slightly more because material piles up in front of it.
   EXPECT_NEAR((feel.force.x() - without.force.x()) / feel.force.z(), -kFriction, 0.25 * kFriction);
   EXPECT_GT(below(pressed), shape_before + 0.0003);
   EXPECT_GT(below(pressed), below(smooth) + 0.0003);
@@ -317,7 +317,8 @@ TEST(RigidContact, FrictionGivesNothingOnAClosedWay) {
   }
   EXPECT_LT(given, -1e-5);
   EXPECT_GE(least, 0);
-  EXPECT_NEAR(lost / -given, 1, 0.1);  // what is lost is what the hand has put in; ties that let go are not counted
+  // friction loss equals the work of the hand; the loss of points that let go is not counted
+  EXPECT_NEAR(lost / -given, 1, 0.1);
 }
 
 TEST(RigidContact, FrictionIsBoundedByThePressureOfItsOwnAnswer) {
@@ -325,7 +326,7 @@ TEST(RigidContact, FrictionIsBoundedByThePressureOfItsOwnAnswer) {
   PressedByTools rough(Law::kNeoHookean, one(RigidShape::sphere(0.015)), kFriction);
   PressedByTools smooth(Law::kNeoHookean, one(RigidShape::sphere(0.015)));
   for (double z = 0.064; z > 0.0599; z -= 0.0005) rough.at(Vec3(0, 0, z));
-  // In one answer nearly out of the body, and aside.
+  // In one answer almost out of the body and sideways.
   const Vec3 light(0.002, 0, 0.0635);
   const Feel feel = rough.at(light);
   EXPECT_GT(feel.force.z(), 0.01);
@@ -360,7 +361,7 @@ TEST(RigidContact, FarApartEachHandFeelsWhatItFeelsAlone) {
     EXPECT_LT((feels[i].force - feel.force).norm(), 0.005 * feel.force.norm()) << i;
     EXPECT_LT((feels[i].stiffness - feel.stiffness).norm(), 0.005 * feel.stiffness.norm()) << i;
   }
-  // One hand that is nowhere leaves the other alone.
+  // An absent hand does not affect the other.
   const std::vector<Feel> one_left = both.contact.press(std::vector{hands[0], std::optional<Pose>()});
   EXPECT_EQ(one_left[1].force, Vec3::Zero());
   PressedByTools alone(Law::kNeoHookean, {sphere});
@@ -388,13 +389,13 @@ TEST(RigidContact, AClosedWayOfTwoHandsGivesNothingThoughThatOfOneDoes) {
     most = std::max(most, std::abs(work[0] + work[1]));
   }
   EXPECT_GT(most, 1e-4);
-  EXPECT_GT(std::abs(work[0]), 0.02 * most);  // what one hand gets the other has given
+  EXPECT_GT(std::abs(work[0]), 0.02 * most);  // energy passes from one hand to the other
   EXPECT_LT(std::abs(work[0] + work[1]), 2e-3 * most);
 }
 
 TEST(Grasp, LiftingBetweenTwoRoughSpheresMovesTheLiverUp) {
   const BodyConfig scene = read_scene(TENDON_SCENES "/grasp.toml").body;
-  const auto lifted = [&](double friction, double& pull) {  // m, how far the side below a sphere goes up
+  const auto lifted = [&](double friction, double& pull) {  // upward displacement of the side below a sphere, m
     Mesh mesh = read_gmsh(std::get<FileShape>(scene.shape).file, std::get<FileShape>(scene.shape).scale).mesh;
     const Fixed fixed = fix_where(mesh, [](const Vec3& node) { return node.z() < 1e-9; });
     const Solid solid(std::move(mesh), scene.element, scene.material, Law::kNeoHookean, fixed);
@@ -416,12 +417,12 @@ TEST(Grasp, LiftingBetweenTwoRoughSpheresMovesTheLiverUp) {
     std::vector<Feel> feels;
     for (double z = 0.019; z < 0.0221; z += 0.001) feels = contact.press(hands(0.068, z));
     pull = -feels[0].force.z() - feels[1].force.z();
-    EXPECT_NEAR(feels[0].force.y() / feels[1].force.y(), -1, 0.01);  // the liver is the same on both sides
+    EXPECT_NEAR(feels[0].force.y() / feels[1].force.y(), -1, 0.01);  // the liver is symmetric
     return model.displacements()[3 * node + 2] - before;
   };
   double pull = 0;
   EXPECT_GT(lifted(*scene.friction, pull), 0.004);  // the hands go 4 mm up
-  EXPECT_GT(pull, 1.5);                             // N, it is held
+  EXPECT_GT(pull, 1.5);                             // N; the liver is held
   double slipping = 0;
   EXPECT_LT(lifted(0, slipping), 0.001);
   EXPECT_LT(slipping, 0);
@@ -461,7 +462,7 @@ TEST(RigidScene, ItsKeysAreItsOwnAndItRefusesWhatItCannotDo) {
         std::string("tool = \"box\"\ntool_size_mm = [20, 0, 12]\ntool_edge_mm = 2"), std::string("layer_mm = 1")}) {
     EXPECT_THROW(scene(wrong), SceneError) << wrong;
   }
-  // A surface from a file is read where the body is made.
+  // A mesh file is read when the body is created.
   const std::string mesh = "tool = \"mesh\"\ntool_file = \"spoon.off\"\ntool_units_per_m = 1000\n";
   const BodyConfig spoon = scene(mesh + "tool_cell_mm = 0.8").body;
   const MeshTool tool = std::get<MeshTool>(spoon.tool);
@@ -469,7 +470,7 @@ TEST(RigidScene, ItsKeysAreItsOwnAndItRefusesWhatItCannotDo) {
   EXPECT_DOUBLE_EQ(tool.scale, 0.001);
   EXPECT_DOUBLE_EQ(tool.cell, 0.0008);
   EXPECT_TRUE(turns_the_hand(spoon));
-  EXPECT_THROW(Body{spoon}, std::invalid_argument);  // it is not there
+  EXPECT_THROW(Body{spoon}, std::invalid_argument);  // the file does not exist
   for (const std::string& wrong : {mesh, mesh + "tool_cell_mm = 0", mesh + "tool_cell_mm = 1\ntool_edge_mm = 1",
                                    std::string("tool = \"mesh\"\ntool_cell_mm = 1\ntool_units_per_m = 1000"),
                                    std::string("tool = \"mesh\"\ntool_file = \"spoon.off\"\ntool_cell_mm = 1"),
@@ -508,7 +509,7 @@ TEST(RigidScene, APatchThatPressesFarIsToldOfRigidTools) {
   EXPECT_NE(beyond_the_patch(config).find("tool = \"sphere\""), std::string::npos);
   config.tool = SphereTool{0.01};
   EXPECT_TRUE(std::isinf(patch_up_to(config)));
-  config = testing::pressed_body(ModelKind::kLinear, Element::kHex8Sri, 4);  // it has no limit load
+  config = testing::pressed_body(ModelKind::kLinear, Element::kHex8Sri, 4);  // this model has no limit load
   EXPECT_TRUE(std::isinf(patch_up_to(config)));
 }
 

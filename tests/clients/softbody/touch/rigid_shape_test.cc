@@ -55,7 +55,7 @@ TEST(RigidShape, ItsDerivativesAreThoseOfItsDistance) {
     for (int i = 0; i < 2000; ++i) {
       const Vec3 x(dice.within(-0.03, 0.03), dice.within(-0.03, 0.03), dice.within(-0.03, 0.03));
       const Distance here = shape.distance(x);
-      if (here.value < -1e-3) continue;  // the core
+      if (here.value < -1e-3) continue;  // too deep inside
       Vec3 slope;
       Mat3 curve;
       bool smooth = true;
@@ -69,7 +69,7 @@ TEST(RigidShape, ItsDerivativesAreThoseOfItsDistance) {
       EXPECT_NEAR(here.gradient.norm(), 1, 1e-12) << name;
       EXPECT_EQ(shape.value(x), here.value) << name;
       EXPECT_LT((slope - here.gradient).norm(), 1e-6) << name;
-      if (!smooth) continue;  // where a flat side meets a round edge
+      if (!smooth) continue;  // between a flat face and a rounded edge
       ++judged;
       EXPECT_LT((curve - here.curvature).norm(), 1e-4 * (1 + here.curvature.norm())) << name;
     }
@@ -97,12 +97,13 @@ TEST(RigidShape, ItsSignSaysWhichSideOfTheSurfaceAPointIsOn) {
   EXPECT_NEAR(capsule.distance(Vec3(0.005, 0, -0.01)).value, 0.006, 1e-15);
 
   const RigidShape box = RigidShape::box(Vec3(0.02, 0.03, 0.012), 0.002);
-  EXPECT_NEAR(box.distance(Vec3::Zero()).value, -0.006, 1e-15);  // to the nearest side
+  EXPECT_NEAR(box.distance(Vec3::Zero()).value, -0.006, 1e-15);  // to the nearest face
   EXPECT_NEAR(box.value(Vec3::Zero()), -0.006, 1e-15);
-  EXPECT_NEAR(box.distance(Vec3(0, 0, 0.007)).value, 0.001, 1e-15);   // above a side
-  EXPECT_NEAR(box.distance(Vec3(0.009, 0, 0)).value, -0.001, 1e-15);  // below one
+  EXPECT_NEAR(box.distance(Vec3(0, 0, 0.007)).value, 0.001, 1e-15);   // above a face
+  EXPECT_NEAR(box.distance(Vec3(0.009, 0, 0)).value, -0.001, 1e-15);  // below a face
   EXPECT_GT(box.distance(Vec3(0.01, 0.015, 0.006)).value, 0.001);     // where a sharp corner would be
-  EXPECT_NEAR(box.distance(Vec3(0.008, 0.013, 0.004) + 0.005 * Vec3(2, 1, 2) / 3).value, 0.003, 1e-15);  // a corner's
+  // a rounded corner
+  EXPECT_NEAR(box.distance(Vec3(0.008, 0.013, 0.004) + 0.005 * Vec3(2, 1, 2) / 3).value, 0.003, 1e-15);
   EXPECT_NEAR(box.distance(Vec3(1000, 0, 0)).value, 999.99, 1e-9);
 }
 
@@ -127,7 +128,7 @@ TEST(RigidShape, NoPointOfItsSurfaceIsFartherThanItsFarthest) {
       const Vec3 far = shape.farthest(way);
       EXPECT_NEAR(shape.distance(far).value, 0, 1e-12) << name;
       EXPECT_LE(far.norm(), shape.reach() + 1e-12) << name;
-      // Beyond the plane through it there is nothing of the tool.
+      // The tangent plane separates the tool from the outside.
       EXPECT_GT(shape.distance(far + 0.001 * way).value, 0.001 - 1e-12) << name;
       Vec3 beside = 1e3 * (Mat3::Identity() - way * way.transpose()) * Vec3(0.3, 0.5, -0.7);
       beside.normalize();
@@ -148,7 +149,7 @@ TEST(RigidShape, AMeshOfABallIsThatBallToWhatItsFactsSay) {
   EXPECT_NEAR(facts.size.z(), 0.02, 1e-4);
   EXPECT_LT(facts.error, 0.05 * facts.cell);
   EXPECT_NEAR(shape.reach(), 0.01, 2e-5);
-  EXPECT_NEAR(shape.thinnest(), 6 * facts.cell, 1e-12);  // it is thicker, and no more is looked for
+  EXPECT_NEAR(shape.thinnest(), 6 * facts.cell, 1e-12);  // it is thicker; the search ends at this value
   Dice dice(8);
   for (int i = 0; i < 1000; ++i) {
     const Vec3 way = Vec3(dice.within(-1, 1), dice.within(-1, 1), dice.within(-1, 1)).normalized();
@@ -163,7 +164,7 @@ TEST(RigidShape, AMeshWithSharpEdgesIsRightToAFifthOfACellAndSaysSo) {
   const RigidShape shape =
       RigidShape::mesh(testing::box_surface(Vec3(20, 30, 12)), kMillimetres, 0.001, 0.001, "box.off");
   EXPECT_LT(shape.mesh_facts()->error, 0.0002);
-  EXPECT_GT(shape.mesh_facts()->error, 0.0001);  // its corners are round
+  EXPECT_GT(shape.mesh_facts()->error, 0.0001);  // the grid rounds its corners
   EXPECT_NEAR(shape.distance(Vec3(0, 0, 0.006)).value, 0, 1e-6);
   EXPECT_NEAR(shape.distance(Vec3(0.003, 0.001, 0.008)).value, 0.002, 1e-6);
   EXPECT_EQ(shape.farthest(Vec3(0.6, -0.64, 0.48)), Vec3(0.01, -0.015, 0.006));

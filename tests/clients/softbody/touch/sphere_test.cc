@@ -20,10 +20,10 @@ namespace tendon::softbody::sphere_test {
 namespace {
 
 constexpr double kRadius = 0.01;            // m
-constexpr double kDeepest = 0.1 * kRadius;  // as far as Hertz holds
+constexpr double kDeepest = 0.1 * kRadius;  // Hertz's theory holds up to this depth
 constexpr Material kSoft{.young = 1e4, .poisson = 0.3};
 
-/// A quarter of a half space, with cells of an eighth of the widest contact where that is.
+/// A quarter of a half space. The cells near the contact are 1/8 of its largest radius.
 Solid half_space() {
   const double widest = std::sqrt(kRadius * kDeepest);
   std::vector<double> out{0};
@@ -43,13 +43,13 @@ TEST(Sphere, OnAHalfSpaceIsWhatHertzSays) {
   std::vector<double> force;
   for (const double depth : {kDeepest / 2, kDeepest}) {
     const Feel feel = sphere.at(Vec3(0, 0, kRadius - depth));
-    force.push_back(4 * feel.force.z());  // four quarters
+    force.push_back(4 * feel.force.z());  // a quarter is simulated
     const double hertz = 4.0 / 3 * modulus * std::sqrt(kRadius) * std::pow(depth, 1.5);
     EXPECT_NEAR(force.back() / hertz, 1, 0.06) << depth;
     EXPECT_NEAR(4 * feel.stiffness(2, 2) / (1.5 * hertz / depth), 1, 0.08) << depth;
-    EXPECT_NEAR(sphere.contact_radius() / std::sqrt(kRadius * depth), 1, 0.15) << depth;  // a cell is an eighth
+    EXPECT_NEAR(sphere.contact_radius() / std::sqrt(kRadius * depth), 1, 0.15) << depth;  // a cell is 1/8 of the radius
   }
-  EXPECT_NEAR(std::log2(force[1] / force[0]), 1.5, 0.04);  // a contact of fixed size would have 1
+  EXPECT_NEAR(std::log2(force[1] / force[0]), 1.5, 0.04);  // 1 for a contact of constant size
 }
 
 class Spheres : public ::testing::Test {
@@ -66,7 +66,7 @@ TEST_F(Spheres, NoNodeIsPulledAndNoneIsInside) {
     EXPECT_TRUE(feel.touching);
     EXPECT_GT(feel.force.z(), 0);
     EXPECT_LT((feel.stiffness - feel.stiffness.transpose()).norm(), 1e-9 * feel.stiffness.norm());
-    // The same from no active set at all.
+    // Starting without an active set gives the same force.
     SphereContact fresh(body_, top_, 0.02);
     EXPECT_LT((fresh.at(q).force - feel.force).norm(), 1e-9);
   }
@@ -75,7 +75,8 @@ TEST_F(Spheres, NoNodeIsPulledAndNoneIsInside) {
 TEST_F(Spheres, AClosedWayThroughTheBodyGivesBackExactlyWhatItTook) {
   const auto place = [](double turn) {
     const double angle = 2 * std::numbers::pi * turn;
-    // Off the middle, where the body gives way more on one side: without the force across, more than that is left.
+    // Off center, where the body is softer on one side, so that the energy is only conserved with the tangential
+    // force.
     return Vec3(0.018 + 0.008 * std::cos(angle), -0.012 + 0.008 * std::sin(angle), 0.067 + 0.001 * std::sin(2 * angle));
   };
   double work = 0;
@@ -106,7 +107,7 @@ TEST(SphereScene, ASceneChoosesItWhereItCanBe) {
   text.replace(text.find("[4, 4, 2]"), 9, "[20, 20, 6]");
   const Scene scene = parse_scene(text, "s.toml", ".");
   Body body(scene.body);
-  // Shallow it is softer than the patch, and its stiffness grows.
+  // At small depth it is softer than the patch, and its stiffness grows.
   const double shallow = body.touch(Vec3(0, 0, 0.0645)).stiffness(2, 2);
   const double deep = body.touch(Vec3(0, 0, 0.060)).stiffness(2, 2);
   EXPECT_GT(shallow, 0);

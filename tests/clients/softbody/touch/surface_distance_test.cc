@@ -20,7 +20,7 @@ TEST(SurfaceDistance, OfABoxItIsThatOnPaperAlsoAtEdgesAndCorners) {
   Dice dice(21);
   for (int i = 0; i < 3000; ++i) {
     Vec3 x(dice.within(-2, 2), dice.within(-2, 2), dice.within(-2, 2));
-    if (i % 3 == 0) x.y() = x.x() - 0.5;  // also over the edges themselves
+    if (i % 3 == 0) x.y() = x.x() - 0.5;  // points over the edges
     if (i % 5 == 0) x = x.x() * size;     // and over corners
     const Vec3 beyond = x.cwiseAbs() - size / 2;
     const double paper = beyond.cwiseMax(0.0).norm() + std::min(0.0, beyond.maxCoeff());
@@ -42,7 +42,7 @@ TEST(SurfaceDistance, OfManyFacetsItIsTheLeastOfAllAndACavityIsOutside) {
   }
 }
 
-/// A tetrahedron whose corner is so sharp that the normals of its facets disagree about which side a point is on.
+/// A tetrahedron with a corner so sharp that the facet normals disagree about the side of a point.
 TEST(SurfaceDistance, AtASharpCornerTheSideIsRightWhereSingleFacetsAreWrong) {
   Triangles needle;
   needle.points = {Vec3(0, 0, 0), Vec3(0.1, 0, -4), Vec3(-0.1, 0.15, -4), Vec3(-0.3, -0.1, -4)};
@@ -50,7 +50,8 @@ TEST(SurfaceDistance, AtASharpCornerTheSideIsRightWhereSingleFacetsAreWrong) {
   const SurfaceDistance distance(needle);
   Dice dice(23);
   for (int i = 0; i < 2000; ++i) {
-    const Vec3 above(dice.within(-1, 1), dice.within(-1, 1), dice.within(0.2, 1));  // nearest: mostly the tip
+    // the nearest point is mostly the tip
+    const Vec3 above(dice.within(-1, 1), dice.within(-1, 1), dice.within(0.2, 1));
     EXPECT_GT(distance.at(above), 0);
   }
   EXPECT_LT(distance.at(Vec3(-0.05, 0.01, -2)), 0);

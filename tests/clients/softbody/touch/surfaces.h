@@ -9,8 +9,8 @@
 
 namespace tendon::softbody::testing {
 
-/// A ball by longitudes and latitudes, `round` of them around. Its facets lie within: the shift of the corners outwards
-/// makes them right on the mean.
+/// A ball with `round` facets along the equator. The corners are moved outward so that the facets are at `radius` on
+/// average.
 inline Triangles ball(double radius, int round) {
   const int up = round / 2;
   const double step = std::numbers::pi / up;
@@ -39,7 +39,7 @@ inline Triangles ball(double radius, int round) {
   return made;
 }
 
-/// A box around the origin, two facets for each side.
+/// A box around the origin with two facets per side.
 inline Triangles box_surface(const Vec3& size) {
   Triangles made;
   for (const double z : {-0.5, 0.5}) {
@@ -56,7 +56,7 @@ inline Triangles box_surface(const Vec3& size) {
   return made;
 }
 
-/// Both, as one surface.
+/// Merges two surfaces.
 inline Triangles together(const Triangles& first, const Triangles& second) {
   Triangles made = first;
   const int shift = static_cast<int>(first.points.size());
