@@ -13,7 +13,7 @@ from tendon.teleop import Follower, FollowerConfig, Pose, ToolContact
 parser = cli.parser("robot", __doc__, rate_hz=200)
 parser.add_argument("--demonstration", required=True)
 options = parser.parse_args()
-UP = (0.5**0.5, 0.5**0.5, 0, 0)  # the device's y points up, as the robot's z does
+UP = (0.5**0.5, 0.5**0.5, 0, 0)  # the device's y axis and the robot's z axis point up
 follow = Follower(FollowerConfig(scale=0.5, rotation=UP, clutch_button=0, rate_hz=options.rate_hz))
 tool = [0.4, 0.0, 0.02]  # m
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The package as it is in this tree, whether or not one is installed."""
+"""Uses the package in this tree even if another one is installed."""
 
 import sys
 from pathlib import Path

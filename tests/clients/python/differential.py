@@ -79,7 +79,7 @@ def _report(report: LinkReport) -> list[object]:
 
 
 def _matrix(matrix: Mat3) -> list[object]:
-    return [_double(entry + 0.0) for row in matrix for entry in row]  # −0 is 0: k · 0 is either
+    return [_double(entry + 0.0) for row in matrix for entry in row]  # −0 becomes 0: k · 0 may have either sign
 
 
 def _handle_of(state: DeviceState) -> list[object]:
@@ -312,7 +312,7 @@ class Dice(random.Random):
         return value & (1 << bits) - 1
 
     def fill(self, message: pb.Datagram, depth: int = 0) -> None:
-        """Values in and out of bounds, for each of the fields or not."""
+        """Fills a random subset of the fields with values inside and outside of their bounds."""
         present = self.choice([0.3, 0.9, 0.97])
         for field in message.DESCRIPTOR.fields:
             if self.random() > present:
@@ -329,16 +329,16 @@ class Dice(random.Random):
                 inside = getattr(message, field.name)
                 inside.SetInParent()
                 self.fill(inside, depth + 1)
-                if field.name == "normal" and self.random() < 0.7:  # by chance none is a unit vector
+                if field.name == "normal" and self.random() < 0.7:  # random vectors are not unit vectors
                     length = self.choice([1, 1, 1, 1, 1.0009, 1.0011, -0.9991, 0.9989])
                     inside.x, inside.y, inside.z = self.choice([(length, 0, 0), (0.6 * length, 0, 0.8 * length)])
-                if isinstance(inside, pb.Quat) and self.random() < 0.7:  # nor is it a rotation
+                if isinstance(inside, pb.Quat) and self.random() < 0.7:  # and random quaternions are not rotations
                     length = self.choice([1, 1, 1, 1, 1.0009, 1.0011, -0.9991, 0.9989])
                     turns = [(length, 0, 0, 0), (0.6 * length, 0, 0.8 * length, 0)]
                     inside.w, inside.x, inside.y, inside.z = self.choice(turns)
             else:
                 setattr(message, field.name, self.value(field))
-        if isinstance(message, pb.DeviceReport) and self.random() < 0.7:  # by chance they are hardly ever enough
+        if isinstance(message, pb.DeviceReport) and self.random() < 0.7:  # a random report is hardly ever consistent
             message.steps = min(max(sum(message.lateness_us_log2), message.overruns, message.unseen), 2**64 - 1)
 
     def value(self, field: object) -> float | int | str | bool:
@@ -358,7 +358,7 @@ class Dice(random.Random):
         return self.whole(32 if kind in (field.TYPE_UINT32, field.TYPE_FIXED32) else 64)  # type: ignore[attr-defined]
 
     def made(self) -> bytes:
-        """A datagram with the right shape and any values."""
+        """Returns a well-formed datagram with random values."""
         random16 = self.randbytes(16)
         kind = self.choice(["data"] * 8 + ["hello", "answer", "answer", "retry"])
         suite = Suite(self.choice([0] * 15 + [1]))
@@ -418,7 +418,7 @@ def datagrams(seed: int, count: int) -> Iterator[bytes]:
 
 
 def compare(decode_lines: Path, seed: int, count: int) -> tuple[dict[str, int], list[tuple[bytes, str, str]]]:
-    """How many datagrams were what, and those on which the two differ: the bytes, what C++ says, what Python says."""
+    """Returns the counts of each kind of datagram, and the datagrams on which the decoders differ with both results."""
     shown = list(datagrams(seed, count))
     lines = "".join(datagram.hex() + "\n" for datagram in shown)
     done = subprocess.run([decode_lines], input=lines, capture_output=True, text=True, check=True)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A front for one worker: its end of the stream, byte by byte as clients/cpp/worker/stream.h says."""
+"""The server side of the stream to one worker, written from clients/cpp/worker/stream.h."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Front:
         self.link = self._listener
 
     def accept(self, patience_s: float = PATIENCE_S) -> tuple[int, bytes]:
-        """The first record of the worker that comes."""
+        """Waits for the worker to connect. Returns its first record."""
         self._listener.settimeout(patience_s)
         self.link, _ = self._listener.accept()
         self.link.settimeout(PATIENCE_S)
@@ -53,7 +53,7 @@ class Front:
         self.link.sendall((8 + len(body)).to_bytes(4, "little") + sequence.to_bytes(8, "little") + body)
 
     def ask(self, sequence: int, hand: DeviceState) -> ForceCommand | None:
-        """The answer, once it is one to this question."""
+        """Sends a state and returns the answer, which must have the same sequence number."""
         self.say(sequence, codec.write_frame(hand))
         answered, body = self.read()
         assert answered == sequence
@@ -75,7 +75,7 @@ class Front:
 
 
 def mpirun(*command: str | Path) -> list[str]:
-    """The words that run it on two ranks of this machine, which others use, too."""
+    """Returns a command line that runs `command` on two ranks, on a machine that may be busy."""
     if shutil.which("mpirun") is None or find_spec("mpi4py") is None:
         pytest.skip("no openmpi-bin or python3-mpi4py")
     words = ["mpirun", "--oversubscribe", "--mca", "mpi_yield_when_idle", "1", "-n", "2", *command]
@@ -84,13 +84,14 @@ def mpirun(*command: str | Path) -> list[str]:
 
 @contextmanager
 def running(command: Sequence[str | Path], **options: Any) -> Iterator[subprocess.Popen[Any]]:
-    """A worker with this package. It is gone when the `with` is left. Open MPI asks for leave to run as root, which
-    tests in containers are."""
+    """Runs a worker with the package in this tree until the end of the `with` block. Tests in containers run as root,
+    which Open MPI only accepts with these variables.
+    """
     environment = {**os.environ, "PYTHONPATH": str(ROOT / "clients" / "python"), "OMP_NUM_THREADS": "1"}
     environment |= {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
     program = subprocess.Popen([str(word) for word in command], env=environment, **options)
     try:
         yield program
     finally:
-        program.terminate()  # mpirun takes its ranks with it
+        program.terminate()  # mpirun also ends its ranks
         program.wait(PATIENCE_S)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Real programs on loopback. Waits are for a line or an end, with 30 s of patience: virtual machines pause."""
+"""Real programs on loopback. All waits have a timeout of 30 s, because virtual machines may pause."""
 
 from __future__ import annotations
 
@@ -26,12 +26,14 @@ EXAMPLES = ROOT / "clients" / "python" / "examples"
 
 
 def scene(name: str) -> str:
-    """The text of a scene of deploy/scenes; their hands press into the region x > 0."""
+    """Returns a scene of deploy/scenes. Its hand presses into x > 0."""
     return (ROOT / "deploy" / "scenes" / f"{name}.toml").read_text(encoding="utf-8")
 
 
 class Process:
-    """A running program. Gone when the `with` is left. Both of its streams are one sequence of lines."""
+    """A running program, which is killed at the end of the `with` block. Its stdout and stderr form one sequence of
+    lines.
+    """
 
     def __init__(self, folder: Path, command: Sequence[str | Path]) -> None:
         environment = {**os.environ, "PYTHONPATH": str(ROOT / "clients" / "python"), "PYTHONUNBUFFERED": "1"}
@@ -50,7 +52,7 @@ class Process:
         self._reader.start()
 
     def wait_for_line(self, text: str) -> str:
-        """The next line with `text` in it."""
+        """Waits for the next line that contains `text`."""
         while True:
             try:
                 line = self._lines.get(timeout=PATIENCE_S)
@@ -63,7 +65,7 @@ class Process:
                 return line
 
     def wait(self) -> int:
-        """The exit code, once it has ended."""
+        """Waits for the exit code."""
         code = self._process.wait(PATIENCE_S)
         while (line := self._lines.get(timeout=PATIENCE_S)) is not None:
             self.said.append(line)
@@ -98,7 +100,7 @@ def tendond() -> Path:
 
 
 class Server(Process):
-    """tendond with the demo's scene: a hand that presses into the region x > 0 twice a second."""
+    """tendond with the demo scene: a hand that presses into x > 0 twice per second."""
 
     def __init__(
         self,
@@ -107,7 +109,7 @@ class Server(Process):
         keys: Path | None = None,
         scenes: Mapping[str, str] | None = None,
     ) -> None:
-        """`keys`: a folder of key files; only they are let in. `scenes`: others, by the names of their devices."""
+        """With `keys`, a folder of key files, only their owners can connect. `scenes` maps device names to scenes."""
         if scenes is None:
             text = scene("demo")
             if keys is not None:
@@ -120,7 +122,7 @@ class Server(Process):
         self.address = str(json.loads(self.wait_for_line('"listening"'))["address"])
 
     def end(self) -> dict[str, Any]:
-        """Stops it; its summary."""
+        """Stops the server. Returns its summary."""
         assert self.stop() == 0
         return summary_of(self, '"stopped"')
 
@@ -130,8 +132,10 @@ def example(folder: Path, name: str, *arguments: str | Path) -> Process:
 
 
 def said_by_example(name: str, *arguments: str) -> tuple[int, str, str]:
-    """Exit code, stdout and stderr of an example that ends at once. It runs in this process, because
-    a new process needs a third of a second to import the package."""
+    """Returns exit code, stdout and stderr of an example that ends at once.
+
+    It runs in this process, because a new process needs a third of a second to import the package.
+    """
     out, err, before = io.StringIO(), io.StringIO(), sys.argv
     sys.argv = [str(EXAMPLES / f"{name}.py"), *arguments]
     try:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The server's end of the Noise handshake, for a test's own server."""
+"""The responder of the Noise handshake."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ class Responder:
         self._peer = b""
 
     def read(self, message: bytes) -> bytes | None:
-        """The payload of message 1. None when it is not authentic."""
+        """Returns the payload of message 1, or None if it is not authentic."""
         if len(message) < KEY_SIZE + TAG_SIZE:
             return None
         self._peer = message[:KEY_SIZE]
@@ -21,7 +21,7 @@ class Responder:
         return self._state.decrypt(message[KEY_SIZE:])
 
     def reply(self, ephemeral: bytes, payload: bytes) -> tuple[bytes, Split]:
-        """Message 2, and the keys. Once."""
+        """Returns message 2 and the keys. Can be called once."""
         point = public_key(ephemeral)
         self._state.mix_ephemeral(point)
         shared = shared_key(ephemeral, self._peer)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A guest, a stand-in server and a hand 1 mm inside a wall, on virtual time."""
+"""A client, a stand-in server and a hand 1 mm inside a wall, on virtual time."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ HANDLE = HandleDescription(
 
 
 class Stage:
-    """A guest whose physics is a wall at x = 0, and a device whose hand is 1 mm inside it, at 1 kHz."""
+    """A client whose physics is a wall at x = 0, and a device at 1 kHz whose hand is 1 mm inside it."""
 
     def __init__(self, config: Config, server: StandIn | None = None, weather: Weather = PERFECT, seed: int = 1):
         self.client = ForceClient(config, World.START, random.Random(seed).randbytes)
@@ -82,15 +82,15 @@ class Stage:
         self.forces: list[ForceCommand] = []
         self.requests: list[Control] = []
         self.requested_at: list[int] = []
-        self.answers: list[ControlAck] = []  # to what the server has asked
+        self.answers: list[ControlAck] = []  # to requests of the server
         self.grant = Code.OK
-        self.wait_ms = 0  # said with each answer
-        self.lease_answers: list[Code] = []  # to TakeLease, in this order; then `grant`
-        self.snatches = 0  # so many leases are another one's as soon as they are given
+        self.wait_ms = 0  # sent with each answer
+        self.lease_answers: list[Code] = []  # answers to TakeLease in order, then `grant`
+        self.snatches = 0  # number of leases that another client takes at once
         self.speed = 0.0  # m/s
-        self.turning: Turning | None = None  # of the handle, in each state
-        self.press_every = 0  # ticks: button 1 is held in one state of so many, unless 0
-        self.every = 1  # ms from one state to the next that is sent
+        self.turning: Turning | None = None  # of the handle, sent in each state
+        self.press_every = 0  # button 1 is pressed in one of this many states; 0: never
+        self.every = 1  # ms between the states that are sent
         self._next_state = World.START
 
     def run(self, length: int) -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A server for one client, sans I/O: it shakes hands as SESSION.md says, in either suite, and holds one Session."""
+"""A server for one client without I/O. It performs the handshake in either suite and keeps one Session."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ COOKIE = bytes(range(1, 17))
 
 
 class StandIn:
-    """`refusal`: what it says instead of Welcome. `deaf`: it answers nothing at all. `grants`: to whatever is claimed."""
+    """With `refusal` it refuses every client, and with `deaf` it never answers. `grants` is the answer to any claim."""
 
     def __init__(self, key: bytes | None = None, suites: tuple[Suite, ...] = (Suite.NOISE,)) -> None:
         self.key = key
-        self.suites = suites  # by which it seals; the first that it has been offered
+        self.suites = suites  # in order of preference
         self.refusal: Refused | None = None
         self.deaf = False
         self.features: tuple[str, ...] = ("local-model",)
         self.grants: tuple[Grant, ...] = ()
         self.version = 1
-        self.hellos: list[Hello] = []  # with the cookie, each attempt once
+        self.hellos: list[Hello] = []  # with a valid cookie, one for each attempt
         self.session: Session | None = None
         self._answers: dict[bytes, bytes] = {}  # by client random
         self._to_send: list[bytes] = []

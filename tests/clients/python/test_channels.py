@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Devices, channels and leases: what a guest claims, holds, asks for and loses."""
+"""Devices, channels and leases of a client."""
 
 from __future__ import annotations
 
@@ -28,18 +28,18 @@ from tendon.messages import (
 )
 
 OURS = Grant(Role.CONTROLLER, 1, 2)
-ANOTHERS = Grant(Role.OBSERVER, 1, 2)  # to a controller's claim: for now another one holds the channel
+ANOTHERS = Grant(Role.OBSERVER, 1, 2)  # another client holds the channel
 
 
 def named(grant: Grant = OURS, **changes) -> Stage:
-    """A guest that names its device and its channel, welcomed with `grant`."""
+    """Returns a client that claims a device and a channel and receives `grant`."""
     stage = Stage(Config(**{"device": "right", "channel": "tool", **changes}))
     stage.server.grants = (grant,)
     return stage
 
 
 def leases(stage: Stage) -> list[int]:
-    """When the lease was asked for."""
+    """Returns the times at which the client asked for the lease."""
     return [at for at, control in zip(stage.requested_at, stage.requests) if control.request == TakeLease(1, 2)]
 
 
@@ -249,7 +249,7 @@ def test_who_has_lost_the_lease_is_told_to_whom_and_sends_nothing_more():
     assert (stage.client.holds, stage.client.stats.lease_lost_to) == (False, "another")
     assert [answer.code for answer in stage.answers] == [Code.OK]
     seen, forces = list(stage.seen), list(stage.forces)
-    stage.client.send(seen[-1], Touch((1, 0, 0)))  # of an engine that was still computing
+    stage.client.send(seen[-1], Touch((1, 0, 0)))  # as an engine that was still computing
     stage.run(400 * MS)
     assert (stage.seen, stage.forces) == (seen, forces)
     assert stage.client.phase is Phase.OPEN
@@ -335,7 +335,7 @@ def test_a_turn_is_due_when_the_lease_is_to_be_asked_for_again():
     stage = named(ANOTHERS, take_lease=True)
     stage.grant = Code.BUSY
     stage.run(30 * MS)
-    stage.client.rearm()  # the keep-alive is later then
+    stage.client.rearm()  # this delays the keep-alive
     stage.run(10 * MS)
     (asked,) = leases(stage)
     assert stage.client.next_turn() == asked + 51 * MS, "50 ms after the answer, which was on its way for 1 ms"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a robot's program writes down, to the byte: tests/clients/dataset makes a dataset of the same file."""
+"""Checks a demonstration file byte by byte. tests/clients/dataset makes a dataset of the same file."""
 
 from __future__ import annotations
 
@@ -21,7 +21,9 @@ def hand(tick: int, x: float, buttons: int) -> DeviceState:
 
 
 def write(path: Path) -> None:
-    """Three seconds at 100 Hz: engaged from 0.5 to 1.5 s, clutched to 2 s, engaged again. The tool is always at its target."""
+    """Writes 3 s at 100 Hz: engaged from 0.5 to 1.5 s, clutched until 2 s, then engaged. The tool is always at its
+    target.
+    """
     follow = Follower(FollowerConfig(scale=0.5, clutch_button=0, rate_hz=100))
     tool = [0.25, 0.0, 0.125]
     with Demonstration(path) as demonstration:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""C++ and Python take the same bytes for the same thing. 100 000 datagrams: differential.py."""
+"""The decoders in C++ and Python must agree. differential.py compares 100 000 datagrams."""
 
 import os
 from pathlib import Path

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The worker whose solver is DOLFINx, beside the reference engine on the same mesh."""
+"""Compares the worker with DOLFINx to the reference engine on the same mesh."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from front import HAND, SECRET, Front, mpirun, running
 from processes import EXAMPLES, PROGRAMS
 
 BLOCK = EXAMPLES / "dolfinx_block.py"
-COMPILED_S = 240  # DOLFINx compiles its forms at the first start on a machine
+COMPILED_S = 240  # DOLFINx compiles its forms at the first start
 
-# Where the hand is, along the block's face; m.
+# Places of the hand on the block's face, m.
 MIDDLE, ASIDE, OFF = (0.0, 0.0), (0.01, -0.02), (0.06, 0.0)
 
 REFERENCE = """
@@ -40,7 +40,7 @@ pytestmark = pytest.mark.skipif(
 
 
 def pressed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, *command: str | Path, depth: float = 1e-3) -> list[float]:
-    """The stiffness that the worker answers at each place, N/m; its forces must be those of a spring."""
+    """Returns the stiffness at each place, N/m. The forces must be those of a linear spring."""
     front = Front("unix", tmp_path)
     monkeypatch.setenv("TENDON_WORKER_ADDRESS", front.address)
     monkeypatch.setenv("TENDON_WORKER_SECRET", SECRET)
@@ -64,14 +64,15 @@ def pressed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, *command: str | Pat
 def test_the_block_is_as_stiff_as_that_of_the_reference_engine(tmp_path, monkeypatch):
     middle, aside, off = pressed(tmp_path, monkeypatch, sys.executable, BLOCK)
     assert middle == pytest.approx(420.2, rel=0.03)  # B1: tests/clients/softbody/pressed_block.h
-    assert 0.9 * middle < aside < middle  # nearer to the free sides
+    assert 0.9 * middle < aside < middle  # softer near the free sides
     assert off == 0
     engine = PROGRAMS / "tendon-softbody"
     if not engine.exists():
         pytest.skip(f"{engine} is not built; TENDON_PROGRAMS names another folder")
     (tmp_path / "block.toml").write_text(REFERENCE, encoding="utf-8")
     told = subprocess.run([engine, "explain", tmp_path / "block.toml", "--json"], capture_output=True, check=True)
-    assert middle == pytest.approx(json.loads(told.stdout)["k_n_per_m"], rel=2e-3)  # the patch is integrated otherwise
+    # the patch is integrated differently
+    assert middle == pytest.approx(json.loads(told.stdout)["k_n_per_m"], rel=2e-3)
 
 
 def test_two_ranks_answer_as_one(tmp_path, monkeypatch):

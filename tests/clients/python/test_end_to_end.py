@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The client and a real tendond on loopback."""
+"""Tests the client with a real tendond on loopback."""
 
 from __future__ import annotations
 
@@ -17,7 +17,8 @@ from tendon import Client, Config, DeviceState, Phase, RefusedForGood, Role, Tou
 STIFFNESS = 2000
 
 LEASED = '[[channel]]\nname = "tissue"\nlease_ms = 300\n[network]\ncontroller_timeout_ms = 60000\n'
-"""Of a scene: whoever sends no force for 0.3 s loses the channel to one that asks, and his session only after a minute."""
+"""A client that sends no force for 0.3 s loses the channel if another asks for it. Its session lasts a minute longer.
+"""
 
 
 def wall(hand: DeviceState) -> Touch:
@@ -25,7 +26,7 @@ def wall(hand: DeviceState) -> Touch:
 
 
 def felt(hand: DeviceState) -> bool:
-    """The device says so itself: this is the force it gives out."""
+    """Returns whether the device reports an applied force."""
     return hand.force_applied[0] < -0.5
 
 
@@ -189,7 +190,7 @@ def test_an_observer_with_json_is_told_of_the_loop_and_of_the_engine(tmp_path):
     with Server(tmp_path) as server, example(tmp_path, "virtual_wall", "--server", server.address), example(
         tmp_path, "echo_motion", "--server", server.address, "--json", "--duration-s", "60"
     ) as echo:
-        while True:  # the first report may be of a time before the engine came
+        while True:  # the first report may precede the engine
             device = json.loads(echo.wait_for_line('{"device":'))["device"]
             assert sum(device["lateness_us_log2"]) == device["steps"] > 0
             assert device["safety"] == "unguarded"
@@ -223,7 +224,7 @@ def test_a_device_that_is_not_there_is_refused_for_good(tmp_path):
 
 def test_a_hanging_engine_loses_its_lease_is_told_and_takes_it_back(tmp_path):
     def waits_until(client, has_come_true):
-        """Lets it live until then."""
+        """Runs the client until the condition is true."""
         for _ in range(300):
             list(client.states(0.1))
             if has_come_true():
@@ -235,7 +236,7 @@ def test_a_hanging_engine_loses_its_lease_is_told_and_takes_it_back(tmp_path):
         second = Client(server.address, Config(name="second", channel="tissue", take_lease=True))
         with first, second:
             assert next(first.states(30)) and first.holds
-            # From here on `first` hangs.
+            # `first` stops answering here.
             for hand in second.states(30):
                 second.send(hand, wall(hand))
                 if felt(hand):
@@ -282,7 +283,7 @@ def test_a_key_that_is_not_there_is_said_and_leaves_with_1(tmp_path):
 
 @pytest.fixture
 def keys(tmp_path):
-    """A folder with wall.key and screen.key, the latter an observer's."""
+    """A folder with wall.key and screen.key, which is an observer's."""
     folder = tmp_path / "keys"
     folder.mkdir()
     for words in (["wall"], ["screen", "--observer"]):

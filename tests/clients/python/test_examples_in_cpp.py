@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The rendering examples in C++: the same as those in Python, for the same hands, options and mistakes."""
+"""The rendering examples in C++ must agree with those in Python for the same states, options and errors."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def built(program: Path) -> Path:
 
 
 def wandering(devices: list[str], seed: int) -> Iterator[Hand]:
-    """Hands that wander through the space in which the examples happen: |x| and |y| up to 35 mm, |z| up to 10 mm."""
+    """Yields hands that move within the workspace of the examples: |x|, |y| ≤ 35 mm and |z| ≤ 10 mm."""
     dice = random.Random(seed)
     at = {device: (0.0, 0.0, 0.0) for device in devices}
     for _ in range(150):
@@ -49,7 +49,7 @@ def wandering(devices: list[str], seed: int) -> Iterator[Hand]:
 
 
 def flat(touch: Touch) -> list[float]:
-    """Force and, where one is sent, nine numbers of stiffness."""
+    """Returns the force and, if it is sent, the nine elements of the stiffness."""
     stiffness = touch.stiffness
     if stiffness is None:
         return list(touch.force)
@@ -99,7 +99,7 @@ def test_cpp_answers_as_python_does(physics_of: Callable[..., Physics], name, ar
 @pytest.mark.parametrize("name", RENDERING)
 def test_both_languages_have_the_same_options(name):
     def options(help_text: str) -> set[str]:
-        # A thread that never sleeps is C++'s alone.
+        # Only the C++ examples can wait without sleeping.
         return set(re.findall(r"--[a-z][a-z-]*", help_text)) - {"--version", "--busy"}
 
     cpp = subprocess.run([built(PROGRAMS / name), "--help"], capture_output=True, text=True, timeout=60, check=True)
@@ -144,7 +144,7 @@ def test_the_gallery_shows_each_example_with_a_command_in_both_languages():
         python = "/usr/bin/python3 clients/python/examples/"
         in_python = [word.replace("build/release/bin/", python) for word in commands[:1]]
         assert commands == [commands[0], in_python[0].replace(name, f"{name}.py")]
-    # A worker shows nothing by itself: a front starts it.
+    # Workers are excluded, because they need a server to start them.
     guests = {path.stem for path in EXAMPLES.glob("*.py") if "worker.run(" not in path.read_text()}
     assert {path.stem for path in IN_CPP.glob("*.cc")} == guests
     assert {path.stem for path in IN_CPP.glob("*.cc")} == {*RENDERING, "echo_motion", "robot"}
@@ -152,11 +152,11 @@ def test_the_gallery_shows_each_example_with_a_command_in_both_languages():
 
 @pytest.fixture
 def draw(monkeypatch: pytest.MonkeyPatch) -> Callable[..., int]:
-    """clients/examples/draw, whose runs last 1.8 s: the exit code."""
+    """Runs clients/examples/draw for 1.8 s. Returns the exit code."""
     loader = SourceFileLoader("draw", str(ROOT / "clients" / "examples" / "draw"))
     module = module_from_spec(spec_from_loader("draw", loader))  # type: ignore[arg-type]
     monkeypatch.setattr(sys, "dont_write_bytecode", True)
-    monkeypatch.setitem(sys.modules, "draw", module)  # dataclasses look there
+    monkeypatch.setitem(sys.modules, "draw", module)  # required by dataclasses
     loader.exec_module(module)
 
     def run(name: str, *options: str | Path) -> int:
@@ -187,7 +187,7 @@ def test_draw_fails_when_the_hand_has_felt_nothing(draw, tmp_path):
 
 
 def test_a_hand_feels_each_cpp_example_through_a_server(tmp_path):
-    """All examples run at the same time. Each has its own device."""
+    """All examples run concurrently, each with its own device."""
     names = sorted(set(RENDERING) - {"two_hands"})
     with contextlib.ExitStack() as stack:
         server = stack.enter_context(Server(tmp_path, scenes={name: scene("right") for name in names}))
@@ -202,7 +202,7 @@ def test_a_hand_feels_each_cpp_example_through_a_server(tmp_path):
 
 @pytest.mark.parametrize("command", [["cpp"], ["python"]], ids=["C++", "Python"])
 def test_two_hands_feel_each_other_through_one_rod(tmp_path, command):
-    """The left hand stays where it is. The right one moves by ± 10 mm along the rod: both are pushed and pulled."""
+    """The left hand rests. The right one moves by ± 10 mm along the rod, so both are pushed and pulled."""
     program = [built(PROGRAMS / "two_hands")] if command == ["cpp"] else [sys.executable, EXAMPLES / "two_hands.py"]
     echo = [sys.executable, EXAMPLES / "echo_motion.py", "--json", "--rate-hz", "0"]
     still = scene("left").replace("amplitude_mm = 15", "amplitude_mm = 0")
@@ -214,6 +214,6 @@ def test_two_hands_feel_each_other_through_one_rod(tmp_path, command):
             for device in ("left", "right"):
                 with Process(tmp_path, [*echo, "--server", server.address, "--device", device, "--duration-s", "30"]) as look:
                     least, most = 0.0, 0.0
-                    while least > -0.5 or most < 0.5:  # one period of 1.25 s, or this waits in vain
+                    while least > -0.5 or most < 0.5:  # one period of 1.25 s
                         wanted = json.loads(look.wait_for_line('{"tick"'))["force_wanted_n"]
                         least, most = (of([here, *wanted[:1]]) for of, here in ((min, least), (max, most)))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A robot that follows a hand: the cases that C++ and TypeScript pass too, and the client's part of it."""
+"""The cases in tests/clients/follower_cases.json, which the C++ and TypeScript clients run as well."""
 
 from __future__ import annotations
 

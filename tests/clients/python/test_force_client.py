@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a guest does, against a stand-in server over virtual networks: the behaviour of clients/cpp/force_client.h."""
+"""Tests the client with a stand-in server on virtual networks, as specified in clients/cpp/force_client.h."""
 
 from __future__ import annotations
 
@@ -151,7 +151,7 @@ def test_attempts_are_given_up_after_2_s_and_wait_twice_as_long_each_time():
     stage.run(30 * SECOND)
     hellos = [decode_hello(datagram).random for datagram in stage.world.there.delivered]
     assert stage.client.stats.attempts == len(set(hellos))
-    # 2 s each, and between them 0.1, 0.2, 0.4, 0.8, 1.6, 2, 2 … s.
+    # Attempts of 2 s, separated by 0.1, 0.2, 0.4, 0.8, 1.6, 2, 2 … s.
     assert stage.client.stats.attempts == 10
 
 
@@ -221,7 +221,7 @@ def test_states_are_handed_out_on_the_grid_of_the_rate():
     stage = Stage(Config(rate_hz=100))
     stage.run(500 * MS)
     stats = stage.client.stats
-    ticks = [hand.tick for hand in stage.seen[1:]]  # the first one comes when it comes
+    ticks = [hand.tick for hand in stage.seen[1:]]  # the first state is not on the grid
     assert {later - earlier for earlier, later in zip(ticks, ticks[1:])} == {10}
     assert stats.states == len(stage.seen) + stats.states_skipped + (stage.client.next_state_due() != inf)
 
@@ -373,7 +373,7 @@ def test_a_force_that_is_not_usable_is_counted_and_not_sent(touch):
     stage.run(300 * MS)
     assert stage.forces == []
     assert stage.client.stats.forces_unusable == len(stage.seen) > 15
-    finite = all(abs(component) < inf for component in touch.force)  # NaN is not
+    finite = all(abs(component) < inf for component in touch.force)  # false for NaN
     assert ("the force is not finite" in stage.client.stats.unusable) is not finite
 
 
@@ -491,7 +491,7 @@ def test_a_key_does_not_show_in_what_is_printed():
 
 
 def sparse(every: int) -> Stage:
-    """A hand that moves at 0.1 m/s, of which the server sends one state in `every`."""
+    """Returns a stage with a hand that moves at 0.1 m/s. The server sends one state in `every`."""
     stage = Stage(Config(rate_hz=500, state_deadband=KEPT))
     stage.every = every
     stage.speed = 0.1
@@ -517,7 +517,7 @@ def test_states_that_were_left_out_are_foretold_at_the_callbacks_rate():
 def test_nothing_is_foretold_beyond_the_longest_silence():
     stage = sparse(200)
     stage.run(1 * SECOND)
-    assert 5 * 8 < len(stage.seen) < 5 * 12 + 2  # 20 ms of every 200
+    assert 5 * 8 < len(stage.seen) < 5 * 12 + 2  # 20 ms of each 200 ms
 
 
 def test_no_state_is_predicted_for_a_server_without_deadbands():

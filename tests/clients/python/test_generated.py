@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What protocol/generator makes of tendon.proto."""
+"""Tests the output of protocol/generator for tendon.proto."""
 
 import shutil
 import sys

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""deploy/scenes/grasp.toml: two hands at two devices hold one liver, which another process simulates."""
+"""deploy/scenes/grasp.toml: two hands at two devices grasp a simulated liver."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def test_two_hands_hold_one_liver_and_are_answered_together(tmp_path, servers):
         with Process(tmp_path, command) as engine:
             for _ in range(2):
                 engine.wait_for_line("connected to")
-            # It squeezes, and both are answered for a second; or a line with such a force is waited for in vain.
+            # Waits until the engine has squeezed the liver and both hands have been answered for a second.
             with Process(tmp_path, [*ECHO, "--server", addresses[1], "--device", "right", "--duration-s", "30"]) as look:
                 first, last, squeezed = None, 0, False
                 while not squeezed or last - first < 1000:
@@ -47,5 +47,6 @@ def test_two_hands_hold_one_liver_and_are_answered_together(tmp_path, servers):
     said = [json.loads(line)["summary"] for line in engine.said if line.startswith('{"summary"')]
     forces = {summary["device"]: summary["forces"] for summary in said}
     assert forces["left"] > 0 and all(summary["forces_unusable"] == 0 for summary in said), said
-    # Both in one turn: only those before the other was there are of one hand alone.
+    # Both hands are answered in the same turn, so the counts only differ by the states before the second hand was
+    # present.
     assert abs(forces["left"] - forces["right"]) <= 10, forces

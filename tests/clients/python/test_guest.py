@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Addresses, and what a socket may report."""
+"""Addresses, name resolution and socket errors."""
 
 import asyncio
 import errno
@@ -32,7 +32,7 @@ def test_anything_else_is_told_what_is_expected(text):
 
 
 class Socket:
-    """A socket whose next receptions and sendings are these."""
+    """A socket with scripted results."""
 
     def __init__(self, *received):
         self.received = list(received)
@@ -74,7 +74,7 @@ def test_a_flood_of_reports_does_not_keep_it_from_sending():
 
 
 def test_a_datagram_found_late_in_a_turn_is_not_taken_for_older(monkeypatch):
-    """A process that loses its processor in the middle of a turn: the round trip would look short by as much."""
+    """If the process is preempted within a turn, an old receive time would make the round trip too short."""
     it = guest(b"one", b"two")
     times = iter([2, 9])
     it.clock = lambda: next(times)
@@ -131,7 +131,7 @@ def place(host):
 
 
 def looked_up(monkeypatch, *answers):
-    """What the system says to one look-up after the other; an OSError is raised."""
+    """Replaces the look-up of names. Each call returns the next answer, or raises it if it is an OSError."""
     answers = list(answers)
     done = threading.Event()
 
@@ -148,7 +148,7 @@ def looked_up(monkeypatch, *answers):
 
 
 def peer_after_an_attempt(it, now):
-    """Where the guest sends to once the attempt that began at `now` was not answered."""
+    """Returns the address to which the client sends after the attempt that began at `now` has failed."""
     it.turn(now + int(Config().patience_s * 1e9))
     assert it.core.phase is Phase.UNANSWERED
     it.turn(now + int(Config().patience_s * 1e9))
@@ -192,7 +192,7 @@ def test_an_address_is_never_looked_up_again(monkeypatch):
 
 
 def answered(client, answers):
-    """Gives the client's answers to states that are 10 ms apart."""
+    """Passes the client's answers to states 10 ms apart."""
     for i, touch in enumerate(answers):
         client.answer(SimpleNamespace(sampled_ns=5_000_000_000 + 10_000_000 * i), touch)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a handle can do more than move: orientation, torque, gripper."""
+"""Orientation, torque and gripper of a handle."""
 
 from __future__ import annotations
 

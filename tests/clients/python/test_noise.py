@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Cipher suites 1 and 2 against themselves; test_vectors.py has the public vectors."""
+"""Cipher suites 1 and 2 with both roles in Python. test_vectors.py has the public vectors."""
 
 
 import pytest
@@ -27,7 +27,8 @@ def test_a_changed_bit_of_the_answer_is_refused_and_the_good_one_opens():
     answer, _ = responder.reply(bytes(31) + b"\2", b"welcome")
     for bit in range(8 * len(answer)):
         if bit == 255:
-            continue  # X25519 ignores the highest bit of a point (RFC 7748), but the hash does not: see below
+            # X25519 ignores the highest bit of a point (RFC 7748), but the handshake hash includes it: see below
+            continue
         forged = bytearray(answer)
         forged[bit // 8] ^= 1 << bit % 8
         assert initiator.read(bytes(forged)) is None, bit

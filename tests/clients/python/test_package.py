@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The package as strangers get it: generated code, types, a wheel, examples, a page."""
+"""The package as users install it: generated code, types, wheel, examples and README."""
 
 import os
 import re
@@ -30,7 +30,7 @@ def run(*command, **options):
 
 
 def test_the_generated_code_is_that_of_tendon_proto(tmp_path):
-    """After a change of tendon.proto: protocol/generate."""
+    """After a change of tendon.proto, run protocol/generate."""
     if shutil.which("protoc") is None:
         pytest.skip("no protoc: apt-get install protobuf-compiler")
     described = tmp_path / "tendon.bin"
@@ -38,7 +38,7 @@ def test_the_generated_code_is_that_of_tendon_proto(tmp_path):
     (file,) = FileDescriptorSet.FromString(described.read_bytes()).file
     for message in file.message_type:
         for field in message.field:
-            field.ClearField("json_name")  # protoc writes it down here and leaves it out there
+            field.ClearField("json_name")  # protoc sets it in descriptor sets but not in generated code
     assert tendon_pb2.DESCRIPTOR.serialized_pb == file.SerializeToString(), "stale; run protocol/generate"
 
 
@@ -57,7 +57,7 @@ def test_an_example_is_a_program(example):
 
 
 def test_a_python_without_the_packages_is_told_both_remedies(tmp_path):
-    """As with conda, pyenv or uv: the first python3 of the path does not have Debian's packages."""
+    """With conda, pyenv or uv, the first python3 in the path lacks Debian's packages."""
     run(sys.executable, "-m", "venv", "--without-pip", tmp_path / "venv")
     other = tmp_path / "venv" / "bin"
     environment = os.environ | {"PATH": f"{other}:{os.environ['PATH']}", "PYTHONPATH": str(PACKAGE)}
@@ -74,14 +74,14 @@ def test_the_types_are_right():
     mypy = shutil.which("mypy")
     if mypy is None:
         pytest.skip("no mypy: apt-get install mypy")
-    built = os.environ.get("TENDON_TEST_PROGRAMS")  # the folder of mypy's cache
+    built = os.environ.get("TENDON_TEST_PROGRAMS")
     run(mypy, *([f"--cache-dir={built}/mypy"] if built else ["--no-incremental"]), cwd=PACKAGE)
 
 
 def test_a_wheel_holds_the_package_with_its_types(tmp_path):
     if not all(map(find_spec, ("pip", "setuptools", "wheel"))):
         pytest.skip("no pip, setuptools or wheel: apt-get install python3-pip python3-wheel")
-    source = tmp_path / "source"  # setuptools leaves things behind
+    source = tmp_path / "source"  # setuptools writes to the source folder
     shutil.copytree(PACKAGE, source, ignore=shutil.ignore_patterns("__pycache__", "*.egg-info", "build"))
     run(sys.executable, "-m", "pip", "wheel", "--no-build-isolation", "--no-deps", "--no-index", "-w", tmp_path, source)
     (wheel,) = tmp_path.glob("*.whl")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The rendering examples: what each makes a hand feel, without a server and with one."""
+"""Tests the forces of the rendering examples, with and without a server."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ RENDERING = [
 
 @pytest.fixture
 def physics_of(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Physics]:
-    """The haptic function of an example, as it is called with these arguments."""
+    """Returns the physics function of an example for the given arguments."""
 
     def load(name: str, *arguments: str) -> Physics:
         taken: list[Any] = []
@@ -50,7 +50,7 @@ def hand(position: Iterable[float], velocity: Iterable[float] = (0, 0, 0)) -> De
 
 
 def work(physics: Physics, path: list[tuple[float, float, float]]) -> float:
-    """J that the hand gets on this path."""
+    """Returns the work on the hand along this path, J."""
     total, before = 0.0, path[0]
     for at in path[1:]:
         middle = [(a + b) / 2 for a, b in zip(before, at)]
@@ -112,7 +112,7 @@ def test_the_table_carries_and_slips_at_coulombs_limit(physics_of):
     table = physics_of("friction_surface")
     normal = table(hand((0, 0, 0))).force[1]
     assert normal == pytest.approx(2)
-    assert table(hand((0.0001, 0, 0))).force[0] == pytest.approx(-0.05)  # it sticks: a spring of 500 N/m
+    assert table(hand((0.0001, 0, 0))).force[0] == pytest.approx(-0.05)  # sticks: a spring of 500 N/m
     for i in range(100):
         force = table(hand((0.0001 * i, 0, 0.0002 * i))).force
         assert hypot(force[0], force[2]) <= 0.5 * normal * (1 + 1e-12)
@@ -144,7 +144,7 @@ def test_the_maze_lets_through_its_rooms_and_not_through_its_walls(physics_of):
     for at in line((0, 0, 0), (-0.008, 0, 0), (-0.008, 0.008, 0), (-0.024, 0.008, 0), (-0.024, -0.008, 0)):
         assert maze(hand(at)).force[:2] == [0, 0], at
     maze = physics_of("maze")
-    for x in range(1, 27):  # on and on to the right, against the wall whose face is at 12 mm
+    for x in range(1, 27):  # keeps moving right, against the wall at 12 mm
         force = maze(hand((0.001 * x, 0, 0))).force
         assert force[0] == pytest.approx(-1200 * max(0.0, 0.001 * x - 0.012)), x
 
@@ -153,13 +153,13 @@ def test_a_hand_that_slides_along_a_wall_meets_the_next_one(physics_of):
     maze = physics_of("maze")
     for at in line((0, 0, 0), (0.008, 0, 0), (0.008, 0.0125, 0), (0.027, 0.0125, 0)):
         force = maze(hand(at)).force
-    assert force[:2] == [0, pytest.approx(-0.6)]  # pressed half a millimetre into the wall at 12 mm
+    assert force[:2] == [0, pytest.approx(-0.6)]  # 0.5 mm inside the wall at 12 mm
     for at in line((0.027, 0.0125, 0), (0.03, 0.0125, 0), (0.03, -0.008, 0)):
         force = maze(hand(at)).force
-    assert force[:2] == [pytest.approx(-2.4), 0]  # 2 mm into the wall at 28 mm, and all along it
+    assert force[:2] == [pytest.approx(-2.4), 0]  # 2 mm inside the wall at 28 mm, and along it
     for at in line((0.03, -0.008, 0), (0.03, 0, 0), (0.016, 0, 0)):
         force = maze(hand(at)).force
-    assert force[0] == pytest.approx(1200 * 0.004)  # from the right into the block in the middle
+    assert force[0] == pytest.approx(1200 * 0.004)  # from the right into the block at the center
 
 
 def test_a_full_turn_around_the_magnet_costs_nothing(physics_of):
@@ -169,7 +169,7 @@ def test_a_full_turn_around_the_magnet_costs_nothing(physics_of):
 
 def test_the_rod_pulls_both_hands_with_one_force_along_itself(physics_of):
     rod = physics_of("two_hands", "--stiffness-n-per-m", "400", "--length-mm", "200")
-    assert rod["left"](hand((0, 0, 0))).force == (0, 0, 0)  # the other hand does not hold it yet
+    assert rod["left"](hand((0, 0, 0))).force == (0, 0, 0)  # the other hand does not hold the rod yet
     assert rod["right"](hand((0, 0, 0))).force == pytest.approx([0, 0, 0], abs=1e-9)  # at rest
     pulled = rod["right"](hand((0.01, 0, 0))).force
     assert pulled == pytest.approx([-4, 0, 0])  # 10 mm too long
@@ -191,8 +191,8 @@ def test_the_rods_stiffness_is_its_forces_slope(physics_of):
 
 
 def test_a_hand_feels_each_example_through_a_server(tmp_path):
-    """All examples run at the same time. Each has its own device."""
-    names = [name for name in RENDERING if name != "two_hands"]  # which wants two devices: test_examples_in_cpp.py
+    """All examples run concurrently, each with its own device."""
+    names = [name for name in RENDERING if name != "two_hands"]  # needs two devices; tested in test_examples_in_cpp.py
     with contextlib.ExitStack() as stack:
         server = stack.enter_context(Server(tmp_path, scenes={name: scene("right") for name in names}))
         engines = {}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A session over good and bad networks: what SESSION.md promises. Every world has a seed."""
+"""The guarantees of SESSION.md over good and bad networks with fixed seeds."""
 
 from __future__ import annotations
 
@@ -121,7 +121,7 @@ def test_the_same_seed_gives_the_same_world():
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_no_damage_done_to_a_sealed_datagram_is_believed(seed):
-    """One of both sessions hears everything twice: once damaged, once as it was."""
+    """One of the sessions receives each datagram twice, first damaged and then intact."""
     dice = random.Random(seed)
     it = world(PERFECT, seed, "sealed")
     genuine = it.a.receive

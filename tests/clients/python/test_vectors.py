@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""protocol/vectors: what every client must be able to make, and to take apart."""
+"""Checks that the client produces and reads the bytes of protocol/vectors."""
 
 import hmac
 import json
@@ -27,7 +27,7 @@ def load(name):
 
 
 def unhex(value):
-    """All hexadecimal texts of one level as bytes."""
+    """Decodes the hexadecimal strings of one level."""
     words = ("body", "cookie", "datagram", "ephemeral", "hash", "key", "key_id", "prologue", "psk", "random")
     return {
         name: bytes.fromhex(text) if isinstance(text, str) and name.endswith(words) else text
@@ -113,7 +113,8 @@ def handshake(file, now=0):
     if file["suite"]:
         suites = (Suite.AES_GCM, Suite.NOISE) if file["suite"] == 2 else (Suite.NOISE,)
         secret = {"key": file["psk"], "ephemeral": file["client_ephemeral"], "suites": suites}
-        words = tuple(word for word in hello.features if word != SUITE_NAMES[Suite.AES_GCM])  # the client adds it
+        # added by the client itself
+        words = tuple(word for word in hello.features if word != SUITE_NAMES[Suite.AES_GCM])
         hello = replace(hello, features=words)
     return ClientHandshake(hello, file["client_random"], now, **secret)
 
@@ -191,7 +192,7 @@ def test_a_datagram_is_written_and_read_as_it_is_here(file, vector):
 
 
 def is_taken(vector):
-    """Whether the codec takes a body with every value that is in it."""
+    """Returns whether the codec accepts all values in the body."""
     body = bytes.fromhex(vector["body"])
     if vector["message"] == "Hello":
         return codec.read_hello(body) is not None

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The bytes of WIRE.md are what this client writes, and what it reads."""
+"""Checks that the client writes and reads the golden datagrams in WIRE.md."""
 
 from dataclasses import replace
 from math import inf, nan
@@ -365,7 +365,7 @@ def test_a_datagram_of_1200_bytes_is_read_and_none_of_1201():
 
 
 def out_of_bounds():
-    """Frames with one value beyond the page's bounds, by what is wrong with them."""
+    """Yields frames with one value out of bounds, by the name of the violation."""
 
     def state(**changes):
         values = {name: getattr(STATE, name) for name in DeviceState.__slots__}
@@ -502,7 +502,7 @@ def test_a_value_out_of_bounds_drops_its_frame_and_no_other(frame):
     assert (content.invalid, content.frames[-1]) == (1, Bye(Code.OK))
     if not isinstance(frame, (Control, ControlAck)) or frame.id == 0:
         assert content.frames[:-1] == []
-    elif isinstance(frame, Control):  # which has to be answered
+    elif isinstance(frame, Control):  # a request must be answered
         [control] = content.frames[:-1]
         assert (control.id, control.request, control.invalid != "") == (frame.id, None, True)
     else:
@@ -516,7 +516,7 @@ def test_no_bound_on_the_force_is_infinity():
 
 
 def test_64_frames_are_read_and_65_are_malformed():
-    empty = b"\x1a\x00"  # a frame of a newer peer
+    empty = b"\x1a\x00"  # a frame type of a future version
     assert codec.read_data(codec.write_data_head(1, None) + 64 * empty) == codec.DataContent(1, None, [], 0)
     assert codec.read_data(codec.write_data_head(1, None) + 65 * empty) is None
 

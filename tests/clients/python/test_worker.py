@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A worker in Python: beside a front in Python, on several ranks, and judged by tendon-conformance."""
+"""Workers in Python: with a front in Python, on several ranks, and under tendon-conformance."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def front(request, tmp_path, monkeypatch):
 
 
 class Running(threading.Thread):
-    """run() in a thread; `end()` gives the exception that came out of it, or None."""
+    """Runs run() in a thread. `end()` returns its exception or None."""
 
     def __init__(self, answer, comm=None):
         super().__init__(daemon=True)
@@ -212,7 +212,7 @@ def test_where_no_front_listens_the_error_names_the_place(front):
 
 
 class Rank:
-    """One of several ranks that are threads: what run() needs of mpi4py's communicators."""
+    """One of several ranks, which are threads, with the interface of mpi4py that run() uses."""
 
     def __init__(self, number: int, mail: list[Queue]) -> None:
         self.number = number
@@ -325,7 +325,7 @@ BROKEN = "import os, sys, time\nimport tendon\nrun = tendon.worker.run\n"
 
 @contextmanager
 def judging(folder: Path, *command: str | Path) -> Iterator[Callable[[], dict[str, str]]]:
-    """The kit at work; the function gives the result of each check."""
+    """Runs tendon-conformance. The function that it yields returns the result of each check."""
     kit = PROGRAMS / "tendon-conformance"
     if not kit.exists():
         pytest.skip(f"{kit} is not built; TENDON_PROGRAMS names another folder")
@@ -351,7 +351,7 @@ def failed_checks(verdicts: dict[str, str]) -> list[str]:
 
 @pytest.fixture(scope="module")
 def of_an_endless_worker(tmp_path_factory):
-    """This worker hangs when its second stream ends. The kit's patience of 10 s passes while others are judged."""
+    """A worker that hangs when its second stream ends. The timeout of 10 s runs while the others are tested."""
     folder = tmp_path_factory.mktemp("endless")
     program = "run(lambda hand: None)\nif os.environ['TENDON_WORKER_ADDRESS'].startswith('tcp:'): time.sleep(100)\n"
     (folder / "broken.py").write_text(BROKEN + program, encoding="utf-8")

@@ -54,7 +54,7 @@ setTimeout(() => process.exit(0), 1000 * Number(after("--duration-s")));
 
 
 class Floor:
-    """The stand-in of the floor: no session at all."""
+    """The server for the floor, without a session."""
 
     def __init__(self) -> None:
         self._state = b""
@@ -72,13 +72,13 @@ class Floor:
 
 
 class Server:
-    """The stand-in of a client."""
+    """The server for a client."""
 
     def __init__(self, key: bytes | None) -> None:
         self._server = StandIn(key)
 
     def receive(self, now: int, datagram: bytes) -> int | None:
-        """The tick that it answers."""
+        """Returns the tick that the datagram answers, if any."""
         server = self._server
         server.receive(now, datagram)
         answered = None
@@ -101,7 +101,7 @@ class Server:
 
 
 def serve(program: list[str], server: Floor | Server, seconds: float) -> tuple[int, list[int]]:
-    """States sent, and the turnaround of each that was answered, ns."""
+    """Returns the number of states sent and the turnaround of each answered state, ns."""
     peer = None
     sent: dict[int, int] = {}
     turnarounds: list[int] = []
@@ -153,7 +153,6 @@ def main() -> int:
     key_file.write_text(f"controller {key.hex()}\n", encoding="utf-8")
     wall = [sys.executable, str(EXAMPLES / "virtual_wall.py")]
     asynchronous = [sys.executable, str(Path(__file__).parent / "turnaround_aio.py")]
-    # Program, its key, and its floor.
     clients: dict[str, tuple[list[str], bytes | None, str]] = {
         PYTHON_FLOOR: ([sys.executable, "-c", FLOOR], None, PYTHON_FLOOR),
         "C++": ([str(options.programs / "virtual_wall")], None, PYTHON_FLOOR),

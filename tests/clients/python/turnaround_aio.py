@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The wall of virtual_wall.py in an event loop, for turnaround.py."""
+"""The wall of virtual_wall.py in an asyncio event loop, for turnaround.py."""
 
 from __future__ import annotations
 

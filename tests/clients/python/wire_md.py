@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The golden datagrams of protocol/WIRE.md, read from the page itself."""
+"""Reads the golden datagrams in protocol/WIRE.md."""
 
 import re
 from pathlib import Path
@@ -8,7 +8,7 @@ PAGE = Path(__file__).resolve().parents[3] / "protocol" / "WIRE.md"
 
 
 def golden_datagrams(page: str) -> dict[str, bytes]:
-    """Name → bytes. `00 x9` is nine zeros; what follows a semicolon says what the bytes mean."""
+    """Returns the bytes by name. `00 x9` is nine zeros; a semicolon begins a comment."""
     datagrams = {}
     for name, block in re.findall(r"^```golden (\S+)\n(.*?)^```", page, re.MULTILINE | re.DOTALL):
         datagram = bytearray()

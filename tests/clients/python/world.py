@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Two ends and a bad network between them, in virtual time that hops to whatever is due next."""
+"""A client, a server and a bad network between them on virtual time, which advances to the next event."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ SECOND = 1000 * MS
 
 @dataclass
 class Weather:
-    """What one direction of the network does. Bad by default."""
+    """Delay, jitter and loss of one direction of the network."""
 
     delay: int = 20 * MS
-    jitter: int = 10 * MS  # uniform in [0, jitter) is added: datagrams overtake each other
+    jitter: int = 10 * MS  # uniform in [0, jitter), so datagrams are reordered
     loss: float = 0.05
     duplicate: float = 0.05
 
@@ -66,7 +66,7 @@ class Direction:
 
 
 class World:
-    """A is the client's end, Z the server's, whose clock is another one. The same seed gives the same world."""
+    """A is the client and Z the server, whose clock has an offset. The same seed reproduces the same run."""
 
     OFFSET = 1234 * 3600 * SECOND + 56789
     START = 100 * SECOND
@@ -78,7 +78,7 @@ class World:
         self.back = Direction(weather, f"back {seed}")
 
     def run(self, length: int, each_turn: Callable[[], Instant]) -> None:
-        """`each_turn` does what the owners of both ends do, and says when they want to do more."""
+        """`each_turn` runs the users of both peers and returns the time of their next turn."""
         end = self.now + length
         while True:
             due = self._turn(each_turn)

@@ -296,7 +296,7 @@ TEST(PlacedBody, ABodyWithTimeAdvancesByTheTimeBetweenSamples) {
   const Vec3 at_once = seldom.answer(hand_at(4e-4, std::chrono::milliseconds(10))).force;
   EXPECT_LT((force - at_once).norm(), 1e-9);
   EXPECT_LT(force.x(), -0.01);
-  // A long pause counts as the maximum step, and time that goes backward does not stop the body.
+  // A long pause is skipped without catching up, and time that goes backward does not stop the body.
   const Vec3 after_a_pause = often.answer(hand_at(4e-4, std::chrono::seconds(100))).force;
   EXPECT_EQ(after_a_pause, seldom.answer(hand_at(4e-4, std::chrono::seconds(1))).force);
   EXPECT_TRUE(often.answer(hand_at(4e-4, Duration(0))).force.allFinite());

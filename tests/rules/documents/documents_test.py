@@ -21,18 +21,18 @@ import subprocess
 import sys
 import tempfile
 
-# Commands that another machine, or a reader's own choice, decides on.
+# Placeholders, for example for addresses and files.
 PLACEHOLDER = re.compile(r"[A-Z]{2,}|…|\.\.\.|<.*>|\*")
 EXAMPLE = r"echo_motion|friction_surface|magnet|maze|texture|two_hands|virtual_fixture|virtual_wall|viscous_field"
 PROGRAM = re.compile(rf"^(tendond|tendon-[a-z-]+|{EXAMPLE}|falcon-server)$")
 SCRIPT = re.compile(r"^(deploy/[a-z-]+|tests/[a-z/]+/[a-z]+\.sh)$")
 PYTHON = re.compile(r"^(\S*/)?python3?$")
-# A program in a code span, and the next span, which is a verb of it: `tendon-lab`: `compare` (...).
+# A program in a code span, followed by one of its subcommands in the next: `tendon-lab`: `compare` (...).
 VERB_AFTER = re.compile(r"`(tendon[a-z-]*)`: `([a-z]+)`")
 
 
 def commands(text):
-    """(line number, command) of each command line, a comment or output beside it left out."""
+    """Yields (line number, command) for each command line, without trailing comments."""
     fence = None
     for number, line in enumerate(text.splitlines(), 1):
         mark = re.match(r"^\s*```(\S*)", line)
@@ -106,7 +106,7 @@ def wrong_python(line, root):
     if not script.is_file():
         return f"there is no {named[0]}"
     is_example = "clients/python/examples" in named[0]
-    is_command = is_example or len(line) > 1  # other names of files are only mentioned
+    is_command = is_example or len(line) > 1  # other file names are not commands
     if is_command and line[0] == named[0] and not os.access(script, os.X_OK):
         return f"{named[0]} is not executable"
     if not is_example or "worker.run(" in script.read_text(encoding="utf-8"):
@@ -134,7 +134,7 @@ def left_out(build):
 
 
 def wrong(command, root, folders):
-    """What is wrong with a command line of ours, in words; empty when nothing is, or when it is not ours."""
+    """Returns what is wrong with a command of this project, or an empty string."""
     found = words(command)
     if not found:
         return ""
@@ -192,7 +192,7 @@ def main():
     checked = 0
     complaints = []
     for document in listed:
-        if document == "CHANGELOG.md":  # tells of what was, too
+        if document == "CHANGELOG.md":  # describes old versions as well
             continue
         for number, command in commands((root / document).read_text(encoding="utf-8")):
             found = words(command)

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The rules of language that a machine can hold, over all files of the tree:
+"""Checks rules about the language of all files in the repository:
 
-    columns   prose of Markdown pages has at most 120 columns (wrap.py wraps it)
-    name      a test's name has at most 70 characters: in C++ suite, dot and name; in TypeScript and JavaScript the title
-              of each test or group; in Python the function's name
-    cleft     no sentence of a page or a comment begins with "Of what", or is of the form "What … is …."
+    columns   prose in Markdown pages has at most 120 columns (wrap.py wraps it)
+    name      the name of a test has at most 70 characters: in C++ suite, dot and name; in TypeScript and JavaScript
+              the title of each test or group; in Python the name of the function
+    cleft     no sentence of a page or a comment begins with "Of what", or has the form "What … is …."
 """
 
 import pathlib
@@ -15,7 +15,7 @@ import sys
 sys.dont_write_bytecode = True
 import wrap  # noqa: E402
 
-NOT_PROSE = ("CHANGELOG.md", "tests/tools/bench/RESULTS.md")  # what was said then; written by a program
+NOT_PROSE = ("CHANGELOG.md", "tests/tools/bench/RESULTS.md")  # a history; the output of a program
 TEST = re.compile(r"^\s*(?:TEST|TEST_F|TEST_P|TYPED_TEST|TYPED_TEST_P|RC_GTEST_PROP)\(\s*(\w+),\s*(\w+)", re.M)
 TITLE = re.compile(r"(?<![.\w])(?:test|it|describe)(?:\.(?:only|skip|todo))?\(\s*([\"'`])((?:(?!\1)[^\\]|\\.)*)\1")
 FUNCTION = re.compile(r"^\s*(?:async )?def (test\w*)", re.M)
@@ -23,7 +23,7 @@ COMMENT = {
     **dict.fromkeys((".h", ".cc", ".ts", ".js", ".mjs", ".proto"), re.compile(r"^\s*(?://[/<!]*|/?\*+/?)\s?(.*)|//[/<]*\s(.*)")),
     **dict.fromkeys((".py", ".sh", ".cmake", ".toml", ".txt"), re.compile(r"^\s*#+\s?(.*)")),
 }
-# A clause of its own, which may have its verb: "What follows the header; empty when it is not authentic."
+# A clause that may contain its own verb: "What follows the header; empty when it is not authentic."
 _PLAIN = r"(?:(?!\b(?:when|as|if|that|who|which|where|whether|has|have)\b)[^.?!:;|])*?"
 _BE = r"(?:is|are|was|were)"
 _NOUN = r"(?:an?|the|in|no|not|what|that|to|on|at|as|there)\b"
@@ -35,7 +35,7 @@ CLEFT = re.compile(
 
 
 def paragraphs(path, text):
-    """(line, words) of each paragraph of a page, or of each comment of a source."""
+    """Yields (line, text) of each paragraph of a page, or of each comment of a source."""
     lines = text.split("\n")
     if path.endswith(".md"):
         at = 1
@@ -63,7 +63,7 @@ def paragraphs(path, text):
 
 
 def test_names(path, text):
-    """(offset, name) of each test of a source."""
+    """Returns (offset, name) of each test in a source."""
     if path.endswith(".cc"):
         return [(found.start(2), f"{found[1]}.{found[2]}") for found in TEST.finditer(text)]
     if path.startswith("tests/") and path.endswith((".ts", ".mjs")):
@@ -74,7 +74,7 @@ def test_names(path, text):
 
 
 def broken(path, text):
-    """(rule, line, words) of all that breaks a rule in one file."""
+    """Yields (rule, line, text) of each violation in a file."""
     if path.endswith(".md") and path not in NOT_PROSE:
         for number in wrap.too_long(text):
             yield "columns", number, "more than 120 columns; run tests/rules/documents/wrap.py " + path
@@ -88,7 +88,7 @@ def broken(path, text):
 
 
 def check_the_rules():
-    """The rules find what they are for, and let other sentences be."""
+    """Each rule must find its violations and accept other sentences."""
 
     def rules(path, text):
         return [rule for rule, _, _ in broken(path, text)]

@@ -3,7 +3,7 @@
 """Wraps the prose of Markdown pages at 120 columns, in place.
 
 Only blocks with a line that is too long are wrapped again: paragraphs, list items and quotes. Tables, code, headings,
-HTML, and lines that end in a hard break stay as they are. Code spans and links are never divided.
+HTML, and lines that end in a hard break are not changed. Code spans and links are never divided.
 
     tests/rules/documents/wrap.py README.md protocol/*.md
 """
@@ -18,19 +18,19 @@ _FENCE = re.compile(r"\s*(```|~~~)")
 _ITEM = re.compile(r"(\s*(?:[-*+]|\d+[.)])\s+)(.*)", re.S)
 _QUOTE = re.compile(r"(\s*>\s?)(.*)", re.S)
 _VERBATIM = re.compile(r"\s*(\||#|<|\[[^\]]+\]:\s|(?:[-*_]\s*){3,}$|=+$)")
-# One unbreakable piece: a code span, a link or image with its address, or a run without blanks.
+# An unbreakable piece: a code span, a link or image with its address, or text without blanks.
 _PIECE = re.compile(r"(?:``[^`]*(?:`[^`]+)*``|`[^`]*`|!?\[[^\]\[]*\]\([^)]*\)|[^\s`\[]|[`\[])+")
-# At the front of a line this would begin an item, a heading, a quote, a table or a rule.
+# At the beginning of a line, these would begin an item, a heading, a quote, a table or a rule.
 _MARK = re.compile(r"[-*+]$|#+$|=+$|-+$|\d+[.)]$|[>|]")
 
 
 def is_verbatim(line: str) -> bool:
-    """A line that is no prose: a heading, a row of a table, HTML, the address of a link, a rule."""
+    """Returns whether a line is not prose: a heading, a table row, HTML, a link definition or a rule."""
     return bool(_VERBATIM.match(line))
 
 
 def wrap_block(lines: list[str], columns: int = COLUMNS) -> list[str]:
-    """One paragraph, list item or quote, of which `lines` are all. The first line's mark tells the indent of the rest."""
+    """Wraps a paragraph, a list item or a quote. The mark of the first line determines the indent of the others."""
     if max(map(len, lines)) <= columns or any(line.endswith(("  ", "\\")) for line in lines[:-1]):
         return lines
     first, rest = lines[0], lines[1:]
@@ -59,7 +59,7 @@ def wrap_block(lines: list[str], columns: int = COLUMNS) -> list[str]:
 
 
 def blocks(text: str):
-    """Yields (is prose, lines) for all of the page, in order."""
+    """Yields (is prose, lines) for the whole page in order."""
     prose: list[str] = []
     fence = front = False
     for number, line in enumerate(text.split("\n")):
@@ -72,7 +72,7 @@ def blocks(text: str):
         if fence or is_fence or front or not line.strip() or is_verbatim(line):
             yield False, [line]
         elif not prose and line.startswith("    ") and not _ITEM.match(line):
-            yield False, [line]  # code by its indent, or the rest of an item after a blank line
+            yield False, [line]  # indented code, or the rest of an item after a blank line
         else:
             prose.append(line)
         fence ^= is_fence
@@ -85,7 +85,7 @@ def wrap(text: str, columns: int = COLUMNS) -> str:
 
 
 def too_long(text: str, columns: int = COLUMNS) -> list[int]:
-    """Numbers of the lines of prose that are too long and that wrapping makes shorter."""
+    """Returns the numbers of the lines of prose that are too long and can be wrapped."""
     numbers, at = [], 1
     for prose, lines in blocks(text):
         if prose and wrap_block(lines, columns) != lines:

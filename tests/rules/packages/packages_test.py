@@ -30,8 +30,9 @@ def mirror(source, target, hidden):
 
 
 def put(folder, target, words):
-    """Copies the files of `folder`. The text of NAME.link is the target of a symbolic link NAME: not every copy of a
-    repository keeps symbolic links."""
+    """Copies the files of `folder`. NAME.link contains the target of a symbolic link NAME, because some copies of a
+    repository do not preserve symbolic links.
+    """
     for file in (path for path in folder.rglob("*") if path.is_file()):
         made = target / file.relative_to(folder)
         made.parent.mkdir(parents=True, exist_ok=True)

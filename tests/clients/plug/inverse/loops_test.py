@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Loops as the clients of the service have them, through tendon-plug and a real tendond, with the library that they use
-(python3-websockets). No code of theirs is here; what they read and write is."""
+"""Runs the loops of typical clients of the service against tendon-plug inverse and a real tendond.
+
+The loops read and write the same data as those clients, with the same library (python3-websockets), but contain none
+of their code.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +25,7 @@ from processes import PROGRAMS, Process, Server, scene  # noqa: E402
 
 
 class Bridge(Process):
-    """tendon-plug inverse on a port of its own."""
+    """tendon-plug inverse on a free port."""
 
     def __init__(self, folder: Path, server: str, *more: str) -> None:
         program = PROGRAMS / "tendon-plug"
@@ -33,8 +36,9 @@ class Bridge(Process):
 
 
 class ArmAndGrip:
-    """As Isaac Lab's device class: a thread that reads one message, keeps what it needs, sends a force under `values`,
-    and sleeps; whoever made it waits 5 s for an arm *and* a grip."""
+    """Follows the device class of Isaac Lab. A thread reads a message, copies the values, sends a force and sleeps. The
+    constructor waits up to 5 s for an arm and a grip.
+    """
 
     def __init__(self, uri: str, hz: float = 200.0) -> None:
         self._uri, self._hz = uri, hz
@@ -124,7 +128,7 @@ def test_orientation_and_buttons_reach_it(tmp_path):
             assert sum(q * q for q in device.quaternion) == pytest.approx(1, abs=1e-6)
         finally:
             device.close()
-    # The button is held from 1 s after the start on: a reader that comes earlier sees it.
+    # The button is pressed from 1 s on, so that readers that connect earlier can see it.
     text = scene("handle").replace("from_ms = 1000\nfor_ms = 300", "from_ms = 1000\nfor_ms = 60000")
     with Server(tmp_path, scenes={"right": text}) as server, Bridge(tmp_path, server.address) as bridge:
         device = ArmAndGrip(bridge.uri)
@@ -135,7 +139,7 @@ def test_orientation_and_buttons_reach_it(tmp_path):
 
 
 async def steps_until_nothing(uri: str, act) -> int:
-    """Looks on while somebody else pushes, and then calls `act`; haptic steps until the device gives out nothing."""
+    """Observes until a force is applied, calls `act`, and returns the haptic steps until the force is zero."""
     async with websockets.connect(uri) as socket:
         first = json.loads(await socket.recv())
         device = first["inverse3"][0]["device_id"]
@@ -143,7 +147,7 @@ async def steps_until_nothing(uri: str, act) -> int:
         probe = json.dumps({"inverse3": [{"device_id": device, "commands": {"probe_position": {}}}]})
 
         async def look() -> tuple[float, int]:
-            # The bridge is connected before the device has told its first state: until then there is none to read.
+            # The bridge may connect before the first state of the device arrives.
             while True:
                 await socket.send(probe)
                 news = json.loads(await socket.recv())
@@ -168,8 +172,8 @@ async def steps_until_nothing(uri: str, act) -> int:
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
 def test_a_program_that_is_killed_or_frozen_with_force_on_is_let_go(tmp_path, number):
-    """Its force is fresh for 100 ms, and the ladder ends it 250 ms after that. Half a second more for a machine that
-    pauses."""
+    """The force is valid for 100 ms, and the fade ends 250 ms later. Half a second is allowed for pauses of the machine.
+    """
     with Server(tmp_path) as server, Bridge(tmp_path, server.address) as bridge:
         command = ["/usr/bin/python3", HERE / "old_program.py", bridge.uri, "0.5", "500"]
         with Process(tmp_path, command) as program:

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""old_program.py URI NEWTONS HZ: a program as the service's tutorials show it, in the client library that they use. It
-pushes the hand up. It sends bytes, as programs with a fast JSON library do."""
+"""old_program.py URI NEWTONS HZ: pushes the hand up with the code of the service's tutorials and their client library.
+
+It sends bytes instead of text, as programs with a fast JSON library do.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +27,7 @@ async def main(uri: str, newtons: float, hz: float) -> None:
             await socket.send(json.dumps(message).encode())
             state = json.loads(await socket.recv())["inverse3"][0]["state"]
             print(state["cursor_position"], state["current_cursor_force"], flush=True)
-            message.pop("session", None)  # once
+            message.pop("session", None)
             await asyncio.sleep(1 / hz)
 
 

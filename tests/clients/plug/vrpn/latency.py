@@ -39,7 +39,7 @@ while True:
 
 
 def stamped(one: socket.socket) -> tuple[bytes, tuple[str, int], int]:
-    """A datagram, its sender, and when it arrived, ns."""
+    """Receives a datagram. Returns its bytes, its sender and the kernel's time stamp, ns."""
     data, ancillary, _, sender = one.recvmsg(2048, 64)
     for level, kind, value in ancillary:
         if level == socket.SOL_SOCKET and kind == SO_TIMESTAMPNS:
@@ -77,7 +77,7 @@ def floor(samples: int) -> list[int]:
 
 
 class Network:
-    """The way between tendon-plug and tendond: a socket for each of the plug's sessions."""
+    """Forwards datagrams between tendon-plug and tendond, with a socket for each session of tendon-plug."""
 
     def __init__(self, target: str) -> None:
         self.target = host_and_port(target)
@@ -86,8 +86,8 @@ class Network:
         self.address = "127.0.0.1:%d" % self.face.getsockname()[1]
         self.poses: list[int] = []
         self.forces: list[int] = []
-        self.handed = 0  # ns, a state to the plug
-        self.asked = 0  # ns, a field to the plug
+        self.handed = 0  # ns, when a state was passed to tendon-plug
+        self.asked = 0  # ns, when a force field was sent to it
 
     def turn(self, client: Client | None, timeout: float) -> None:
         sockets = [self.face, *self.backs.values()]
@@ -105,7 +105,7 @@ class Network:
             elif client and one is client.udp:
                 try:
                     _, _, at = stamped(one)
-                except BlockingIOError:  # the client has just read it, with its stream
+                except BlockingIOError:  # the client has read it together with its stream
                     continue
                 if self.handed:
                     self.poses.append(at - self.handed)
@@ -131,7 +131,7 @@ def main() -> None:
             end = time.monotonic() + 2
             while time.monotonic() < end:
                 network.turn(None, 0.01)
-            # The client's constructor waits: meanwhile the network rests, which it survives.
+            # The constructor blocks, so no datagram is forwarded meanwhile, which the sessions survive.
             client = Client(between.address())
             assert client.udp is not None
             client.udp.setsockopt(socket.SOL_SOCKET, SO_TIMESTAMPNS, 1)
@@ -146,7 +146,7 @@ def main() -> None:
                 while not network.handed:
                     network.turn(client, 0.01)
                 half = time.time_ns() + 500_000
-                while (left := half - time.time_ns()) > 0:  # asleep: who has been busy is interrupted sooner
+                while (left := half - time.time_ns()) > 0:  # sleeps, because the scheduler delays busy processes
                     network.turn(client, left / 1e9)
                 n += 1
                 network.asked = time.time_ns()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""tendon-plug vrpn against a client that was written from VRPN.md alone, on real sockets."""
+"""Tests tendon-plug vrpn with a client that was written from VRPN.md alone, over real sockets."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ def test_poses_come_and_forces_are_felt_by_every_way(stage, by_hello, udp):
         pose = client.wait(POSE, lambda pose: pose[3] > 1e-3)
         assert abs(pose[2]) < 1e-3 and abs(pose[4]) < 1e-3, pose
         assert pose[5:9] == (0, 0, 0, 1)
-        while udp and client.by_datagram == 0:  # what came before by the stream is read first
+        while udp and client.by_datagram == 0:  # poses sent earlier by the stream are read first
             assert time.monotonic() < end
             client.wait(POSE)
         assert (client.by_datagram > 0) == udp
@@ -89,7 +89,7 @@ def test_poses_come_and_forces_are_felt_by_every_way(stage, by_hello, udp):
 
 def test_numbers_change_at_any_time_and_descriptions_may_be_late(stage):
     with Client(stage.address, by_hello=False, describe=False) as client:
-        for seed in range(5):  # nonsense, before anything is described
+        for seed in range(5):  # messages with undefined types
             client.send(seed, 7 * seed, field(force=(0, 1, 0)))
         for _ in range(3):
             client.describe("Phantom0")
@@ -123,13 +123,13 @@ def test_an_update_rate_is_this_clients_own(stage):
                 client.read(0.001)
                 counts[i] += sum(1 for one in client.inbox if one[1] == POSE)
                 client.inbox.clear()
-        assert counts[1] > 8 * counts[0] > 0, counts  # 20 to 1, and the machine pauses
+        assert counts[1] > 8 * counts[0] > 0, counts  # the ratio is 20, less on a machine that pauses
 
 
 def test_nothing_is_dialled_that_the_hello_names(stage):
-    """The text says 127.0.0.2, the datagram comes from 127.0.0.1."""
+    """The text names 127.0.0.2, but the datagram comes from 127.0.0.1."""
     other = socket.create_server(("127.0.0.2", 0))
-    other.settimeout(0.2)  # ours has been dialled by now, and so would this one
+    other.settimeout(0.2)  # a connection would arrive before that of `ours`
     ours = socket.create_server(("127.0.0.1", other.getsockname()[1]))
     ours.settimeout(30)
     lob = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -202,7 +202,7 @@ def test_the_seventeenth_program_finds_no_place_until_one_leaves(stage):
 
 @pytest.fixture(scope="module")
 def silent(stage):
-    """A connection that says nothing. The plug's patience of 3 s passes while the next test waits, too."""
+    """A connection that sends nothing. The server's timeout of 3 s runs during the next test."""
     host, _, port = stage.address.rpartition(":")
     with socket.create_connection((host, int(port)), timeout=30) as connection:
         yield connection
@@ -242,11 +242,11 @@ def test_every_state_is_one_report_and_nobody_waits_busily(stage):
         client.wait(POSE)
         before = stage.plug.counts()
         start, busy = time.monotonic(), processor_time_s(stage.plug)
-        after = stage.plug.counts()  # a second later
+        after = stage.plug.counts()
         taken, busy = time.monotonic() - start, processor_time_s(stage.plug) - busy
-    assert taken > 0.5 and busy < 0.3 * taken  # measured 0.03; a loop that does not sleep has 1
+    assert taken > 0.5 and busy < 0.3 * taken  # measured: 0.03; 1 for a loop that does not sleep
     reports = after["reports"] - before["reports"]
-    # Each line is written between the two.
+    # The counts are printed between the two.
     assert abs(reports - (after["states"] - before["states"])) <= 2
     assert reports > 500
 
@@ -258,7 +258,7 @@ def test_a_program_without_a_pause_is_felt_by_its_newest_field(stage, udp):
         before = stage.plug.counts()
         size, end = stage.plug.size(), time.monotonic() + 30
         n = 0
-        while stage.plug.size() <= size:  # until the next counts, which are thus of nothing else
+        while stage.plug.size() <= size:  # the counts then only include this loop
             assert time.monotonic() < end
             for _ in range(20):
                 n += 1
@@ -267,12 +267,12 @@ def test_a_program_without_a_pause_is_felt_by_its_newest_field(stage, udp):
             client.inbox.clear()
         after = stage.plug.last_counts()
         last = 0.1 + 1e-7 * n
-        while True:  # it goes on, because a datagram may be lost
+        while True:  # repeated, because a datagram may be lost
             client.force_field(force=(0, last, 0))
             if abs(client.wait(FORCE)[1] - last) < 1e-6:
                 break
     states = after["states"] - before["states"]
-    # Of states that come at once, while it is busy with fields, it reports the newest.
+    # If several states arrive at once, only the newest is reported.
     assert 0.8 * states < after["reports"] - before["reports"] <= states + 2
     assert after["skipped"] > before["skipped"]
     assert after["forces"] - before["forces"] < 7 * states
@@ -295,7 +295,7 @@ def test_a_stylus_its_button_and_its_gripper_are_seen(tmp_path):
     scene = (ROOT / "deploy" / "scenes" / "handle.toml").read_text()
     with server(tmp_path, scene) as device, plug(tmp_path, device.address()) as between:
         with Client(between.address()) as client:
-            # The hand turns it by 45 degrees about z, which points to the user, then by 30 about y, which points up.
+            # The hand rotates it by 45° about z (to the user), then by 30° about y (up).
             turned = client.wait(POSE, lambda pose: pose[7] > 0.3)
             assert abs(turned[5]) < 0.05 and abs(turned[6]) < 0.05, turned
             assert sum(one * one for one in turned[5:9]) == pytest.approx(1, abs=1e-6)
@@ -317,7 +317,7 @@ def test_beyond_this_machine_it_listens_only_when_that_is_meant(tmp_path):
 
 
 def given_out(folder: Path, *more: str) -> dict:
-    """What tendon-report says of 2.5 s of a wall of 1000 N/m that a program of old draws 20 ms away."""
+    """Runs a wall of 1000 N/m behind a delay of 20 ms for 2.5 s. Returns the output of tendon-report."""
     scene = (ROOT / "deploy" / "scenes" / "demo.toml").read_text()
     folder.mkdir()
     with server(folder, scene, "--record", "run.mcap", *more, duration_s=2.5) as device:

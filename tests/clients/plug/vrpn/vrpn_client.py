@@ -47,7 +47,7 @@ def plane(abcd, spring=1.0, damping=0.0, dynamic=0.0, static=0.0, index=0, cycle
 
 
 def messages_in(data: bytes) -> Iterator[tuple[int, int, float, bytes, int]]:
-    """Sender, type, stamp, payload, and where the message ends."""
+    """Yields sender, type, stamp, payload, and the offset of the end of each message."""
     at = 0
     while len(data) - at >= 24:
         length, seconds, us, sender, type_, _ = HEADER.unpack_from(data, at)
@@ -60,7 +60,7 @@ def messages_in(data: bytes) -> Iterator[tuple[int, int, float, bytes, int]]:
 
 
 def numbers_in(type_name: str, payload: bytes):
-    """The payload of a server's message as numbers."""
+    """Decodes the payload of a server's message."""
     layouts = {
         "vrpn_Tracker Pos_Quat": ">2i7d",
         "vrpn_Tracker Velocity": ">2i8d",
@@ -86,8 +86,7 @@ def host_and_port(address: str) -> tuple[str, int]:
 
 
 class Client:
-    """`by_hello`: the server connects to us; else we connect. `numbers`: where ours begin, so that they are not the
-    server's."""
+    """A VRPN client. With `by_hello` the server connects to the client."""
 
     TYPES = (
         "vrpn_ForceDevice Force_Field",
@@ -132,7 +131,7 @@ class Client:
             self.udp = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
             self.udp.bind((self.tcp.getsockname()[0], 0))
             self.udp.setblocking(False)
-            self.send(self.udp.getsockname()[1], UDP, b"192.0.2.1\0")  # the text is not read
+            self.send(self.udp.getsockname()[1], UDP, b"192.0.2.1\0")  # the server ignores the text
         if describe:
             self.describe(name)
             for one in self.TYPES:
@@ -163,7 +162,7 @@ class Client:
         return data
 
     def number(self, what: str) -> int:
-        """A number of our own for a name, again another one each time."""
+        """Returns a new random number for a name."""
         taken = set(self.ours.values())
         number = next(n for n in iter(lambda: self.random.randrange(2000), None) if n not in taken)
         self.ours[what] = number
@@ -201,7 +200,7 @@ class Client:
         self.say("vrpn_ForceDevice Plane", plane(*values, **more))
 
     def read(self, timeout: float = 0.05) -> None:
-        """Takes what has come into `inbox`."""
+        """Reads all data that has arrived into `inbox`."""
         ready, _, _ = select.select([one for one in (self.tcp, self.udp) if one], [], [], timeout)
         for one in ready:
             try:
@@ -234,7 +233,7 @@ class Client:
             self.inbox.append((self.senders[sender], self.types[type_], stamp, payload))
 
     def wait(self, type_name: str, that: Callable[[tuple], bool] = lambda _: True, patience: float = 30.0):
-        """The next message of that type of ours whose numbers are so; what came before it is forgotten."""
+        """Returns the next message of this type for which `that` is true. Earlier messages are discarded."""
         end = time.monotonic() + patience
         while time.monotonic() < end and not self.closed:
             while self.inbox:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""tendond and tendon-plug on loopback, for tests and measurements. What they say goes into files of `folder`."""
+"""Starts tendond and tendon-plug on loopback for tests and measurements. Their output goes to files in `folder`."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ frequency_hz = 1
 [limiter]
 kind = "none"
 """
-"""A hand that stays where it is but for what it feels."""
+"""A hand that only moves if a force acts on it."""
 
 BUTTON = (
     STILL
@@ -41,7 +41,7 @@ BUTTON = (
 
 
 class Program:
-    """A running program; gone when the `with` is left."""
+    """A running program, which is killed at the end of the `with` block."""
 
     def __init__(self, folder: Path, name: str, *arguments: str | Path) -> None:
         self.out = folder / f"{name}-{time.monotonic_ns()}.out"
@@ -51,7 +51,7 @@ class Program:
             self.process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=out, stderr=err, cwd=folder)
 
     def wait_for(self, text: str) -> str:
-        """The first line with `text` in it, in what it has said until now or will say."""
+        """Returns the first line that contains `text`, including earlier lines."""
         end = time.monotonic() + PATIENCE_S
         while True:
             said = self.out.read_text() + self.err.read_text()
@@ -65,7 +65,7 @@ class Program:
         return str(json.loads(self.wait_for(f'"{key}":'))[key])
 
     def counts(self) -> dict:
-        """The next JSON line."""
+        """Waits for the next JSON line."""
         lines = self.out.read_text().count("\n")
         end = time.monotonic() + PATIENCE_S
         while self.out.read_text().count("\n") <= lines:
@@ -74,7 +74,7 @@ class Program:
         return self.last_counts()
 
     def last_counts(self) -> dict:
-        """The last JSON line that is whole."""
+        """Returns the last complete JSON line."""
         return dict(json.loads(self.out.read_text().rpartition("\n")[0].splitlines()[-1]))
 
     def size(self) -> int:
