@@ -119,7 +119,7 @@ TEST(HapticLoop, OfAFollowerWithFourLeadersMakesNoHeapCall) {
   LocalTime now(std::chrono::seconds(1));
   for (std::uint64_t n = 1; n <= 20'000; ++n) {
     for (std::uint32_t i = 0; i < 4; ++i) {
-      if (n % 3000 > 2500 && i == n / 3000 % 4) continue;  // stops sending
+      if (n % 3000 > 2500 && i == n / 3000 % 4) continue;
       PortState peer;
       peer.epoch = 5 + i;
       peer.sequence = n;

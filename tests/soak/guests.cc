@@ -88,7 +88,6 @@ class Home : public Link {
   int socket_;
 };
 
-/// Checks each state against those before it.
 class Promises {
  public:
   std::optional<std::string> broken(const DeviceState& state) {

@@ -50,7 +50,6 @@ class Watching {
   std::uint64_t states() const noexcept { return states_; }
   std::uint64_t sessions() const noexcept { return sessions_; }
   Duration longest_silence() const noexcept { return Duration(longest_silence_); }
-  /// The first violation, in words.
   std::optional<std::string> broken() const;
 
  private:

@@ -61,7 +61,6 @@ std::vector<std::string> operator+(std::vector<std::string> words, const std::ve
 }
 
 constexpr int kVisitors = 8;
-// Growth that is still accepted as flat.
 constexpr VitalSigns kGrowth{.resident = std::size_t{1} << 20};
 /// The proxy keeps a socket and statistics for each recent engine, so their number varies.
 constexpr VitalSigns kProxyGrowth{.resident = std::size_t{4} << 20, .files = 8};
@@ -85,13 +84,11 @@ class Program {
     process_->signal(SIGKILL);
     process_->wait();
   }
-  /// Sends SIGTERM. Returns the exit code.
   int stop() {
     process_->signal(SIGTERM);
     return process_->wait();
   }
 
-  /// Waits for the first line in the log that contains `text`.
   std::string line(const std::string& text) const {
     for (const LocalTime end = clock::now() + e2e::kPatience; clock::now() < end;
          std::this_thread::sleep_for(std::chrono::milliseconds(20))) {
@@ -134,7 +131,6 @@ class SmallDisk {
   bool mounted_ = false;
 };
 
-/// Processes that keep all processors busy.
 class Hogs {
  public:
   ~Hogs() { stop(); }
@@ -171,7 +167,6 @@ std::uint64_t rotate(const std::filesystem::path& log) {
   return size;
 }
 
-/// A program whose vital signs must stay flat.
 struct Watched {
   Watched(std::string the_name, std::unique_ptr<Program> the_program, const VitalSigns& the_growth)
       : name(std::move(the_name)), program(std::move(the_program)), growth(the_growth) {}
@@ -280,7 +275,6 @@ class Run {
     return true;
   }
 
-  /// Starts or kills the engine.
   void flap(LocalTime now) {
     if (now < next_flap_) return;
     if (engine_) {

@@ -27,13 +27,12 @@ namespace tendon::soak {
 /// Checks that memory, files and threads of the servers and the proxy are flat (VitalSigns), that no program ends
 /// early, that the haptic loop latches no fault, and that every visitor receives a state.
 struct Config {
-  std::filesystem::path folder;  ///< for output; created if missing, must be empty
+  std::filesystem::path folder;
   Duration duration = std::chrono::hours(1);
   std::uint64_t reconnects = 1'000'000;
   std::uint64_t seed = 1;
 };
 
-/// The vital signs of one program.
 struct ProgramReport {
   std::string name;
   double mb_first = 0;  ///< resident memory after a fifth of the run
@@ -43,20 +42,20 @@ struct ProgramReport {
 };
 
 struct Report {
-  std::vector<std::string> broken;  ///< violations, in words
+  std::vector<std::string> broken;
   double duration_s = 0;
   std::uint64_t steps = 0;     ///< of the server
   std::uint64_t overruns = 0;  ///< intervals of more than two periods
   double longest_interval_ms = 0;
   std::uint64_t engines_killed = 0;
-  std::uint64_t forces = 0;  ///< received by the server
+  std::uint64_t forces = 0;
   std::uint64_t sessions = 0;
   std::uint64_t vain = 0;  ///< visitors that received no state within 10 s
   std::uint64_t states_watched = 0;
   double longest_silence_ms = 0;  ///< longest interval between two states at the watcher
   std::uint64_t clock_steps = 0;
   std::uint64_t log_rotations = 0;
-  std::uint64_t log_bytes = 0;  ///< total bytes written
+  std::uint64_t log_bytes = 0;
   bool disk_was_full = false;
   std::vector<ProgramReport> programs;
 };
@@ -67,7 +66,6 @@ Report run(const Config& config, const std::function<void(double)>& progress);
 
 /// Returns {"event":"soak", …} with all fields of the report.
 std::string to_json(const Config& config, const Report& report);
-/// The same as text, one line per value.
 std::string to_text(const Report& report);
 
 }  // namespace tendon::soak

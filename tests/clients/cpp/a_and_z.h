@@ -61,7 +61,6 @@ class Network {
   std::multimap<LocalTime, Datagram> flying_;
 };
 
-/// The link of one peer.
 class Port : public Link {
  public:
   Port(Network& network, const LocalTime& now, Address self) : network_(network), now_(now), self_(self) {}
@@ -73,7 +72,7 @@ class Port : public Link {
     return network_.receive(now_, self_, from, buffer);
   }
 
-  int sent = 0;  ///< datagrams
+  int sent = 0;
 
  private:
   Network& network_;
@@ -95,8 +94,8 @@ class Server {
   bool features = true;            ///< whether the offered features are accepted
   static constexpr int kLoopHz = 1000;
   int state_hz = kLoopHz;
-  std::optional<Turning> turning;  ///< of the handle, sent in each state
-  std::uint64_t press_every = 0;   ///< button 1 is pressed in one of this many states; 0: never
+  std::optional<Turning> turning;
+  std::uint64_t press_every = 0;  ///< button 1 is pressed in one of this many states; 0: never
 
   std::vector<Code> lease_answers;  ///< answers to take_lease in order, then kOk
   int snatches = 0;                 ///< number of leases that another client takes at once

@@ -517,9 +517,9 @@ TEST(ForceClient, AForceLeavesInTheTurnThatHasComputedIt) {
     return answer(hand);
   });
   ASSERT_TRUE(world.run_until(Phase::kOpen, kSecond));
-  world.run(kSecond);  // the descriptions have arrived
+  world.run(kSecond);
   int answers = 0;
-  for (int i = 0; i < 1000; ++i) {  // Z takes one turn per millisecond
+  for (int i = 0; i < 1000; ++i) {
     world.now += milliseconds(1);
     world.z->turn(world.now);
     const int sent_before = world.a_port.sent;

@@ -11,7 +11,6 @@ using a_and_z::kFineWeather;
 using a_and_z::World;
 constexpr Duration kSecond = std::chrono::seconds(1);
 
-/// An answer with force, torque and gripper force.
 Touch answer_with_torque(const DeviceState& hand) {
   Touch touch = Vec3(-100 * hand.position);
   touch.torque = Vec3(0, 0, 0.1);

@@ -96,7 +96,7 @@ TEST(Sleeps, ABusyGuestNeverSleepsAndStillEndsInTime) {
 TEST(Sleeps, ABusyGuestHasItsTimersServed) {
   Options options;
   options.client.name = "wall";
-  options.server = "127.0.0.1:9";  // no server is there
+  options.server = "127.0.0.1:9";
   options.client.patience = options.client.retry_min = options.client.retry_max = milliseconds(5);
   options.duration = milliseconds(200);
   options.busy = true;

@@ -167,7 +167,7 @@ TEST(UdpTransport, WaitsForAnyOfSeveral) {
   std::array<std::byte, kMaxDatagram> buffer{};
   EXPECT_EQ(to_near.receive(from, buffer), 0U);
   EXPECT_EQ(to_far.receive(from, buffer), 3U);
-  UdpTransport::wait_for_any(both, Duration::zero());  // nothing is left to read
+  UdpTransport::wait_for_any(both, Duration::zero());
 }
 
 TEST(UdpTransport, HearsNobodyButItsServer) {

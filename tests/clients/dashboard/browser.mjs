@@ -42,7 +42,6 @@ export async function engage(page) {
   await page.locator("#engage:not(:disabled)").click();
 }
 export const says = (page, selector, text) => page.locator(selector, { hasText: text }).first().waitFor();
-/** Returns the number of pixels of a plot that are not empty. */
 export const painted = (page, selector) =>
   page.locator(selector).first().evaluate((canvas) => {
     const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);

@@ -58,7 +58,6 @@ it("shows a server, its device and its engine, live and as metrics", async (test
   assert.equal(loop.loop.safety, "unguarded");
   const { engines } = await find("the engine is reported", (m) => m.type === "reports" && m.engines.length > 0 && m.engines[0].round_trip_ms);
   assert.equal(engines[0].name, "virtual_wall");
-  // Each state arrived once and in order.
   const ticks = said.filter((m) => m.type === "states").flatMap((m) => m.tick);
   assert.ok(ticks.every((tick, i) => i === 0 || tick > ticks[i - 1]));
 

@@ -27,7 +27,6 @@ export const serverMessage = (devices = kDevices) => ({
   devices: devices.map((device, number) => ({ number, loop_hz: 1000, max_force_n: 8, channels: [], arming_objection: "This page only looks on.", ...device })),
 });
 
-/** Returns the state of kDevices[number] at time `t`, s. */
 function stateOf(number, t) {
   const sway = (rate, phase = 0) => Math.sin(rate * t + phase);
   const plain = { orientation: null, torque_nm: null, grip_rad: null, grip_n: null, buttons: 0 };

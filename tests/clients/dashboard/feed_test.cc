@@ -139,7 +139,7 @@ TEST_F(FeedTest, TellsOfTheCouplingOfTheWatchedDevice) {
 TEST_F(FeedTest, ReportsOnceASecond) {
   const auto page = feed_.join(now_);
   int reports = 0;
-  for (int i = 0; i < 599; ++i) {  // a little less than 10 s
+  for (int i = 0; i < 599; ++i) {
     tick();
     for (const json& text : all(page)) reports += text.at("type") == "reports" ? 1 : 0;
   }

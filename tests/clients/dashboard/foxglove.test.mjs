@@ -156,7 +156,6 @@ it("drops whole tenths of a second for one that does not read", async (test) => 
     for (const { time } of some) tenths.set(time / 100_000_000n, (tenths.get(time / 100_000_000n) ?? 0) + 1);
     return tenths;
   };
-  // The other viewer received every state that arrived.
   const tenths = tenthsOf(late);
   const whole = tenthsOf(steps);
   const parts = [...tenths].filter(([tenth, some]) => some < whole.get(tenth)).length;

@@ -16,7 +16,6 @@ namespace {
 using nlohmann::json;
 
 constexpr Duration kUnixOffset = std::chrono::seconds(1'700'000'000);
-/// Offset of the server's clock.
 constexpr Duration kAhead = std::chrono::hours(5);
 
 class FoxgloveFeedTest : public testing::Test {
@@ -57,7 +56,6 @@ class FoxgloveFeedTest : public testing::Test {
     }
     return all;
   }
-  /// Returns the channel of a topic in the last advertisement.
   std::uint32_t channel(FoxgloveFeed::ClientId client, const std::string& topic) {
     for (const json& text : told(client).texts) {
       if (text["op"] != "advertise") continue;

@@ -31,7 +31,6 @@ inline Board::Ports both_ends() {
   return ports;
 }
 
-/// A board with all optional values present.
 inline Board full_board() {
   Board board;
   Welcome welcome;

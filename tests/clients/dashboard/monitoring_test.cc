@@ -30,7 +30,6 @@ std::string read(const std::string& name) {
   return text.str();
 }
 
-/// Returns the names of all exported metrics and their labels.
 std::map<std::string, std::set<std::string>> exported() {
   const std::string text = metrics_text(full_board(), {}, {});
   static const std::regex sample(R"(^(tendon_[a-z_]+)(\{[^\n]*\})? )", std::regex::multiline);
@@ -136,7 +135,6 @@ TEST(Monitoring, PrometheusLoadsTheseAlertsAndLooksAtThemAsOftenAsItScrapes) {
   EXPECT_NE(text.find("127.0.0.1:8080"), std::string::npos);
 }
 
-/// Returns the panels in this part of a layout.
 std::set<std::string> panels_of(const nlohmann::json& part) {
   if (part.is_string()) return {part.get<std::string>()};
   std::set<std::string> all = panels_of(part.at("first"));

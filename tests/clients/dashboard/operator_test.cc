@@ -23,7 +23,6 @@ using std::chrono::milliseconds;
 using std::chrono::seconds;
 using State = Press::State;
 
-/// A handle that does not move.
 class Handle final : public Device {
  public:
   const DeviceInfo& info() const noexcept override { return info_; }
@@ -121,7 +120,6 @@ class OperatorTest : public testing::Test {
     port_->phase = PortPhase::kCoupled;
     serve(false);
   }
-  /// Runs until the press is no longer under way.
   const Press& settle() {
     for (int i = 0; i < 200 && board_.press()->state == State::kUnderWay; ++i) run(milliseconds(50));
     return *board_.press();
@@ -143,8 +141,8 @@ class OperatorTest : public testing::Test {
   int steps_ = 0;
   bool shaking_ = false;
   std::optional<PortState> port_;  ///< if set, the state of the coupling
-  bool obeys_ = true;              ///< whether the coupling obeys orders
-  bool blind_ = false;             ///< whether all messages to the observer are lost
+  bool obeys_ = true;
+  bool blind_ = false;  ///< whether all messages to the observer are lost
   Board board_;
   Observer observer_{observer_end_, server_.self, {.key = operator_key_.key, .seed = 1}, board_, now_};
   std::optional<ForceClient> engine_;

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-// Operates the page in a browser, with a running server.
 import assert from "node:assert/strict";
 import { writeFileSync } from "node:fs";
 import { join } from "node:path";
@@ -141,7 +140,6 @@ name = "operator"
 keys = "keys"
 `;
 
-/** Starts a server with keys for an engine, an operator, a colleague and a screen. */
 async function guarded(test) {
   const folder = scratch(test);
   await makeKeys(test, folder, ["engine", "operator", "colleague"]);

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-// Operates the page on recordings, in a browser.
 import assert from "node:assert/strict";
 import { closeSync, copyFileSync, openSync, readFileSync, statSync, truncateSync, writeFileSync, writeSync } from "node:fs";
 import { join } from "node:path";
@@ -10,7 +9,6 @@ import { kRoot, packageOf, Program, scratch, startDash, startServer, until } fro
 
 const { McapStreamReader, McapWriter } = packageOf("clients/dashboard/page", "@mcap/core");
 
-/** Returns the module of the page that reads damaged recordings. */
 async function salvageModule(test) {
   const ts = packageOf("clients/dashboard/page", "typescript");
   const folder = scratch(test);
@@ -22,7 +20,6 @@ async function salvageModule(test) {
   return import(join(folder, "salvage.js"));
 }
 
-/** Returns a position in an MCAP file. */
 function middleOfThirdChunk(bytes) {
   const kChunk = 6;
   const lengthAt = (at) => Number(bytes.readBigUInt64LE(at + 1));

@@ -13,10 +13,8 @@ import { fileURLToPath } from "node:url";
 export const kRoot = join(dirname(fileURLToPath(import.meta.url)), "../../..");
 const kPatienceMs = 60_000;
 
-/** Imports an npm package that is installed in the folder of one of the clients. */
 export const packageOf = (folder, name) => createRequire(join(kRoot, folder, "package.json"))(name);
 
-/** Creates a temporary folder for the test. */
 export function scratch(test) {
   const folder = mkdtempSync(join(tmpdir(), "tendon-dash-"));
   test.after(() => rmSync(folder, { recursive: true }));
@@ -47,7 +45,6 @@ export class Program {
   }
 }
 
-/** Waits for a condition that another process causes. */
 export async function until(what, done, more = () => "") {
   const deadline = performance.now() + kPatienceMs;
   for (;;) {
@@ -70,7 +67,6 @@ export async function makeKeys(test, folder, names, ...more) {
   }
 }
 
-/** Starts tendond with scenes from deploy/scenes or with scene files. */
 export async function startServer(test, folder, scenes, ...more) {
   const paths = scenes.map((scene) => (scene.endsWith(".toml") ? scene : join(kRoot, "deploy/scenes", `${scene}.toml`)));
   const program = new Program(test, "tendond", [...paths, ...(more.includes("--listen") ? [] : ["--listen", "127.0.0.1:0"]), "--json", ...more], folder);
@@ -94,7 +90,6 @@ export async function startPair(test, folder, network = "delay=10ms") {
   return { leader, follower };
 }
 
-/** Starts tendon-dash. */
 export async function startDash(test, server, ...more) {
   const program = new Program(test, "tendon-dash", ["--server", server, "--listen", "127.0.0.1:0", "--json", ...more]);
   const { address, operator_url: operatorUrl } = JSON.parse(await program.line('"listening"'));
@@ -126,7 +121,6 @@ export async function raw(address, bytes, localAddress = "127.0.0.1") {
   return answer;
 }
 
-/** Returns the value of a sample in /metrics, or undefined. */
 export async function metric(url, sample) {
   const text = await (await fetch(`${url}/metrics`)).text();
   const line = text.split("\n").find((one) => one.startsWith(`${sample} `));

@@ -17,7 +17,6 @@ export interface Column {
   readonly values: readonly (number | readonly number[])[];
 }
 
-/** Returns the columns of a Parquet file by name. */
 export function readParquetFile(path: string): Map<string, Column> {
   const { tableFromIPC } = load("apache-arrow") as {
     tableFromIPC: (bytes: Uint8Array) => {

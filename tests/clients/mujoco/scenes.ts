@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-// MJCF for several tests.
 
 export const kStiff = 'solref="0.004 1" solimp="0.99 0.999 0.0001"';
 

@@ -55,7 +55,7 @@ class World {
       turn_plugs();
       if (each) {
         each();
-        turn_plugs();  // sends the requests of this turn
+        turn_plugs();
       }
       carry();
     }
@@ -76,17 +76,15 @@ class World {
     assembly_->turn_network(0, now);
   }
 
-  /// Returns the number of datagrams that have arrived at the plugs and have not been read.
   std::size_t unread() const {
     std::size_t all = 0;
     for (const Guest& guest : guests_) all += guest.watcher->inbox.size() + guest.controller->inbox.size();
     return all;
   }
 
-  /// false: datagrams are lost
   bool connected = true;
   LocalTime now = LocalTime(std::chrono::seconds(1000));
-  StepRecord step;  ///< the newest haptic step
+  StepRecord step;
   /// J, minimum of the energy ledger; below zero, the device has given out more than it received
   double least_energy = 0;
   HandleDescription handle;  ///< used by the server from its next start on

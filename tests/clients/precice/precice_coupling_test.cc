@@ -16,7 +16,6 @@ namespace {
 /// The total stiffness in spring_body_main.cc, N/m.
 constexpr double kStiffness = 500;
 
-/// The process of the body, which ends with this object.
 class Body {
  public:
   explicit Body(const std::string& file) : pid_(::fork()) {

@@ -84,11 +84,11 @@ class Stage:
         self.requested_at: list[int] = []
         self.answers: list[ControlAck] = []  # to requests of the server
         self.grant = Code.OK
-        self.wait_ms = 0  # sent with each answer
+        self.wait_ms = 0
         self.lease_answers: list[Code] = []  # answers to TakeLease in order, then `grant`
         self.snatches = 0  # number of leases that another client takes at once
         self.speed = 0.0  # m/s
-        self.turning: Turning | None = None  # of the handle, sent in each state
+        self.turning: Turning | None = None
         self.press_every = 0  # button 1 is pressed in one of this many states; 0: never
         self.every = 1  # ms between the states that are sent
         self._next_state = World.START

@@ -53,7 +53,6 @@ void still(benchmark::State& state, ModelKind model, Element element) {
   answer(state, config);
 }
 
-/// With a tolerance of 0.5 % of the force.
 void within_half_a_percent(benchmark::State& state, ModelKind model) {
   BodyConfig config = testing::pressed_body(model, Element::kHex8Sri, static_cast<int>(state.range(0)));
   config.tolerance = 5e-3;

@@ -27,7 +27,6 @@ constexpr int kSteps = 400;           // the block is then at rest
 constexpr btScalar kDamping = 0.05F;  // Pa·s, for both moduli
 constexpr btScalar kMass = 0.5F;      // kg
 
-/// A constant downward force on the patch.
 class Press final : public btDeformableLagrangianForce {
  public:
   Press(const Patch& patch, double newtons) : patch_(patch), newtons_(newtons) {}

@@ -55,7 +55,7 @@ TEST(PlacedBody, TwoHandsAreAnsweredAtOnceEachInItsOwnDevicesFrame) {
   rigid.replace(rigid.find("patch_radius_mm"), 0, "tool = \"sphere\"\ntool_radius_mm = 10\n");
   PlacedBody body(parse_scene(rigid, "s.toml", "."));
   std::vector<std::optional<DeviceState>> hands(2);
-  hands[0].emplace().position = Vec3(0.003, 0, 0);  // 3 mm deep
+  hands[0].emplace().position = Vec3(0.003, 0, 0);
   hands[1].emplace().position = Vec3(0.003, 0.001, 0);
   const std::vector<Touch> both = body.answer(hands);
   for (const Touch& touch : both) {

@@ -22,7 +22,6 @@ inline Solid pressed_block(Element element, int n, double poisson, Law law = Law
   return {std::move(mesh), element, {.young = 1e4, .poisson = poisson}, law, fixed};
 }
 
-/// The configuration of B1 for any model.
 inline BodyConfig pressed_body(ModelKind model, Element element, int n) {
   BodyConfig config;
   config.shape = BlockShape{Vec3(0.1, 0.1, 0.05), {n, n, n / 2}};
@@ -33,7 +32,6 @@ inline BodyConfig pressed_body(ModelKind model, Element element, int n) {
   return config;
 }
 
-/// Block B1 with Newton's method, and the patch at the center of its top.
 struct PressedByNewton {
   explicit PressedByNewton(Element element, int n, Law law, int max_iterations = 30)
       : solid(pressed_block(element, n, 0.45, law)),

@@ -10,7 +10,6 @@
 
 namespace tendon::softbody::testing {
 
-/// A model that always returns the same reaction.
 class SameAnswer : public Model {
  public:
   explicit SameAnswer(Reaction reaction) : reaction_(std::move(reaction)) {}
@@ -37,7 +36,6 @@ inline Reaction whole_answer() {
   return answer;
 }
 
-/// The contact's result for a reaction on an inclined surface.
 inline Feel felt(const Reaction& answer) {
   const Solid solid = pressed_block(Element::kHex8Sri, 8, 0.45);
   const TouchSurface slanting(solid.mesh(), Vec3(0.3, -0.2, 1).normalized(), kB1PatchRadius);

@@ -39,7 +39,6 @@ async function openPage(test: TestContext, url: string, options: ClientOptions =
   return page;
 }
 
-/** Returns the status of the bridge's response. */
 async function refusal(url: string, options: ClientOptions): Promise<number> {
   const page = new WebSocket(url, options);
   page.on("error", () => {});

@@ -7,7 +7,6 @@ import { connect } from "../../../clients/typescript/src/connect.js";
 import { lookUp, NoSuchHost, parseServer, udp } from "../../../clients/typescript/src/udp.js";
 import { startNode } from "./support/program.js";
 
-/** Opens a socket on 127.0.0.1 that echoes each datagram. */
 async function echo(test: TestContext): Promise<number> {
   const socket = createSocket("udp4");
   await new Promise<void>((resolve) => socket.bind(0, "127.0.0.1", resolve));

@@ -43,7 +43,6 @@ for (const file of ["plain.json", "sealed.json", ...(kHasAes ? ["sealed_aes.json
   const vectors = readVectors(file);
   const aes: boolean = vectors.suite === 2;
   const suites = aes ? [CipherSuite.AesGcm, CipherSuite.Noise] : [CipherSuite.Noise];
-  /** The cipher suite of the handshake. */
   const opening: CipherSuite = vectors.suite === 0 ? CipherSuite.Plain : CipherSuite.Noise;
   const key: Uint8Array | undefined = vectors.psk && fromHex(vectors.psk);
   /** Returns the random bytes in the order in which the client draws them. */

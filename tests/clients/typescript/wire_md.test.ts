@@ -52,7 +52,6 @@ function contentOf(name: string): DataContent {
   return content;
 }
 
-/** Decodes and re-encodes a datagram. */
 function roundTrip(datagram: Uint8Array): Uint8Array {
   const header = decodeHeader(datagram);
   assert.ok(header);
@@ -97,7 +96,7 @@ describe("WIRE.md", () => {
 
   for (const [name, datagram] of kGolden) {
     if (decodeHeader(datagram)?.suite === 1) continue; // tested in vectors.test.ts
-    if (name === "state-columns") continue; // tested below
+    if (name === "state-columns") continue;
     it(`${name}: decoding and encoding gives the very bytes of the page`, () => {
       assert.equal(toHex(roundTrip(datagram)), toHex(datagram));
     });

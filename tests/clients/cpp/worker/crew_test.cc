@@ -25,7 +25,6 @@ constexpr int kPatienceMs = 30'000;
 
 std::string fake(const std::string& arguments) { return TENDON_FAKE_WORKER " " + arguments; }
 
-/// Waits for the next event.
 std::optional<Crew::Event> next(Crew& crew, int patience_ms = kPatienceMs) {
   for (int waited = 0;;) {
     if (auto event = crew.next()) return event;
@@ -40,7 +39,6 @@ bool opened(Crew& crew) {
   return event && std::holds_alternative<Crew::Opened>(*event);
 }
 
-/// Returns the reason for which the worker ended.
 std::string ended(Crew& crew) {
   const auto event = next(crew);
   const auto* end = event ? std::get_if<Crew::Ended>(&*event) : nullptr;

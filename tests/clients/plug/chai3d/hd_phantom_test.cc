@@ -31,7 +31,6 @@ class Library {
     return once;
   }
 
-  /// Publishes a new state of each device.
   void come() {
     ++tick_;
     for (std::size_t i = 0; i < hands_->devices; ++i) {
@@ -46,7 +45,6 @@ class Library {
     double z = 0;
     EXPECT_NE(position_(device, &x, &y, &z), 0);
   }
-  /// Returns the duration of the call.
   Duration set_force(int device = 0) {
     const double zero = 0;
     const LocalTime before = read_clock();

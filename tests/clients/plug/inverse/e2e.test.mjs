@@ -9,7 +9,6 @@ import { Program, packageOf, raw, scratch, startServer, until } from "../../dash
 
 const { WebSocket } = packageOf("clients/typescript", "ws");
 
-/** Starts tendon-plug inverse for a server. Returns its address. */
 async function startBridge(test, server, ...more) {
   const listen = ["--listen", "127.0.0.1:0", "--duration-s", "120", "--json"];
   const program = new Program(test, "tendon-plug", ["inverse", "--server", server, ...listen, ...more]);
@@ -27,7 +26,6 @@ async function startBoth(test, scene = "demo", ...more) {
 const pushing = (id, z) =>
   JSON.stringify({ inverse3: [{ device_id: id, commands: { set_cursor_force: { vector: { x: 0, y: 0, z } } } }] });
 
-/** Connects a client and waits for its first message. `got` has all messages; `next()` waits for one more. */
 async function come(test, url, options = {}) {
   const socket = new WebSocket(url, options);
   const got = [];
@@ -55,7 +53,6 @@ async function come(test, url, options = {}) {
   return { socket, got, ended, first, id, push, ask, next };
 }
 
-/** Returns the status and the message with which the server refuses a client. */
 const refusal = (url, options = {}) =>
   new Promise((resolve, reject) => {
     const socket = new WebSocket(url, options);

@@ -25,7 +25,6 @@ using std::chrono::seconds;
 /// Uniform in [0, 1). std::uniform_real_distribution may differ between standard libraries.
 double uniform(std::mt19937_64& random) { return static_cast<double>(random() >> 11) * 0x1p-53; }
 
-/// A server, a bridge, and the bridge's clients.
 struct Bridge {
   explicit Bridge(const std::string& scene, Plug::Config config = {}, const HandleDescription& handle = {})
       : world(scene, {}) {
@@ -124,7 +123,7 @@ TEST(InverseSession, OfTooManyMessagesTheOlderAreSkippedAndTheNewestIsTaken) {
   const int batch = 64;
   std::uint64_t messages = 0;
   double last = 0;
-  bridge.world.run(1000, [&] {  // 64 000 messages per second
+  bridge.world.run(1000, [&] {
     std::vector<std::string> all;
     for (int i = 0; i < batch; ++i)
       all.push_back(bridge.force(Vec3(0, 0, last = 1e-6 * static_cast<double>(++messages))));

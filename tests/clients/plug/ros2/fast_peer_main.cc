@@ -170,8 +170,8 @@ class ReaderOf final : public Reader, public dds::DataReaderListener {
   Awaited& awaited_;
   std::mutex mutex_;
   std::uint64_t count_ = 0;
-  std::uint64_t back_ = 0;            ///< messages older than the previous one
-  std::chrono::nanoseconds first_{};  ///< stamps
+  std::uint64_t back_ = 0;  ///< messages older than the previous one
+  std::chrono::nanoseconds first_{};
   std::chrono::nanoseconds newest_{};
   Clock::duration first_age_{};
   Message message_;

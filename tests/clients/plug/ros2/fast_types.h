@@ -38,7 +38,6 @@ struct PoseStamped {
   }
 };
 
-/// A twist or a wrench.
 struct TwoVectors {
   Header header;
   std::array<double, 3> first{};

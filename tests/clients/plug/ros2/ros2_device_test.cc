@@ -42,12 +42,10 @@ struct Stage {
     world.handle.buttons = {"stylus"};
     start_anew();
   }
-  /// Restarts with the current world.handle.
   void start_anew() {
     world.kill_server();
     world.open_server();
   }
-  /// Runs for `ms` milliseconds. In each, calls `program` and counts the messages that are due.
   void run(int ms, const std::function<void()>& program = nullptr) {
     world.run(ms, [&] {
       if (program) program();

@@ -153,7 +153,6 @@ class Peer : public Process {
       : Process(std::filesystem::path(TENDON_PEERS) / "fast_peer", with({"--domain", domain.text()}, more),
                 folder.path()) {}
 
-  /// Waits for a line for which `holds` returns true.
   std::string until(const std::function<bool(const std::string&)>& holds) {
     const auto patience = read_clock() + kPatience;
     while (read_clock() < patience) {

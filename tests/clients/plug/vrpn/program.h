@@ -76,7 +76,6 @@ class Program {
   static Buffer draw(const Plane& plane) { return say(Type::kPlane, plane_payload(plane)); }
 };
 
-/// A decoded message of the server, with names instead of numbers.
 struct Said {
   std::string sender;
   std::string type;
@@ -93,7 +92,6 @@ struct Said {
   }
 };
 
-/// Decodes the server's bytes.
 class Reader {
  public:
   std::vector<Said> take(Bytes bytes, bool has_cookie = false) {

@@ -21,7 +21,6 @@ namespace {
 constexpr Stamp kStamp{1'700'000'000, 250'000};
 constexpr std::uint32_t kSequence = 7;
 
-/// Returns the golden messages of VRPN.md by name.
 std::map<std::string, Buffer> golden() {
   std::ifstream file(TENDON_VRPN_MD);
   const std::string page{std::istreambuf_iterator<char>(file), {}};

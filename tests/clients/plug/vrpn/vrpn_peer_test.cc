@@ -20,7 +20,6 @@ namespace {
 
 using std::chrono::milliseconds;
 
-/// One program and two stations.
 class VrpnPeer : public testing::Test {
  protected:
   VrpnPeer() {
@@ -37,7 +36,6 @@ class VrpnPeer : public testing::Test {
     peer_.take_datagram(now_, bytes);
     peer_.end_of_batch(now_);
   }
-  /// Sends cookie, sender and types.
   void introduces_itself() {
     comes(program_.hello());
     comes(Program::description(Program::kSender, kSenderDescription, "Phantom0"));
@@ -301,7 +299,7 @@ TEST_F(VrpnPeer, TellsOfADeviceThatStopsGivingForceOnce) {
 TEST_F(VrpnPeer, OfTooManyMessagesTheNewestOfEachBatchIsTaken) {
   introduces_itself();
   double newest = 0;
-  for (int batch = 0; batch < 10; ++batch) {  // 10 000 fields within a second
+  for (int batch = 0; batch < 10; ++batch) {
     for (int i = 0; i < 1000; ++i) {
       newest += 1e-4;
       peer_.take_datagram(now_, Program::draw(ForceField{.force = Vec3(newest, 0, 0), .radius = 1}));

@@ -37,7 +37,6 @@ constexpr double kPush = -2;  // N, along x: `vrpn_client.py … press`
 /// N/ms. A fade with a time constant of 50 ms changes a force of 2 N by 0.04 N in the first millisecond.
 constexpr double kFastest = 0.05;
 
-/// Returns the steps after the last fresh force.
 std::vector<StepRecord> after_the_last_fresh_one(const Recording& recording) {
   const auto last = std::find_if(recording.steps.rbegin(), recording.steps.rend(), [](const StepRecord& step) {
     return step.mode == Mode::kActive && step.applied.x() < 0.99 * kPush;

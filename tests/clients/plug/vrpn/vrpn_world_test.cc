@@ -15,7 +15,6 @@
 namespace tendon::plug::vrpn::vrpn_world_test {
 namespace {
 
-/// A program at one station.
 class Old {
  public:
   Old(World& world, Plug& plug, Station& station, Plug::Program number)

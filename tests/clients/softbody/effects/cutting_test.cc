@@ -203,7 +203,7 @@ TEST(CutUnderLoad, TheCutItselfPutsInNoEnergyAndTheBodyThenGivesWay) {
       double energy = body.solid.energy(body.model.displacements());
       for (const Cut& next : {across(0, 0.025), across(0.025, 0.05), across(0, 0.05)}) {
         body.cut(next);
-        EXPECT_NEAR(body.solid.energy(body.model.displacements()) / energy, 1, 1e-12);  // the shape is the same
+        EXPECT_NEAR(body.solid.energy(body.model.displacements()) / energy, 1, 1e-12);
         const Reaction found = body.press(4e-3);
         EXPECT_LT(found.force, before.force);
         EXPECT_GT(found.force, 0.1 * before.force);
@@ -301,7 +301,7 @@ TEST(Factor, SplitsAreSolvedAsByANewFactorOrRefused) {
   ASSERT_TRUE(again.factorize(before));
   EXPECT_FALSE(again.split(loose, {0}));
   EXPECT_FALSE(again.split(matrix, std::vector<int>(static_cast<std::size_t>(matrix.size), 0)));
-  const MatrixXd back = again.solve(right.topRows(before.size));  // the factor has not changed
+  const MatrixXd back = again.solve(right.topRows(before.size));
   EXPECT_LT((before.times(back.col(0)) - right.col(0).head(before.size)).norm(), 1e-9);
 
   // With new values, the ordering of the grown pattern is reused and the splits are included.

@@ -64,7 +64,6 @@ bool cost_the_same(const Body& a, const Body& b) {
   return std::abs(a.cost.instructions - b.cost.instructions) <= 1e-3 * b.cost.instructions + kCopies;
 }
 
-/// Formats the table in the README.
 std::string table(const std::vector<Body>& bodies) {
   std::ostringstream text;
   text << "| model | without | gravity | inertia | damping | viscosity | friction | cutting | stiffening | "

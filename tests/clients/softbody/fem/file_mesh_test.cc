@@ -24,7 +24,6 @@
 namespace tendon::softbody::file_mesh_test {
 namespace {
 
-/// The position of an element in the block.
 struct At {
   int i, j, k;
 };
@@ -72,7 +71,6 @@ struct BlockFile {
   }
 };
 
-/// The stiffness and the warnings for a mesh file.
 class MeshOfAFile : public ::testing::Test {
  protected:
   BodyConfig body_of(const std::string& text, bool slits = false) const {

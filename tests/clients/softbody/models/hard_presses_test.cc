@@ -17,7 +17,6 @@ namespace {
 
 constexpr double kPatch = testing::kB1PatchRadius;
 
-/// A side of a body with the whole model and the near model.
 struct Side {
   Side(Solid of, const Vec3& towards_tool, const Vec3& first, double tolerance = 1e-9)
       : solid(std::move(of)),

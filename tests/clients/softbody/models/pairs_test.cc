@@ -20,7 +20,6 @@ VectorXd drawn(Dice& dice) {
   return all;
 }
 
-/// A stiffness matrix, an older one, and the inverse of the older one.
 struct Drawn {
   explicit Drawn(Dice& dice) : older(kSize, kSize), now(kSize, kSize) {
     for (double& one : older.reshaped()) one = dice.within(-1, 1);

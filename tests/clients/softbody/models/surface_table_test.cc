@@ -33,7 +33,6 @@ class SurfaceTableFile : public ::testing::Test {
   std::string reading() const {
     return thrown_by([&] { read_table(file()); });
   }
-  /// A block of n cells whose center can be touched.
   static BodyConfig block(int n) {
     BodyConfig config = pressed_body(ModelKind::kCondensed, Element::kHex8Sri, n);
     config.reach = 0.01;

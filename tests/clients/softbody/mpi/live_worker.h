@@ -10,7 +10,6 @@
 
 namespace tendon::softbody {
 
-/// Sends states to a worker one at a time and waits for each answer.
 class LiveWorker {
  public:
   /// Throws std::runtime_error if the worker is not ready after `patience_s`.

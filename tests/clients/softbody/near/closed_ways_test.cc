@@ -69,7 +69,6 @@ std::vector<Vec3> drawn_way(Dice& dice) {
   return corners;
 }
 
-/// Sums and maxima over many paths.
 struct Account {
   int ways = 0;
   int answers = 0;
@@ -149,7 +148,6 @@ Account drawn_ways(Climbed& body, int ways, std::uint64_t seed, int soonest = 1,
   return all;
 }
 
-/// Which thread computes the near fields.
 enum class Fields : std::uint8_t {
   kNone,     ///< the body is not larger than a near field
   kAnswers,  ///< the answering thread, in pieces
@@ -158,18 +156,17 @@ enum class Fields : std::uint8_t {
 
 /// Limits in units of the allowed gain.
 struct Most {
-  double given = 1;  ///< per path
+  double given = 1;
   double together = kMostTogether;
 };
 
-/// Runs both material laws.
 Account expect_nothing_given(Fields fields, int ways, const Most& most) {
   Account both;
   for (const Law law : {Law::kNeoHookean, Law::kCorotational}) {
     const PressedBefore& block = fields == Fields::kNone ? smallest_block(law) : small_block(law);
     Climbed body(block, fields == Fields::kThread);
     const Account all = drawn_ways(body, ways, 1);
-    std::cout << all << std::endl;  // progress of the long form
+    std::cout << all << std::endl;
     EXPECT_LE(all.most_given, most.given);
     EXPECT_LE(all.most_kept, most.given);
     EXPECT_LE(all.given_together(), most.together);

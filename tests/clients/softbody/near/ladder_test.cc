@@ -364,7 +364,7 @@ TEST(Ladder, AnotherThreadMakesTheFieldsForAHandUnderARung) {
 
 TEST(Ladder, WhereNoFieldIsThereYetTheLinearBodyGoesOnFromTheForceOfTheRung) {
   KnownBlock block(Law::kCorotational);
-  Elsewhere thread;  // never works
+  Elsewhere thread;
   block.near->make_fields_by(thread.background());
   const auto press = [&](const Vec2& place, double depth) {
     const double truth = block.truth(place, depth);

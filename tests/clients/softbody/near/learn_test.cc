@@ -22,7 +22,7 @@ class Learn : public ::testing::Test {
  protected:
   struct Run {
     Learned learned;
-    int told = 0;  ///< lines of progress
+    int told = 0;
   };
   Run run(Law law = Law::kNeoHookean, bool answers = true) const {
     const Solid solid = pressed_block(Element::kHex8Sri, 4, 0.45, law);

@@ -20,7 +20,6 @@ namespace {
 using testing::kB1PatchRadius;
 using testing::pressed_block;
 
-/// Block B1, the factorization of its stiffness at rest, and the load of a press on the center of its top.
 struct AtRest {
   AtRest(int n, double poisson, Law law)
       : solid(pressed_block(Element::kHex8Sri, n, poisson, law)),
@@ -69,7 +68,6 @@ struct Pressed : AtRest {
   std::unique_ptr<NearBody> body;
 };
 
-/// The part of the load on the nodes of a near body.
 VectorXd own_load(const NearBody& body, const VectorXd& load) {
   VectorXd own = VectorXd::Zero(body.size());
   for (int node = 0; 3 * node < load.size(); ++node) {

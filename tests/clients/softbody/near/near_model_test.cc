@@ -24,7 +24,6 @@ using testing::pressed_body;
 
 constexpr Law kLaws[] = {Law::kNeoHookean, Law::kCorotational, Law::kStVenantKirchhoff};
 
-/// Block B1 with a near field at its center.
 struct Near : AskedAndExact {
   Near(int n, double poisson, Law law, double tolerance = 1e-6, int modes = NearBody::Config{}.modes)
       : AskedAndExact(pressed_block(Element::kHex8Sri, n, poisson, law)),

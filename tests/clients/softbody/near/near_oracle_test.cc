@@ -28,7 +28,6 @@ using testing::kB1PatchRadius;
 using testing::pressed_block;
 using testing::pressed_body;
 
-/// Block B1 with a near field at its center and a second thread.
 struct NearBeside : AskedAndExact {
   NearBeside(int n, Law law, double tolerance = 5e-3, double poisson = 0.45)
       : AskedAndExact(pressed_block(Element::kHex8Sri, n, poisson, law)),

@@ -112,7 +112,6 @@ TEST(Polygons, ARoundingErrorBesideALineIsSeen) {
   EXPECT_EQ(wrong_with(convex, triangles_of(convex)), "");
 }
 
-/// A star with random radii.
 Flat star(Dice& dice) {
   const int count = 4 + static_cast<int>(dice.within(0, 30));  // all gaps are less than 180°
   Flat made;

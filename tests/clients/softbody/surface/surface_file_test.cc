@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests for the readers of surface files and their repairs.
 #include "clients/softbody/surface/surface_file.h"
 
 #include <gtest/gtest.h>

@@ -25,7 +25,6 @@ constexpr double kRadius = 0.01;       // m
 constexpr double kHalfLength = 0.012;  // m
 constexpr double kStiff = 1e9;         // Pa/m: compresses by 0.2 to 0.4 % of the depths here
 
-/// A block, the fine part of its top, and a capsule.
 struct Pressed {
   Pressed(double cell, double reach, double poisson = 0.45)
       : block(cell, reach, reach, poisson),

@@ -26,7 +26,6 @@ inline RigidContact::Config config_of(const Material& material, double friction 
   return config;
 }
 
-/// Block B1 and the tools that press it.
 struct PressedByTools {
   PressedByTools(Law law, std::vector<HeldTool> tools, double friction = 0, double tolerance = 1e-6)
       : solid(pressed_block(Element::kHex8Sri, 8, 0.45, law)),
@@ -75,8 +74,8 @@ struct ClosedWay {
   double work = 0;     ///< from the hand to the body, total
   double most = 0;     ///< largest intermediate value
   double turning = 0;  ///< of rotations, sum of absolute values
-  double lost = 0;     ///< by friction
-  double least = 0;    ///< smallest loss of a friction point in one answer
+  double lost = 0;
+  double least = 0;  ///< smallest loss of a friction point in one answer
 };
 /// `handle` maps [0, 1] to poses. Each answer is at the middle of its step.
 template <class Way>

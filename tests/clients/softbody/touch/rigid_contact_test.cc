@@ -63,7 +63,7 @@ TEST(RigidContact, ASphereOnAHalfSpaceIsNearHertzAndTheCondensedSphere) {
   for (const double depth : {kDeepest / 2, kDeepest}) {
     const Pose place{.position = Vec3(0, 0, kRadius - depth)};
     const Feel feel = contact.press(std::vector{std::optional(place)}).front();
-    force.push_back(4 * feel.force.z());  // a quarter is simulated
+    force.push_back(4 * feel.force.z());
     const double hertz = 4.0 / 3 * modulus * std::sqrt(kRadius) * std::pow(depth, 1.5);
     // Half of the tolerance is the mesh error: the condensed sphere differs by 3 to 5 %.
     EXPECT_NEAR(force.back() / hertz, 1, 0.1) << depth;
@@ -236,14 +236,12 @@ TEST(RigidContact, OutsideNothingIsFeltAndTheGapIsTheWayToTheLayer) {
   EXPECT_NEAR(above.gap, 0.0049, 2e-4);  // the nearest point is not below the center
   EXPECT_NEAR(above.valid_radius, above.gap, 1e-12);
   EXPECT_GT(above.normal->z(), 0.99);
-  // The same from the side.
   pressed.at(Vec3(0.08, 0, 0.07));
   pressed.at(Vec3(0.08, 0, 0.03));
   const Feel beside = pressed.at(Vec3(0.064, 0, 0.03));
   EXPECT_LT(beside.gap, 0);
   EXPECT_GT(beside.force.x(), 0.05);
   EXPECT_GT(beside.normal->x(), 0.9);
-  // After release the body is at rest.
   pressed.at(Vec3(0, 0, 0.2));
   EXPECT_LT(pressed.model.displacements().lpNorm<Eigen::Infinity>(), 1e-7);
 }
@@ -470,7 +468,7 @@ TEST(RigidScene, ItsKeysAreItsOwnAndItRefusesWhatItCannotDo) {
   EXPECT_DOUBLE_EQ(tool.scale, 0.001);
   EXPECT_DOUBLE_EQ(tool.cell, 0.0008);
   EXPECT_TRUE(turns_the_hand(spoon));
-  EXPECT_THROW(Body{spoon}, std::invalid_argument);  // the file does not exist
+  EXPECT_THROW(Body{spoon}, std::invalid_argument);
   for (const std::string& wrong : {mesh, mesh + "tool_cell_mm = 0", mesh + "tool_cell_mm = 1\ntool_edge_mm = 1",
                                    std::string("tool = \"mesh\"\ntool_cell_mm = 1\ntool_units_per_m = 1000"),
                                    std::string("tool = \"mesh\"\ntool_file = \"spoon.off\"\ntool_cell_mm = 1"),

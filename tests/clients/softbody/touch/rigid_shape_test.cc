@@ -97,11 +97,11 @@ TEST(RigidShape, ItsSignSaysWhichSideOfTheSurfaceAPointIsOn) {
   EXPECT_NEAR(capsule.distance(Vec3(0.005, 0, -0.01)).value, 0.006, 1e-15);
 
   const RigidShape box = RigidShape::box(Vec3(0.02, 0.03, 0.012), 0.002);
-  EXPECT_NEAR(box.distance(Vec3::Zero()).value, -0.006, 1e-15);  // to the nearest face
+  EXPECT_NEAR(box.distance(Vec3::Zero()).value, -0.006, 1e-15);
   EXPECT_NEAR(box.value(Vec3::Zero()), -0.006, 1e-15);
-  EXPECT_NEAR(box.distance(Vec3(0, 0, 0.007)).value, 0.001, 1e-15);   // above a face
-  EXPECT_NEAR(box.distance(Vec3(0.009, 0, 0)).value, -0.001, 1e-15);  // below a face
-  EXPECT_GT(box.distance(Vec3(0.01, 0.015, 0.006)).value, 0.001);     // where a sharp corner would be
+  EXPECT_NEAR(box.distance(Vec3(0, 0, 0.007)).value, 0.001, 1e-15);
+  EXPECT_NEAR(box.distance(Vec3(0.009, 0, 0)).value, -0.001, 1e-15);
+  EXPECT_GT(box.distance(Vec3(0.01, 0.015, 0.006)).value, 0.001);  // where a sharp corner would be
   // a rounded corner
   EXPECT_NEAR(box.distance(Vec3(0.008, 0.013, 0.004) + 0.005 * Vec3(2, 1, 2) / 3).value, 0.003, 1e-15);
   EXPECT_NEAR(box.distance(Vec3(1000, 0, 0)).value, 999.99, 1e-9);

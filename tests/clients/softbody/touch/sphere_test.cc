@@ -43,7 +43,7 @@ TEST(Sphere, OnAHalfSpaceIsWhatHertzSays) {
   std::vector<double> force;
   for (const double depth : {kDeepest / 2, kDeepest}) {
     const Feel feel = sphere.at(Vec3(0, 0, kRadius - depth));
-    force.push_back(4 * feel.force.z());  // a quarter is simulated
+    force.push_back(4 * feel.force.z());
     const double hertz = 4.0 / 3 * modulus * std::sqrt(kRadius) * std::pow(depth, 1.5);
     EXPECT_NEAR(force.back() / hertz, 1, 0.06) << depth;
     EXPECT_NEAR(4 * feel.stiffness(2, 2) / (1.5 * hertz / depth), 1, 0.08) << depth;

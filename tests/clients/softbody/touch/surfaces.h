@@ -56,7 +56,6 @@ inline Triangles box_surface(const Vec3& size) {
   return made;
 }
 
-/// Merges two surfaces.
 inline Triangles together(const Triangles& first, const Triangles& second) {
   Triangles made = first;
   const int shift = static_cast<int>(first.points.size());

@@ -53,7 +53,6 @@ export class Program {
     }
   }
 
-  /** Sends the signal, if any, and returns the exit code. */
   async end(signal?: NodeJS.Signals): Promise<number | null> {
     if (signal) this.#process.kill(signal);
     return this.#ended;
@@ -89,7 +88,6 @@ export async function startTendond(
 export const startNode = (test: TestContext, name: string, ...args: string[]): Program =>
   new Program(test, process.execPath, [join(kRoot, "clients/typescript/dist", `${name}.js`), ...args]);
 
-/** Waits for a condition that other code of this process causes. */
 export async function until(what: string, done: () => boolean): Promise<void> {
   const deadline = performance.now() + kPatienceMs;
   while (!done()) {

@@ -3,5 +3,4 @@ import { readFileSync } from "node:fs";
 import { join } from "node:path";
 import { kRoot } from "./paths.js";
 
-/** Parses a file in protocol/vectors. */
 export const readVectors = (name: string): any => JSON.parse(readFileSync(join(kRoot, "protocol/vectors", name), "utf8"));

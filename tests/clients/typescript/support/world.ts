@@ -31,7 +31,6 @@ export interface Weather {
 export const kFair: Weather = { loss: 0, delayMs: 5, jitterMs: 0, duplicates: 0 };
 export const kFoul: Weather = { loss: 0.3, delayMs: 5, jitterMs: 20, duplicates: 0.1 };
 
-/** One direction of the network. */
 class Way {
   #flying: { readonly at: Nanoseconds; readonly datagram: Uint8Array }[] = [];
   constructor(readonly world: World) {}
@@ -54,9 +53,7 @@ class Way {
   }
 }
 
-/** Behavior of the server, which a test may change at any time. */
 export interface ServerConduct {
-  /** Whether the server runs. */
   up: boolean;
   refuse: Refused | undefined;
   features: string[];
@@ -247,7 +244,6 @@ export class World {
 
 export const kPush = { x: -1, y: 0, z: 0 };
 
-/** Creates a controller that collects the received states. */
 export function controller(seed: number, weather: Weather, config: ClientConfig = {}, conduct: Partial<ServerConduct> = {}) {
   const seen: DeviceState[] = [];
   const physics = (hand: DeviceState) => {
