@@ -159,7 +159,6 @@ class Hogs {
   std::vector<pid_t> pids_;
 };
 
-/// Truncates a log while its program writes to it. Returns the previous size.
 std::uint64_t rotate(const std::filesystem::path& log) {
   const std::uint64_t size = std::filesystem::file_size(log);
   std::filesystem::copy_file(log, log.string() + ".1", std::filesystem::copy_options::overwrite_existing);

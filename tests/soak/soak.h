@@ -44,7 +44,7 @@ struct ProgramReport {
 struct Report {
   std::vector<std::string> broken;
   double duration_s = 0;
-  std::uint64_t steps = 0;     ///< of the server
+  std::uint64_t steps = 0;
   std::uint64_t overruns = 0;  ///< intervals of more than two periods
   double longest_interval_ms = 0;
   std::uint64_t engines_killed = 0;

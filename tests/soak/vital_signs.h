@@ -12,8 +12,8 @@ namespace tendon::soak {
 
 /// Memory, files and threads of a process, from /proc/PID.
 struct VitalSigns {
-  std::size_t resident = 0;  ///< bytes in memory
-  std::size_t files = 0;     ///< open descriptors
+  std::size_t resident = 0;
+  std::size_t files = 0;  ///< open descriptors
   std::size_t threads = 0;
 };
 

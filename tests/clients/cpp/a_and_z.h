@@ -91,20 +91,20 @@ class Server {
   const LinkStats& link_stats() const { return session_->stats(); }
 
   std::optional<Refused> refusal;  ///< if set, every client is refused with it
-  bool features = true;            ///< whether the offered features are accepted
+  bool features = true;
   static constexpr int kLoopHz = 1000;
   int state_hz = kLoopHz;
   std::optional<Turning> turning;
   std::uint64_t press_every = 0;  ///< button 1 is pressed in one of this many states; 0: never
 
   std::vector<Code> lease_answers;  ///< answers to take_lease in order, then kOk
-  int snatches = 0;                 ///< number of leases that another client takes at once
+  int snatches = 0;                 ///< leases that another client takes as soon as they are granted
 
   std::vector<LocalTime> attempts;  ///< one entry for each Hello with a valid cookie
   std::vector<Hello> hellos;
   std::vector<std::pair<LocalTime, ForceCommand>> forces;
   std::vector<Request> requests;  ///< requests except those for descriptions
-  std::optional<Code> closed;     ///< reason for which the last session ended
+  std::optional<Code> closed;
   int welcomes = 0;
   std::uint64_t tick = 0;
 
@@ -145,7 +145,6 @@ class World {
   void run(Duration length);
   /// Runs until A is in `phase`. Returns false after `limit`.
   bool run_until(ForceClient::Phase phase, Duration limit);
-  /// Stops Z without a Bye and starts it with a different secret.
   void restart_server() {
     kill_server();
     z.emplace(z_port, std::uint8_t{2});

@@ -15,7 +15,6 @@ export { protobuf };
 
 export const kNames = ["foxglove.sdk.v1", "foxglove.websocket.v1"];
 
-/** Returns the status with which a WebSocket to /foxglove is refused; 101: accepted. */
 export async function refusal(address, protocols, options = {}) {
   const socket = new WebSocket(`ws://${address}/foxglove`, protocols, options);
   socket.on("error", () => {});

@@ -41,7 +41,6 @@ class ObserverTest : public testing::Test {
     server_.inbox.clear();
     loop_ = std::make_unique<NetworkLoop>(config, server_, now_);
   }
-  /// Runs in steps of 1 ms. Each device takes one step in each.
   void run(Duration length) {
     for (const LocalTime end = now_ + length; now_ < end; now_ += milliseconds(1)) {
       ++tick_;

@@ -108,7 +108,7 @@ class OperatorTest : public testing::Test {
       }
     }
   }
-  /// Stands in for the coupling, which has no peer here.
+  /// Replaces the coupling, which has no peer in this test.
   void obey(const HapticOrder* order) {
     if (order != nullptr && obeys_ && order->kind == HapticOrder::Kind::kEngage) port_->phase = PortPhase::kEngaged;
     if (order != nullptr && obeys_ && order->kind == HapticOrder::Kind::kDisengage) port_->phase = PortPhase::kCoupled;
@@ -140,7 +140,7 @@ class OperatorTest : public testing::Test {
   std::optional<Assembly> loops_;
   int steps_ = 0;
   bool shaking_ = false;
-  std::optional<PortState> port_;  ///< if set, the state of the coupling
+  std::optional<PortState> port_;
   bool obeys_ = true;
   bool blind_ = false;  ///< whether all messages to the observer are lost
   Board board_;
@@ -179,7 +179,7 @@ TEST_F(OperatorTest, ArmsAndDisarmsBesideAnEngineAndLeaves) {
 }
 
 TEST_F(OperatorTest, TakesNothingFromTheHolderAndSaysWhoThatIs) {
-  serve(true, {"operator"});  // this channel needs no wait for a lease
+  serve(true, {"operator"});
   Operator& person = with(operator_key_, "main");
   start_engine(engine_key_, "main");
   run(seconds(3));

@@ -109,7 +109,6 @@ export async function fakeServer(test) {
   return { socket, arrived, address: `127.0.0.1:${socket.address().port}` };
 }
 
-/** Sends bytes over a new TCP connection from `localAddress`. Returns all bytes received until it is closed. */
 export async function raw(address, bytes, localAddress = "127.0.0.1") {
   const [host, port] = address.split(":");
   const socket = connect({ port: Number(port), host, localAddress });

@@ -175,7 +175,7 @@ describe("the stiffness", () => {
   });
 
   it("against a smooth plane is the coupling's along the normal", async (test) => {
-    const normal = [2, 3, 6].map((value) => value / 7); // in scene coordinates
+    const normal = [2, 3, 6].map((value) => value / 7);
     const more = `<geom type="plane" size="1 1 1" zaxis="2 3 6" pos="${normal.map((n) => -0.012 * n).join(" ")}" condim="1" ${kStiff}/>`;
     const { scene: held } = await load(test, scene(kBall, { more }), { rotation: kAskew });
     const [x, y, z] = toDevice(kAskew, normal.map((n) => -0.004 * n)) as [number, number, number];

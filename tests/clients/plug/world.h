@@ -85,7 +85,7 @@ class World {
   bool connected = true;
   LocalTime now = LocalTime(std::chrono::seconds(1000));
   StepRecord step;
-  /// J, minimum of the energy ledger; below zero, the device has given out more than it received
+  /// J, minimum of the energy ledger; negative if the device generates energy
   double least_energy = 0;
   HandleDescription handle;  ///< used by the server from its next start on
 

@@ -30,7 +30,7 @@ class StandIn:
         self.version = 1
         self.hellos: list[Hello] = []  # with a valid cookie, one for each attempt
         self.session: Session | None = None
-        self._answers: dict[bytes, bytes] = {}  # by client random
+        self._answers: dict[bytes, bytes] = {}
         self._to_send: list[bytes] = []
         self._welcomed = 0
 

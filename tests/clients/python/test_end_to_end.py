@@ -17,8 +17,7 @@ from tendon import Client, Config, DeviceState, Phase, RefusedForGood, Role, Tou
 STIFFNESS = 2000
 
 LEASED = '[[channel]]\nname = "tissue"\nlease_ms = 300\n[network]\ncontroller_timeout_ms = 60000\n'
-"""A client that sends no force for 0.3 s loses the channel if another asks for it. Its session lasts a minute longer.
-"""
+"""A client without a force for 0.3 s loses the channel if another asks for it. Its session times out after a minute."""
 
 
 def wall(hand: DeviceState) -> Touch:

@@ -237,7 +237,7 @@ def test_a_press_in_a_state_that_is_skipped_is_in_the_next_one_that_is_not():
 def test_after_a_pause_the_grid_starts_anew_and_nothing_is_caught_up():
     stage = Stage(Config(rate_hz=100))
     stage.run(300 * MS)
-    stage._next_state += 55 * MS  # the device pauses
+    stage._next_state += 55 * MS
     stage.run(300 * MS)
     apart = [later - earlier for earlier, later in zip(stage.seen_at[1:], stage.seen_at[2:])]
     assert len([pause for pause in apart if pause > 40 * MS]) == 1
@@ -410,7 +410,7 @@ def test_diagnostics_are_the_newest_reports_of_the_session():
     stage.run(100 * MS)
     assert stage.client.device_report == DEVICE_REPORT
     assert {channel: peer.name for channel, peer in stage.client.peer_reports.items()} == {0: "guidance", 1: "wall"}
-    stage.server.session.send(replace(DEVICE_REPORT, number=6))  # older than 7
+    stage.server.session.send(replace(DEVICE_REPORT, number=6))
     stage.server.session.send(replace(PEER_REPORT, link=replace(REPORT, number=4)))
     stage.run(100 * MS)
     assert stage.client.device_report == DEVICE_REPORT

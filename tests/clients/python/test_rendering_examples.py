@@ -92,7 +92,7 @@ def test_the_magnet_draws_in_and_most_at_its_reach(physics_of):
     magnet = physics_of("magnet", "--reach-mm", "8")
     pulls = [-magnet(hand((x / 1000, 0, 0))).force[0] for x in range(1, 30)]
     assert min(pulls) > 0
-    assert pulls.index(max(pulls)) == 7  # at 8 mm
+    assert pulls.index(max(pulls)) == 7
 
 
 def test_honey_only_takes_energy(physics_of):
@@ -117,8 +117,8 @@ def test_the_table_carries_and_slips_at_coulombs_limit(physics_of):
         force = table(hand((0.0001 * i, 0, 0.0002 * i))).force
         assert hypot(force[0], force[2]) <= 0.5 * normal * (1 + 1e-12)
     assert hypot(force[0], force[2]) == pytest.approx(0.5 * normal)
-    assert force[0] / force[2] == pytest.approx(0.5, rel=1e-3)  # against the motion
-    assert table(hand((0, 0.003, 0))).force == (0, 0, 0)  # lifted off
+    assert force[0] / force[2] == pytest.approx(0.5, rel=1e-3)
+    assert table(hand((0, 0.003, 0))).force == (0, 0, 0)
 
 
 def test_rubbing_the_table_only_takes_energy(physics_of):
@@ -170,7 +170,7 @@ def test_a_full_turn_around_the_magnet_costs_nothing(physics_of):
 def test_the_rod_pulls_both_hands_with_one_force_along_itself(physics_of):
     rod = physics_of("two_hands", "--stiffness-n-per-m", "400", "--length-mm", "200")
     assert rod["left"](hand((0, 0, 0))).force == (0, 0, 0)  # the other hand does not hold the rod yet
-    assert rod["right"](hand((0, 0, 0))).force == pytest.approx([0, 0, 0], abs=1e-9)  # at rest
+    assert rod["right"](hand((0, 0, 0))).force == pytest.approx([0, 0, 0], abs=1e-9)
     pulled = rod["right"](hand((0.01, 0, 0))).force
     assert pulled == pytest.approx([-4, 0, 0])  # 10 mm too long
     assert rod["left"](hand((0, 0, 0))).force == pytest.approx([4, 0, 0])

@@ -64,9 +64,9 @@ TEST(PlacedBody, TwoHandsAreAnsweredAtOnceEachInItsOwnDevicesFrame) {
     EXPECT_GT((*touch.stiffness)(0, 0), 50);
     ASSERT_TRUE(touch.contact);
     EXPECT_LT(touch.contact->normal.x(), -0.9);
-    EXPECT_NEAR(touch.contact->gap, -0.0031, 4e-4);  // the surface nodes are 3 mm apart
+    EXPECT_NEAR(touch.contact->gap, -0.0031, 4e-4);
   }
-  EXPECT_LT(both[0].force.y() * both[1].force.y(), 0);  // opposite sides
+  EXPECT_LT(both[0].force.y() * both[1].force.y(), 0);
   hands[1].reset();
   const std::vector<Touch> one = body.answer(hands);
   EXPECT_TRUE(one[1].unknown);

@@ -18,7 +18,6 @@ interface Pair {
   readonly z: NoiseSeal;
 }
 
-/** Two peers that renew their keys after this number of datagrams. */
 function pairOf(suite: CipherSuite, datagrams: bigint): Pair {
   const random = new Random(4);
   const [first, second] = [random.bytes(32), random.bytes(32)];

@@ -18,8 +18,8 @@ const descriptor = require("protobufjs/ext/descriptor");
 const reader = new McapStreamReader();
 reader.append(await readFile(recording));
 const [schemas, channels, types] = [new Map(), new Map(), new Map()];
-const names = new Map(); // by client random
-const guests = new Map(); // by connection id
+const names = new Map();
+const guests = new Map();
 
 function take(logTime, { connection_id: connectionId, payload, type }) {
   if (type === 1) {

@@ -50,7 +50,7 @@ Question question_in(const std::string& datagram) {
   constexpr std::size_t kHeader = 12;
   std::size_t end = kHeader;
   while (end < datagram.size() && datagram[end] != '\0') end += static_cast<unsigned char>(datagram[end]) + 1U;
-  end += 5;  // the root, type and class
+  end += 5;
   if (end > datagram.size()) throw std::runtime_error("the resolver sent no question");
   const auto at = [&](std::size_t i) { return static_cast<unsigned char>(datagram[i]); };
   return {datagram.substr(0, 2), datagram.substr(kHeader, end - kHeader),

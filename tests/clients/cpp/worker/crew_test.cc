@@ -176,7 +176,7 @@ TEST(Crew, AStrangerWithoutTheSecretDoesNotOpenTheStream) {
   const auto word = to_bytes(opening(kSecret));
   ASSERT_EQ(::write(right, word.data(), word.size()), static_cast<ssize_t>(word.size()));
   EXPECT_TRUE(opened(crew));
-  const int late = connect_to(crew.address());  // the secret is used a second time
+  const int late = connect_to(crew.address());
   ASSERT_EQ(::write(late, word.data(), word.size()), static_cast<ssize_t>(word.size()));
   EXPECT_FALSE(next(crew, 300).has_value());
   for (const int socket : {silent, wrong, right, late}) ::close(socket);

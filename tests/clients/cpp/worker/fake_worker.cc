@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// fake_worker [WAY [AFTER]] SCENE: a worker that pulls the hand to the origin. After AFTER answers it fails as WAY
-// says.
+// fake_worker [WAY [AFTER]] SCENE: a worker that pulls the hand to the origin. WAY selects how it fails after
+// AFTER answers.
 #include <unistd.h>
 
 #include <csignal>
@@ -55,7 +55,7 @@ int main(int argc, char** argv) {
              ++i) {
         }
       }
-      if (way == "shouts") stream.send({.sequence = sequence, .body = std::vector<std::byte>(2000)});  // too long
+      if (way == "shouts") stream.send({.sequence = sequence, .body = std::vector<std::byte>(2000)});
     }
     if (!stream.send(codec.answer(sequence, *hand, touch))) return 0;
   }

@@ -118,7 +118,7 @@ TEST(Front, TheDeadlineIsThreeTimesTheMedian) {
   EXPECT_EQ(played.front.stats().median, milliseconds(40));
 }
 
-/// Answers without contact take almost no time. A hand that taps a body with answers of 100 ms must feel every tap.
+/// Answers are fast without contact, but take 100 ms with contact. The hand must feel every tap.
 TEST(Front, QuickAnswersWithoutAForceDoNotMakeSlowOnesLate) {
   Played played;
   played.open();

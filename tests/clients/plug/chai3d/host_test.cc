@@ -56,7 +56,7 @@ const std::vector<Vec3> kSeen = {Vec3(-1, 0, 0), Vec3(0, -1, 0), Vec3(0, 0, 1)};
 TEST(Chai3dHost, AHandThatMovesAlongEachAxisIsSeenOnChai3dsOwn) {
   for (std::size_t axis = 0; axis < 3; ++axis) {
     Theatre theatre("demo_parts.toml", {"device.hand.motion.direction=" + kDirections[axis]}, kWooden);
-    theatre.run(500);  // the sine of 0.5 Hz is at its peak
+    theatre.run(500);
     const Vec3 seen(theatre.hand.position.data());
     EXPECT_GT(seen.dot(kSeen[axis]), 0.010) << axis;
     EXPECT_LT((seen - seen.dot(kSeen[axis]) * kSeen[axis]).norm(), 0.001) << axis;
@@ -120,7 +120,7 @@ TEST(Chai3dHost, AForceThatIsReadLateIsOldAndNotSent) {
                    .count = 1,
                    .open = 1,
                    .force = {0, 0, 0.5}};
-  theatre.world.run(60);  // the bridge's process was stopped
+  theatre.world.run(60);
   theatre.hands->device[0].asked.put(theatre.asked);
   theatre.run(100);
   EXPECT_EQ(theatre.plug.owner(), 0U);

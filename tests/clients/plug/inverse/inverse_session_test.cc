@@ -235,10 +235,10 @@ TEST(InverseSession, APressBetweenTwoRepliesIsInTheNextOneAndInNoLaterOne) {
   Bridge bridge("handle.toml");
   const auto client = bridge.client();
   const auto held = [&] { return grip(bridge.say(*client, kProbe)).at("buttons").at("a").get<bool>(); };
-  bridge.world.run(1800, [&] { client->see(bridge.world.now); });  // until 1.9 s; the press of 300 ms began at 1 s
+  bridge.world.run(1800, [&] { client->see(bridge.world.now); });
   EXPECT_TRUE(held());
   EXPECT_FALSE(held());
-  bridge.world.run(500, [&] { client->see(bridge.world.now); });  // the press of 50 ms begins at 2 s
+  bridge.world.run(500, [&] { client->see(bridge.world.now); });
   EXPECT_TRUE(held());
   EXPECT_FALSE(held());
 }

@@ -115,8 +115,8 @@ struct Awaited {
   Clock::time_point since{};
   bool waiting = false;
   Delays delays;
-  std::optional<Clock::time_point> stopped;  ///< time of the last command
-  std::optional<Clock::duration> let_go;     ///< from then until the force was zero
+  std::optional<Clock::time_point> stopped;
+  std::optional<Clock::duration> let_go;
 };
 
 template <class Message>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A VRPN program is killed or stopped while it pushes. The recording shows what the device did.
+// Kills or stops a VRPN program while it pushes, and checks the recording of the device.
 #include <gtest/gtest.h>
 #include <poll.h>
 

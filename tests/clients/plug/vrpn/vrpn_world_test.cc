@@ -150,7 +150,7 @@ TEST(VrpnWorld, AProgramThatSendsWithoutAPauseMakesNoFloodOfForces) {
       if (i > 300) {
         EXPECT_NEAR(world.step.wanted.y(), asked, 1.1e-3) << "the newest of them with the next state";
       }
-      for (int k = 0; k < 60; ++k) {  // in one millisecond
+      for (int k = 0; k < 60; ++k) {
         asked = static_cast<double>(static_cast<float>(1e-3 * i + 1e-5 * k));
         old.says(constant(Vec3(0, asked, 0)));
         old.turn();

@@ -330,7 +330,7 @@ TEST(Cutting, IsMadeInItsOrderAtItsTimeOrForceAndSaidOnce) {
   EXPECT_LT(once, 0.999 * whole);
   EXPECT_TRUE(said_once);
   EXPECT_EQ(stiffness(1e-4), std::pair(once, false));
-  body.tick(0);  // does not undo the cut
+  body.tick(0);
   const auto [pressed, not_yet] = stiffness(2e-3);
   EXPECT_NEAR(pressed / once, 1, 1e-9);
   EXPECT_FALSE(not_yet);

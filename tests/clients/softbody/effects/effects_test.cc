@@ -203,7 +203,7 @@ TEST(Friction, HoldsTheToolUntilTheConeAndThenPullsAlongIt) {
   EXPECT_NEAR(sliding.force.x() / sliding.force.y(), 0.75, 1e-12);
   EXPECT_EQ(sliding.stiffness, 0);
   EXPECT_EQ(friction.move(Vec2(0.01, 0), 0).force, Vec2::Zero());  // lifted
-  EXPECT_EQ(friction.move(Vec2(0.02, 0), 1).force, Vec2::Zero());  // pressed again elsewhere
+  EXPECT_EQ(friction.move(Vec2(0.02, 0), 1).force, Vec2::Zero());
   EXPECT_THROW(Friction(-0.1, 1000), std::invalid_argument);
   EXPECT_THROW(Friction(std::numeric_limits<double>::quiet_NaN(), 1000), std::invalid_argument);
   EXPECT_THROW(Friction(0.1, 0), std::invalid_argument);
@@ -213,7 +213,7 @@ TEST(Friction, TakesEnergyOnEveryClosedWayAndGivesNone) {
   Dice dice(3);
   for (int way = 0; way < 200; ++way) {
     Friction friction(0.4, 1000);
-    double work = 0;  // on the hand
+    double work = 0;
     Vec2 place(0, 0);
     friction.move(place, 1);
     for (int i = 0; i < 100; ++i) {

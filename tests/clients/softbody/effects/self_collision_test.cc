@@ -332,7 +332,7 @@ TEST(SelfCollision, AHeavyJawFallsOnTheOtherAndStaysThere) {
 
 TEST(SelfCollision, TheSidesOfACutThatIsMadeUnderTheToolStayApart) {
   BodyConfig config = pressed_body(ModelKind::kCorotational, Element::kHex8Sri, 8);
-  config.middle = Vec3(0.0125, 0, 0);  // next to the cut
+  config.middle = Vec3(0.0125, 0, 0);
   config.cuts = {{{Vec3(0, -0.06, 0.025), Vec3(0, 0.12, 0), Vec3(0, 0, 0.03)}, PlannedCut::When::kForce, 0.5}};
   const auto felt = [](const BodyConfig& each) {
     Body body(each);

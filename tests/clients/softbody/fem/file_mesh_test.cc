@@ -30,10 +30,10 @@ struct At {
 
 /// Writes a block of 100 × 100 × 50 mm with 8 × 8 × 4 elements in format 2.2 of gmsh.
 struct BlockFile {
-  std::function<int(At)> times = [](At) { return 1; };               ///< copies of an element
-  std::function<int(At)> side = [](At) { return 0; };                ///< elements with different values share no nodes
-  std::function<double(At)> shift = [](At) { return 0; };            ///< along x, mm
-  std::vector<std::array<int, 8>> orders{{0, 1, 2, 3, 4, 5, 6, 7}};  ///< node order of each copy
+  std::function<int(At)> times = [](At) { return 1; };
+  std::function<int(At)> side = [](At) { return 0; };      ///< elements with different values share no nodes
+  std::function<double(At)> shift = [](At) { return 0; };  ///< along x, mm
+  std::vector<std::array<int, 8>> orders{{0, 1, 2, 3, 4, 5, 6, 7}};
 
   std::string text() const {
     std::ostringstream nodes;
@@ -142,7 +142,7 @@ TEST_F(MeshOfAFile, NodesAtOnePlaceBecomeOneUnlessTheSceneSaysThatThereIsASlit) 
       "block.msh: 45 places have two nodes, which stay apart, the first at (0, -50, 0)\n"
       "block.msh: the mesh has 2 parts, which share no face; the smallest, of 128 elements, begins with element 1 "
       "at (-43.75, -43.75, 6.25)\n");
-  file.side = [](At at) { return 64 * at.k + 8 * at.j + at.i; };  // no shared nodes
+  file.side = [](At at) { return 64 * at.k + 8 * at.j + at.i; };
   EXPECT_NEAR(stiffness(body_of(file.text())), kWhole, 1e-3);
   EXPECT_NE(said_of(body_of(file.text())).find("397 places had two nodes or more, which are merged"), std::string::npos)
       << "all but the corners";
@@ -172,7 +172,7 @@ TEST_F(MeshOfAFile, EverythingTwiceIsTheWhole) {
   BlockFile file;
   int time = 0;
   file.times = [](At) { return 2; };
-  file.side = [&time](At) { return time++ / 8 % 2; };  // each copy has its own nodes
+  file.side = [&time](At) { return time++ / 8 % 2; };
   const BodyConfig body = body_of(file.text());
   EXPECT_NEAR(stiffness(body), kWhole, 1e-3);
   EXPECT_NE(said_of(body).find("256 elements are there again"), std::string::npos) << said_of(body);
@@ -192,7 +192,7 @@ TEST_F(MeshOfAFile, APartThatNothingHoldsIsRefusedByItsElementAndPlace) {
   file.shift = [](At at) { return at.k < 2 ? 0 : 1; };
   EXPECT_NE(refusal(body_of(file.text())).find("nothing holds the part of 128 elements that begins with element 129"),
             std::string::npos);
-  file.times = [](At at) { return at.k < 3 || (at.i == 7 && at.j == 7) ? 1 : 0; };  // one element on top
+  file.times = [](At at) { return at.k < 3 || (at.i == 7 && at.j == 7) ? 1 : 0; };
   file.side = [](At) { return 0; };
   file.shift = [](At) { return 0; };
   EXPECT_EQ(refusal(body_of(file.text())), "") << "on a face it is held";

@@ -80,7 +80,7 @@ TEST(Regions, ABarOfTwoMaterialsIsTwoSpringsInSeries) {
       const double z = solid.mesh().nodes[i].z();
       if (z > 0.1 - 1e-9) pulls += force.z();
       if (z < 1e-9 || z > 0.1 - 1e-9) continue;
-      EXPECT_LT(force.norm(), 1e-12) << element.name << z;  // at rest and without load
+      EXPECT_LT(force.norm(), 1e-12) << element.name << z;
     }
     EXPECT_NEAR(pulls, 1, 1e-12) << element.name;
   }

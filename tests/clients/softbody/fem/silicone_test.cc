@@ -121,7 +121,7 @@ TEST(Silicone, MeasuredCylindersAreThePublishedYeohLawAndNotTheNeoHookeanOne) {
   };
 
   const double scatter = measured(folder / "EF10_0T_A1.csv", 0.002) / measured(folder / "EF10_0T_B2.csv", 0.002) - 1;
-  EXPECT_NEAR(scatter, 0.038, 0.005);  // two specimens of the same silicone
+  EXPECT_NEAR(scatter, 0.038, 0.005);
   for (const std::string silicone : {"EF10_0T", "EF30_0T", "EF10_50T"}) {
     const auto file = folder / (silicone + "_A1.csv");
     const std::vector<double> three = constants(silicone, "Yeoh_o3");

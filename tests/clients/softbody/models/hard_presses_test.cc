@@ -46,8 +46,8 @@ TEST(HardPress, InACornerAndAtTheRimStiffnessIsTheSlopeAndNearIsWhole) {
     Vec3 towards_tool;
     Vec3 tool;
   };
-  for (const Place& place : {Place{Vec3::UnitZ(), Vec3(0.042, 0.041, 0.047)},   // near a corner of the top
-                             Place{Vec3::UnitX(), Vec3(0.047, 0.003, 0.004)}})  // near the clamped bottom
+  for (const Place& place :
+       {Place{Vec3::UnitZ(), Vec3(0.042, 0.041, 0.047)}, Place{Vec3::UnitX(), Vec3(0.047, 0.003, 0.004)}})
     for (const Law law : {Law::kCorotational, Law::kNeoHookean}) {
       Side side(testing::pressed_block(Element::kHex8Sri, 8, 0.45, law), place.towards_tool, place.tool);
       PatchContact contact(side.whole, side.surface, 0, PatchContact::Side::kUnilateral, nullptr);
@@ -104,7 +104,7 @@ TEST(HardPress, AMillionTimesStifferFarFieldIsCoveredByTheErrorSaid) {
         // Rounding errors of the stiff part affect the soft part.
         EXPECT_LT(whole.error, 1e-3 * whole.force) << ratio << ' ' << depth;
         EXPECT_LE(std::abs(near.force - whole.force), near.error) << ratio << ' ' << depth;
-        // A rigid far field is exact at once. A far field softer than the near field moves as much as the near field,
+        // With a rigid far field, the first answer is exact. A far field softer than the near field moves as much as the near field,
         // and rotates.
         const double share = ratio > 1 ? 1e-5 : 0.05;
         EXPECT_LT(std::abs(near.force - whole.force), share * whole.force) << ratio << ' ' << depth;

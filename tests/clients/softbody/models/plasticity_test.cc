@@ -233,7 +233,7 @@ TEST(Plasticity, ADentedBodyIsMetLowerAndKeepsItsDentUntouched) {
     Body elastic(pressed_body(model, Element::kHex8Sri, 4));
     const double pressed = body.touch(Vec3(0, 0, 0.042)).force.z();
     EXPECT_LT(pressed, 0.8 * elastic.touch(Vec3(0, 0, 0.042)).force.z());
-    const Feel above = body.touch(Vec3(0, 0, 0.0501));  // the tool leaves the body
+    const Feel above = body.touch(Vec3(0, 0, 0.0501));
     EXPECT_FALSE(above.touching);
     const double dent = above.gap - 1e-4;
     EXPECT_GT(dent, 1e-3);

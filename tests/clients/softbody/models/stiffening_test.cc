@@ -65,12 +65,12 @@ TEST(Stiffening, AViscousBodyCreepsAsOneOfThatModulusAndTheSameRelaxation) {
 }
 
 TEST(Stiffening, ATensedBodyGivesOutWhatTensingPutInAndNoMore) {
-  // The hand presses 2 mm deep, the stiffness doubles, and the hand retracts: it receives ½ k δ² more than it gave.
+  // The stiffness doubles at a depth of δ = 2 mm. The hand receives ½ k δ² more than it gave when it retracts.
   BodyConfig config = pressed_body(ModelKind::kCondensed, Element::kHex8Sri, 4);
   config.stiffening = StiffnessOverTime{.at = {0, 1}, .factor = {1, 2}};
   Body body(config);
   const double k = body.press(Given::kDepth, 1e-3).stiffness;
-  const auto work = [&](double from, double to) {  // on the hand
+  const auto work = [&](double from, double to) {
     double sum = 0;
     for (int i = 0; i < 100; ++i) {
       sum += body.touch(Vec3(0, 0, 0.05 - from - (to - from) * (i + 0.5) / 100)).force.z() * (from - to) / 100;

@@ -199,7 +199,7 @@ TEST(ClosedWays, OnWhichAnotherThreadRefreshesNearFieldsGiveNothing) {
   expect_nothing_given(Fields::kThread, ways_of(20), {});
 }
 
-/// At least half of the answers have no near field: where the hand comes down, on its path, and where it leaves.
+/// The second thread is so slow that at least half of the answers have no near field.
 TEST(ClosedWays, OnWhichTheHandIsFasterThanTheOtherThreadGiveNothing) {
   const int ways = std::max(6, ways_of(12));
   for (const Law law : {Law::kNeoHookean, Law::kCorotational}) {

@@ -41,7 +41,7 @@ Reaction press(const PressedBefore& block, Model& model, const Vec2& place, doub
 
 /// Energy balance of the hand on a closed path, J.
 struct ClosedWay {
-  double work = 0;   ///< net gain of the hand
+  double work = 0;
   double given = 0;  ///< largest amount given by the hand
 };
 
@@ -157,7 +157,7 @@ TEST(Ladder, WhereAnotherRungTakesOverNothingJumps) {
       }
       last = found.force;
     }
-    for (int i = 0; i <= 60; ++i) {  // down through the deepest levels
+    for (int i = 0; i <= 60; ++i) {
       const double depth = 3e-3 + 1e-4 * i;
       const double truth = block.truth(Vec2::Zero(), depth);
       const Reaction found = press(block, *ladder, Vec2::Zero(), depth);
@@ -490,7 +490,7 @@ TEST(Ladder, ABodyThatListsNothingHasNoLadder) {
 TEST(Ladder, WhatCannotBeLearnedIsRefused) {
   BodyConfig config = testing::pressed_body(ModelKind::kNear, Element::kHex8Sri, 6);
   config.near.tabulate = true;
-  EXPECT_THROW(Body{config}, std::invalid_argument);  // reach is not set
+  EXPECT_THROW(Body{config}, std::invalid_argument);
   config.reach = 0.031;
   EXPECT_THROW(Body{config}, std::invalid_argument);
   config.reach = 0.005;

@@ -48,7 +48,7 @@ TEST(LearnedShapes, AnAnswerBeginsNextToItsShape) {
     for (int level = 0; level < PressGrid::kLevels - 1; ++level) {
       const Vec2 place = grid.place(1.5, 2.5);
       const double depth = (level + 0.5) * grid.step;
-      const auto begun = body.press(*block.top.patch(place), depth, *grid.find(place, depth), 1);  // no Newton step
+      const auto begun = body.press(*block.top.patch(place), depth, *grid.find(place, depth), 1);
       ASSERT_TRUE(begun);
       most = std::max(most, begun->error / begun->force);
     }

@@ -85,7 +85,7 @@ TEST(NearCut, AnswersGoOnAndAreThoseOfTheCutBodyToTheErrorSaid) {
       Truth before(law, {cuts.begin(), cuts.begin() + static_cast<std::ptrdiff_t>(made)});
       body.tick(static_cast<double>(made) + 1);
       double last = 0;
-      for (int i = 0; i < 5; ++i) {  // while the cut is prepared
+      for (int i = 0; i < 5; ++i) {
         const Feel feel = touch();
         EXPECT_FALSE(feel.topology_changed);
         EXPECT_NEAR(feel.force.z(), before.at(tool), 0.02 * before.at(tool)) << which;
@@ -117,7 +117,7 @@ TEST(NearCut, AnswersGoOnAndAreThoseOfTheCutBodyToTheErrorSaid) {
 }
 
 TEST(NearCut, WithoutAnotherThreadTheNextAnswerMakesTheFieldOfTheCutBody) {
-  const std::vector<Cut> cuts{slit(-0.025, 0.0375)};  // next to the patch
+  const std::vector<Cut> cuts{slit(-0.025, 0.0375)};
   for (const Law law : kLawsOfCut) {
     Body body(cut_body(law, cuts));
     const Vec3 tool(0.0055, 0, 0.047);
@@ -163,7 +163,7 @@ TEST(NearCut, AFieldOfTheBodyBeforeTheCutIsThrownAwayWheneverItIsDone) {
     Body body(config);
     Elsewhere thread;
     asked(body, thread);
-    if (when == 0) thread.given[0]();  // before the cut
+    if (when == 0) thread.given[0]();
     EXPECT_EQ(body.touch(tool).force, expected[0].force) << when;
     if (when != 1) thread.given[1]();
     if (when == 1) {  // between the cut and the answer that uses it
@@ -171,7 +171,7 @@ TEST(NearCut, AFieldOfTheBodyBeforeTheCutIsThrownAwayWheneverItIsDone) {
       thread.given[0]();
     }
     EXPECT_EQ(body.touch(tool).force, expected[1].force) << when;
-    if (when == 2) thread.given[0]();  // after the first answer of the cut body
+    if (when == 2) thread.given[0]();
     for (std::size_t i = 2; i < expected.size(); ++i) {
       const Feel feel = body.touch(tool);
       EXPECT_EQ(feel.force, expected[i].force) << when;
@@ -322,7 +322,7 @@ class CutMeanwhile : public Model {
       for (Eigen::Index i = 0; i < patch.weights.size(); ++i)
         place += patch.weights[i] * cut_.solid.mesh().nodes[at(patch.nodes[static_cast<std::size_t>(i)])];
       reaction = before_.press(*top_.patch(top_.across(place)), given, value);
-      reaction.error = std::max(reaction.error, std::abs(reaction.force));  // as in Body
+      reaction.error = std::max(reaction.error, std::abs(reaction.force));
     } else {
       if (answers_ == at_) after_->go_on_from(before_, {});
       reaction = after_->press(patch, given, value);

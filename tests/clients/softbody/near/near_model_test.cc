@@ -119,7 +119,7 @@ TEST(Near, OnItsWayAsideItFollowsTheWholeMeshThroughSeveralCentres) {
       const Reaction found = near.press(place, 4e-3);
       EXPECT_NEAR(found.force, truth, 0.02 * truth) << i;
       EXPECT_GE(found.error, std::abs(found.force - truth)) << i;
-      if (i > 0) {  // no jump at the transition between fields
+      if (i > 0) {
         EXPECT_NEAR(found.force, last, 0.01 * truth) << i;
       }
       last = found.force;

@@ -86,8 +86,8 @@ TEST(Capsule, PushesAsACushionOnTheSameNodesThatHardens) {
     EXPECT_LT((feel.force - truth.force).norm(), 0.005 * truth.force.norm());
     EXPECT_LT((feel.torque->torque - truth.torque).norm(), 0.005 * truth.torque.norm());
   };
-  compare(coarse(), oblique(0.7, 2.5, 0.003, 0.002, -0.001));  // steep, on its end
-  Pressed compressible(0.002, 0.012, 0.2);                     // compressible, so the body also yields sideways
+  compare(coarse(), oblique(0.7, 2.5, 0.003, 0.002, -0.001));
+  Pressed compressible(0.002, 0.012, 0.2);  // compressible, so the body also yields sideways
   compare(compressible, oblique(0.25, -0.8, 0.0025, -0.002, 0.002));
 }
 
@@ -184,7 +184,7 @@ TEST(Capsule, ItsStiffnessesAreTheSlopesOfForceAndTorque) {
 }
 
 TEST(Capsule, WhereAHandleWouldFallOverItsAngularStiffnessIsZero) {
-  const ContactIntegral::Tool tool = oblique(std::numbers::pi / 2, 0, 0.002, -0.003, 0);  // standing on its end
+  const ContactIntegral::Tool tool = oblique(std::numbers::pi / 2, 0, 0.002, -0.003, 0);
   const Vec3 about = tool.middle + Vec3(0, 0, 0.03);
   const Eigen::SelfAdjointEigenSolver<Mat3> parts(slopes(tool, about).second);
   EXPECT_LT(parts.eigenvalues()[0], -1e-3);  // N·m/rad

@@ -112,7 +112,7 @@ class ContactIntegral {
     for (int round = 0;; ++round) {
       if (round == 60) throw std::runtime_error("the cushion does not come to rest");
       SymmetricMatrix tangent = stiffness_;
-      VectorXd left = stiffness_.times(solid_.to_free(u));  // elastic forces
+      VectorXd left = stiffness_.times(solid_.to_free(u));
       for (const Point& point : points_) add(point, tool, u, bends, tangent, left);
       if (!factor.factorize(tangent)) throw std::runtime_error("the cushion pushes the body aside");
       const VectorXd step = factor.solve(left);

@@ -162,7 +162,7 @@ std::vector<BodyConfig> linear_ones(BodyConfig config) {
   config.effects = {.density = 1000, .gravity = Vec3(0.5, 0, -1)};
   all.push_back(config);
   config.effects = {};
-  config.plasticity = Yield{.stress = 1e5, .hardening = 1e4};  // never yields
+  config.plasticity = Yield{.stress = 1e5, .hardening = 1e4};
   all.push_back(config);
   config.plasticity.reset();
   config.stiffening = StiffnessOverTime{.at = {0}, .factor = {3}};

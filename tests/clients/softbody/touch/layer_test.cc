@@ -46,7 +46,7 @@ TEST(Layer, PressesWithYoungsModulusAndBeginsWithoutAStepInForceOrStiffness) {
   constexpr double kOnset = kThickness / 10;              // m
   constexpr double kStiff = kArea * kYoung / kThickness;  // N/m, past the onset
   EXPECT_EQ(covered.at(-1e-9).energy, 0);
-  for (const double share : {0.001, 0.25, 0.5, 0.999}) {  // as a share of the onset
+  for (const double share : {0.001, 0.25, 0.5, 0.999}) {
     const Layer::Press press = covered.at(share * kOnset);
     EXPECT_NEAR(press.felt[0].curve(2, 2), share * kStiff, 1e-6 * kStiff) << share;
     EXPECT_NEAR(-press.felt[0].slope[2], share * share * kOnset * kStiff / 2, 1e-6 * kOnset * kStiff) << share;

@@ -169,7 +169,7 @@ double lost_by_sliding(const BodyConfig& config, int axis, bool to_and_fro) {
 TEST(RigidContact, AThinToolSlidesAlongEitherAxisAndGivesBackWhatItTook) {
   BodyConfig blade = testing::pressed_body(ModelKind::kNeoHookean, Element::kHex8Sri, 6);
   blade.tolerance = 1e-3;
-  blade.tool = BoxTool{.size = Vec3(0.0026, 0.007, 0.03), .edge = 0.0013};  // thin along x
+  blade.tool = BoxTool{.size = Vec3(0.0026, 0.007, 0.03), .edge = 0.0013};
   BodyConfig capsule = blade;
   capsule.tool = CapsuleTool{.radius = 0.0013, .half_length = 0.003, .axis = Vec3::UnitY()};
   BodyConfig sphere = blade;
@@ -304,7 +304,7 @@ TEST(RigidContact, FrictionGivesNothingOnAClosedWay) {
     return Vec3(0.003 * std::sin(angle), 0.002 * std::sin(2 * angle), 0.062 + 0.004 * std::cos(angle));
   };
   constexpr int kSteps = 120;
-  double given = 0;  // to the hand, from outside to outside
+  double given = 0;
   double lost = 0;
   double least = 0;
   for (int i = 0; i < kSteps; ++i) {
@@ -419,8 +419,8 @@ TEST(Grasp, LiftingBetweenTwoRoughSpheresMovesTheLiverUp) {
     return model.displacements()[3 * node + 2] - before;
   };
   double pull = 0;
-  EXPECT_GT(lifted(*scene.friction, pull), 0.004);  // the hands go 4 mm up
-  EXPECT_GT(pull, 1.5);                             // N; the liver is held
+  EXPECT_GT(lifted(*scene.friction, pull), 0.004);
+  EXPECT_GT(pull, 1.5);  // N; the liver is held
   double slipping = 0;
   EXPECT_LT(lifted(0, slipping), 0.001);
   EXPECT_LT(slipping, 0);

@@ -55,7 +55,7 @@ TEST(RigidShape, ItsDerivativesAreThoseOfItsDistance) {
     for (int i = 0; i < 2000; ++i) {
       const Vec3 x(dice.within(-0.03, 0.03), dice.within(-0.03, 0.03), dice.within(-0.03, 0.03));
       const Distance here = shape.distance(x);
-      if (here.value < -1e-3) continue;  // too deep inside
+      if (here.value < -1e-3) continue;
       Vec3 slope;
       Mat3 curve;
       bool smooth = true;
@@ -101,7 +101,7 @@ TEST(RigidShape, ItsSignSaysWhichSideOfTheSurfaceAPointIsOn) {
   EXPECT_NEAR(box.value(Vec3::Zero()), -0.006, 1e-15);
   EXPECT_NEAR(box.distance(Vec3(0, 0, 0.007)).value, 0.001, 1e-15);
   EXPECT_NEAR(box.distance(Vec3(0.009, 0, 0)).value, -0.001, 1e-15);
-  EXPECT_GT(box.distance(Vec3(0.01, 0.015, 0.006)).value, 0.001);  // where a sharp corner would be
+  EXPECT_GT(box.distance(Vec3(0.01, 0.015, 0.006)).value, 0.001);
   // a rounded corner
   EXPECT_NEAR(box.distance(Vec3(0.008, 0.013, 0.004) + 0.005 * Vec3(2, 1, 2) / 3).value, 0.003, 1e-15);
   EXPECT_NEAR(box.distance(Vec3(1000, 0, 0)).value, 999.99, 1e-9);
