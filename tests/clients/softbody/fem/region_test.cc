@@ -88,7 +88,7 @@ TEST(Regions, ABarOfTwoMaterialsIsTwoSpringsInSeries) {
 
 TEST(Regions, AfterACutEveryElementThatIsLeftIsOfItsMaterial) {
   const Solid whole = testing::pressed_block(Element::kHex8Sri, 8, 0.45);
-  // The cuts detach a piece at the side, so elements after it in the mesh keep their order.
+  // The cuts detach a piece at the side. Elements with higher numbers remain and are renumbered.
   const std::vector<Cut> around{{Vec3(0.025, -0.06, 0.0125), Vec3(0, 0.12, 0), Vec3(0, 0, 0.0125)},
                                 {Vec3(0.025, -0.06, 0.0125), Vec3(0, 0.12, 0), Vec3(0.03, 0, 0)},
                                 {Vec3(0.025, -0.06, 0.025), Vec3(0, 0.12, 0), Vec3(0.03, 0, 0)}};

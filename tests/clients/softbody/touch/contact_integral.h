@@ -190,7 +190,7 @@ class ContactIntegral {
     const Vec3 y = place(point, u);
     const auto [depth, normal] = inside(tool, y);
     if (depth <= 0) return;
-    // The normal rotates around an end or around the axis.
+    // The normal turns as y moves around an end or around the axis.
     Mat3 round = Mat3::Identity() - normal * normal.transpose();
     if (std::abs(tool.axis.dot(y - tool.middle)) < tool.half_length) round -= tool.axis * tool.axis.transpose();
     round /= tool.radius - depth;
