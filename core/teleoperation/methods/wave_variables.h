@@ -115,9 +115,7 @@ class WavePort {
   WaveMessage<N> observe(const Interval<N>& interval, const SharedAccount& account) noexcept;
 
   /// Discards the missing part of the sum.
-  void forgive() noexcept {
-    unsent_.setZero();
-  }
+  void forgive() noexcept { unsent_.setZero(); }
   /// Discards x − ∫ v' dt, because the line does not move with the handle.
   void rest() noexcept {
     ahead_.setZero();
