@@ -286,6 +286,25 @@ TEST(WaveVariables, AWrongVelocityDoesNotMoveThePeer) {
   EXPECT_NEAR(heard, 0, 1e-6) << "m; without the correction 60 rounds of 10 mm end 60 mm off";
 }
 
+TEST(WaveVariables, UseTheEnergyOfAMessageWhenItsWaveIsPlayed) {
+  WavePort<1> port({.impedance = 2, .period = kPeriod, .smoothing = kPeriod});
+  port.receive({1, 1ms, Vec<1>(kT), 0.125 * kT});  // a wave of 1 takes T/2
+  port.receive({2, 2ms, Vec<1>(kT), 1.125 * kT});
+  EXPECT_NEAR(port.command(Vec<1>(0)).force[0], 2 * 0.5, 1e-12);
+}
+
+TEST(WaveVariables, MayUseWhatTheAccountHasBeyondOneAndAHalfReserves) {
+  const auto force = [](double reserve) {
+    WavePort<1> port({.impedance = 2, .period = kPeriod, .smoothing = kPeriod});
+    port.command(Vec<1>(0));
+    port.observe({Vec<1>(0), Vec<1>(0), kPeriod}, {.payable = 1, .reserve = reserve});
+    port.receive({1, 1ms, Vec<1>(kT), 0});  // its energy was not sent
+    return port.command(Vec<1>(0)).force[0];
+  };
+  EXPECT_GT(force(0), 1.9);
+  EXPECT_EQ(force(1), 0);
+}
+
 TEST(WaveVariables, SayWhatIsWrongWithTheirConfiguration) {
   EXPECT_THROW(WavePort<1>({.impedance = 0, .period = kPeriod}), std::invalid_argument);
   EXPECT_THROW(WavePort<1>({.impedance = 1, .period = Duration::zero()}), std::invalid_argument);
