@@ -24,6 +24,7 @@
 
 namespace {
 
+// NOLINTBEGIN(readability-identifier-naming): the names are CHAI3D's
 int (*GetNumDevices)();
 int (*Open)(int);
 int (*Close)(int);
@@ -38,7 +39,9 @@ int (*GetWorkspaceRadius)(int, double*);
 int (*GetType)(int, char*);
 void (*StartServo)();
 void (*StopServo)();
+// NOLINTEND(readability-identifier-naming)
 
+// NOLINTBEGIN(concurrency-mt-unsafe): this program has one thread
 template <typename Function>
 void load(void* library, Function& function, const char* name) {
   void* const symbol = dlsym(library, name);
@@ -68,6 +71,7 @@ void load_libraries() {
   load(library, StartServo, "hdPhantomStartServo");
   load(library, StopServo, "hdPhantomStopServo");
 }
+// NOLINTEND(concurrency-mt-unsafe)
 
 using Vec = std::array<double, 3>;
 using Clock = std::chrono::steady_clock;
