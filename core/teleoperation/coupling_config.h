@@ -47,6 +47,7 @@ struct CouplingConfig {
   std::optional<std::uint32_t> engage_by{};             ///< leader only; the bit of a button that calls engage()
   Duration ramp = std::chrono::milliseconds(300);       ///< > 0
   Duration peer_period = std::chrono::milliseconds(1);  ///< > 0; the time between two states of the peer
+  double encoder_step = 0;                              ///< m, ≥ 0; of the device; used by waves; 0: exact
   bool holds_place = false;                             ///< only for a follower: the device is a robot
   /// The initial value of α (0 to 1) if the follower has several leaders (can_be_shared).
   std::optional<double> share{};

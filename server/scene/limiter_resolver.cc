@@ -151,7 +151,7 @@ class LimiterResolver : SceneErrors {
       blame("limiter.preset", {"limiter.preset", "limiter.kind"},
             "expected kind \"aol+\", whose parts a preset lists, found " + in_quotes(info(limiter.law).name));
     }
-    const std::optional<double> step = draft_.ledger_step ? draft_.ledger_step : draft_.simulated.encoder_step;
+    const std::optional<double> step = draft_.encoder_step();
     if (!step && draft_.scene.driver().moves_a_hand) {
       blame("limiter.robust_ledger.encoder_step_um", {"limiter.preset"},
             "missing, expected " + kZeroOrMore.expected(unit_of("_um")) +
@@ -186,7 +186,7 @@ class LimiterResolver : SceneErrors {
             "missing, expected this table with fading_contact: without it no contact has a credit of its own");
     }
     if (limiter.parts.robust_ledger) {
-      const std::optional<double> step = draft_.ledger_step ? draft_.ledger_step : draft_.simulated.encoder_step;
+      const std::optional<double> step = draft_.encoder_step();
       if (!step) {
         blame("limiter.robust_ledger.encoder_step_um", {},
               "missing, expected " + kZeroOrMore.expected(unit_of("_um")) +

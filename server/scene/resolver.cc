@@ -384,6 +384,7 @@ class SceneResolver : SceneErrors {
     resolve_absolute(coupling, leads);
     coupling.map.rotation = rotation_by(draft_.map_rotation);
     coupling.spring.period = draft_.scene.loop.period;
+    coupling.encoder_step = draft_.encoder_step().value_or(0);
     coupling.spring.max_force = draft_.coupling_force.value_or(control.max_force);
     const Law law = control.limiter.law;
     resolve_leaders(coupling);

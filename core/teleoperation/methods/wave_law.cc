@@ -17,8 +17,9 @@ WavePort<3> wave_port_of(const CouplingConfig& config, double impedance) {
   const double max_wave = 2 * config.spring.max_force / std::sqrt(2 * impedance);
   return WavePort<3>({.impedance = impedance,
                       .period = config.spring.period,
-                      .smoothing = std::max<Duration>(config.spring.period, std::chrono::milliseconds(20)),
-                      .max_wave = max_wave});
+                      .smoothing = std::max(config.spring.period, WavePort<3>::kSmoothing),
+                      .max_wave = max_wave,
+                      .encoder_step = config.encoder_step});
 }
 
 }  // namespace

@@ -15,8 +15,8 @@ namespace tendon {
 /// the follower stays at its position. An end that is not engaged receives waves and does not send any.
 class WaveLaw : public CouplingLaw {
  public:
-  /// The delay of the line without the network and the playout: W/2 and the periods.
-  static constexpr Duration kLineWaits = std::chrono::milliseconds(11);
+  /// The delay of the line without the network and the playout: W and a period.
+  static constexpr Duration kLineWaits = WavePort<3>::kSmoothing + std::chrono::milliseconds(1);
   static constexpr bool kHoldsSilent = false;
 
   WaveLaw(const CouplingConfig& config, const MappedEnd& frame);

@@ -16,12 +16,14 @@ WavePort<N>::WavePort(const Config& config)
   expect_above_zero(seconds(config.period), "period");
   expect_not_negative(seconds(config.max_playout), "max_playout");
   expect(config.max_wave > 0, "max_wave", config.max_wave, "above 0");
+  expect_not_negative(config.encoder_step, "encoder_step");
   const double means = seconds(config.smoothing) / seconds(config.period);
   expect(means >= 1 && means <= static_cast<double>(kMost), "smoothing", seconds(config.smoothing),
          "1 to 256 periods of " + shortest(seconds(config.period)) + " s");
   means_ = static_cast<std::size_t>(portable::round(means));
   tracking_ = 1 / std::max(config.impedance / kTracking, seconds(config.smoothing));
   for (Vec<N>& sum : played_) sum.setZero();
+  for (Vec<N>& due : due_) due.setZero();
 }
 
 template <int N>
@@ -97,12 +99,34 @@ Demand<N> WavePort<N>::command(const Vec<N>& velocity) noexcept {
   const double energy = seconds(config_.period) * wave_.squaredNorm() / 2;
   if (energy > left) wave_ *= std::sqrt(left / energy);
 
+  if (!velocity.allFinite()) {
+    velocity_.setZero();
+    return {root_ * wave_ - config_.impedance * velocity};
+  }
+  follow(still_ > kStillFor ? Vec<N>(Vec<N>::Zero()) : velocity);
+  return {root_ * wave_ - config_.impedance * velocity_};
+}
+
+/// Computes v' from v.
+template <int N>
+void WavePort<N>::follow(const Vec<N>& velocity) noexcept {
   const Vec<N> most = seconds(config_.period) * velocity;
   const double square = most.squaredNorm();
   const double lags = square > 0 ? std::clamp(ahead_.dot(most) / square, 0.0, 1.0) : 0.0;
-  const Vec<N> tracked = velocity + tracking_ * (ahead_ - lags * most);
-  velocity_ = tracked.allFinite() ? tracked : Vec<N>::Zero();
-  return {root_ * wave_ - config_.impedance * tracked};
+  velocity_ = velocity + tracking_ * (ahead_ - lags * most);
+}
+
+template <int N>
+void WavePort<N>::watch_rest(const Vec<N>& dx, Duration held) noexcept {
+  wandered_ += dx;
+  still_ += held;
+  const double far = wandered_.stableNorm();
+  const double still = kStill * config_.encoder_step;
+  constexpr double kRounding = 1 + 1e-9;
+  if (still == 0 || far > kRounding * still) {
+    if (far > 0) wandered_ *= still / far;
+    still_ = {};
+  }
 }
 
 template <int N>
@@ -126,6 +150,7 @@ WaveMessage<N> WavePort<N>::observe(const Interval<N>& interval, const Vec<N>& c
   if (!interval.applied.allFinite() || !interval.dx.allFinite() || !cut.allFinite()) return sent_;
 
   ahead_ += interval.dx - held * velocity_;
+  watch_rest(interval.dx, interval.held);
 
   // A period that is longer than planned cannot use more energy than available.
   taken_ = std::min(held * wave_.squaredNorm() / 2, std::max(played_energy_ - used_energy_, 0.0));
@@ -135,7 +160,11 @@ WaveMessage<N> WavePort<N>::observe(const Interval<N>& interval, const Vec<N>& c
 
   const Vec<N> due = (config_.impedance * interval.dx - held * interval.applied) / root_;
   unsent_ -= held * cut / root_;
-  send(due / held, held, reserve);
+  due_sum_ += due;
+  const Vec<N> mean = (due_sum_ - due_[due_next_]) / static_cast<double>(means_);
+  due_[due_next_] = due_sum_;
+  due_next_ = (due_next_ + 1) % means_;
+  send(mean / held, held, reserve);
   spare_ = std::max(account_ - kReserves * reserve, 0.0);
   return sent_;
 }

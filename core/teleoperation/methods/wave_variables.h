@@ -24,12 +24,15 @@ struct WaveMessage {
 /// own energy, instead of velocity and force.
 ///
 ///     F_wanted = √(2B) r̂ − B v'           r̂: received wave
-///     s        = (B v̄ − F) / √(2B)        s: wave to send;  −F·v̄ = (s² − r²)/2
+///     s        = mean of (B v̄ − F) / √(2B) over the last W        s: wave to send;  −F·v̄ = (s² − r²)/2 if W = T
 ///
 /// B (N·s/m, > 0) is the wave impedance, v̄ = Δx/T the mean velocity in the previous interval, and F the **applied**
 /// force in it, after the limiter. F acts on the moving side: on the hand at the leader, on the tool at the follower.
 /// With this sign, both ends have the same equations and use the same class. F of Niemeyer and Slotine is −F at the
 /// leader and F at the follower; u is the wave from the leader and w the wave from the follower.
+///
+/// The mean saves energy, because the displacement comes in encoder counts. A hand at 5 mm/s that moves one count of 30
+/// µm in one of six periods of 1 ms would send six times the energy of a smooth motion.
 ///
 /// v' is the estimated velocity v, corrected so that its integral follows the measured displacement x:
 ///
@@ -37,7 +40,8 @@ struct WaveMessage {
 ///
 /// λ (0 … 1) minimizes the correction, so that an estimate that lags by up to one period is not corrected. Without the
 /// correction, the error of the estimator at encoder counts accumulates in the integral of s, and the two ends drift
-/// apart.
+/// apart. v is 0 while the handle stays within 1.5 counts for 16 ms, because a handle on the edge of a count is not
+/// moving, and each change of the force costs a robust ledger half a count.
 ///
 /// **Playout.** The messages contain I = ∫ wave dt and E = ∫ wave²/2 dt. The receiver interpolates both linearly
 /// between messages at the time τ of PlayoutClock, and computes the mean Ī of I over the last W:
@@ -62,8 +66,7 @@ struct WaveMessage {
 /// is positive. (In all cases the limiter at the device bounds the leader's port.)
 ///
 /// **Felt dynamics.** A spring K = B/d with the inertia B d, and a damper B for fast motion. d is the minimum delay
-/// from `observe` to the `command` that uses it, plus the playout D, averaged over both directions, plus T + (W −
-/// T)/2. A hand k_h that pushes by Δx on an object k_w feels
+/// from `observe` to the `command` that uses it, plus the playout D, averaged over both directions, plus W. A hand k_h that pushes by Δx on an object k_w feels
 ///
 ///     F = Δx / (1/k_h + d/B + 1/k_w)
 ///
@@ -77,14 +80,16 @@ struct WaveMessage {
 template <int N>
 class WavePort {
  public:
+  static constexpr Duration kSmoothing = std::chrono::milliseconds(12);
   struct Config {
-    double impedance = 0;                                ///< B, N·s/m; > 0
-    Duration period{};                                   ///< T, hold time of a command; > 0
-    Duration smoothing = std::chrono::milliseconds(20);  ///< W; T … 256 T, rounded to a multiple of T
+    double impedance = 0;             ///< B, N·s/m; > 0
+    Duration period{};                ///< T, hold time of a command; > 0
+    Duration smoothing = kSmoothing;  ///< W, of each end; T … 256 T, rounded to a multiple of T
     /// Maximum of D; ≥ 0. Messages that wait for more than 255 periods of the sender are played out early.
     Duration max_playout = std::chrono::milliseconds(120);
     /// √W, limit of r̂, which bounds the received power (half of its square, in W). The remainder is used later.
     double max_wave = std::numeric_limits<double>::infinity();
+    double encoder_step = 0;  ///< m, ≥ 0; one count of the positions; 0: exact
   };
 
   /// Throws std::invalid_argument with the name of the field, its value and the expected value.
@@ -120,6 +125,7 @@ class WavePort {
   void rest() noexcept {
     ahead_.setZero();
     velocity_.setZero();
+    wandered_.setZero();
   }
 
   /// A, J.
@@ -137,6 +143,8 @@ class WavePort {
   static constexpr double kPoorShare = 0.8;
   static constexpr double kReserves = 1.5;    ///< a missing part is made up with the energy beyond these reserves
   static constexpr double kTracking = 150.0;  ///< N/m, B/τ_x
+  static constexpr double kStill = 1.5;       ///< counts; a handle that stays within them for kStillFor does not move
+  static constexpr Duration kStillFor = std::chrono::milliseconds(16);
 
   WaveMessage<N>& heard(std::size_t k) noexcept { return heard_[(begin_ + k) % kMost]; }
   /// The integral and the energy of the peer at a time of its clock.
@@ -145,6 +153,8 @@ class WavePort {
     double energy;
   };
   Sums sums_at(Duration time) noexcept;
+  void follow(const Vec<N>& velocity) noexcept;
+  void watch_rest(const Vec<N>& dx, Duration held) noexcept;
   WaveMessage<N> observe(const Interval<N>& interval, const Vec<N>& cut, double reserve) noexcept;
   void send(const Vec<N>& wave, double held, double reserve) noexcept;
 
@@ -165,6 +175,8 @@ class WavePort {
   Vec<N> wave_ = Vec<N>::Zero();      ///< r̂ of this period
   Vec<N> velocity_ = Vec<N>::Zero();  ///< v' of this period
   Vec<N> ahead_ = Vec<N>::Zero();     ///< m, x − ∫ v' dt
+  Vec<N> wandered_ = Vec<N>::Zero();  ///< m, from the centre of the last rest, at most 1.5 counts
+  Duration still_{};                  ///< time since the handle last moved farther
   Vec<N> used_integral_ = Vec<N>::Zero();
   double used_energy_ = 0;
   double played_energy_ = 0;  ///< E(τ)
@@ -173,7 +185,10 @@ class WavePort {
   double taken_ = 0;
   double given_ = 0;
   WaveMessage<N> sent_;
-  Vec<N> unsent_ = Vec<N>::Zero();  ///< missing part of ∫ wave dt
+  std::array<Vec<N>, kMost> due_{};  ///< ring buffer of the last W/T values of ∫ (B v̄ − F)/√(2B) dt
+  std::size_t due_next_ = 0;
+  Vec<N> due_sum_ = Vec<N>::Zero();  ///< the newest value
+  Vec<N> unsent_ = Vec<N>::Zero();   ///< missing part of ∫ wave dt
 };
 
 }  // namespace tendon

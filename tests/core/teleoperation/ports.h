@@ -13,6 +13,8 @@
 #include <vector>
 
 #include "core/control/limiter.h"
+#include "core/control/preset.h"
+#include "core/estimation/velocity_estimator.h"
 #include "core/ledger/energy_ledger.h"
 #include "core/teleoperation/coupling.h"
 #include "tests/core/teleoperation/one_way.h"
@@ -29,6 +31,7 @@ struct PortSetup {
   std::array<Surroundings, 3> around{};  ///< external contact along each axis
   std::function<Vec3(double)> path{};    ///< t, s → m: prescribed motion, forces have no effect
   double encoder_step = 0;               ///< m; 0: exact
+  std::optional<Preset> preset{};        ///< of the limiter, with the velocity estimator; empty: AOL+ without parts
   bool measures_contact = false;
   double motor = std::numeric_limits<double>::infinity();  ///< N, saturation
   bool limited = true;  ///< if false, the demand of the coupling is applied without a limiter
@@ -61,9 +64,14 @@ class Port {
     auto config = setup.coupling;
     config.spring.epoch = epoch;
     config.spring.period = setup.every * std::chrono::milliseconds(1);
+    config.encoder_step = setup.encoder_step;
     coupling.emplace(config);
     LimiterConfig with{.law = Law::kAolPlus, .friction = setup.friction, .longest_hold = config.spring.period};
     with.shared_account = true;
+    if (setup.preset) {
+      with.parts = preset_parts(*setup.preset, {setup.friction, with.longest_hold, setup.encoder_step}).parts;
+      estimator_.emplace(setup.encoder_step);
+    }
     limiter.emplace(with);
     applied.setZero();
     speed_.setZero();
@@ -104,6 +112,7 @@ class Port {
     }
     began_ = true;
     least_account = std::min(least_account, limiter->payable());
+    if (estimator_) speed_ = estimator_->observe(at(now), measured());
     if (seen) {
       demand = coupling->command({at(now), measured(), speed_}, buttons, ready);
     } else {
@@ -139,6 +148,7 @@ class Port {
 
  private:
   std::vector<Body> bodies_;
+  std::optional<VelocityEstimator> estimator_;
   Vec3 speed_ = Vec3::Zero();
   bool began_ = false;
 };

@@ -122,7 +122,7 @@ TEST(WaveVariables, AnEndThatIsTerminatedWithTheImpedanceReflectsNothing) {
 }
 
 TEST(WaveVariables, SendsNothingWhileItsAccountIsShort) {
-  WavePort<1> port({.impedance = 2, .period = kPeriod});
+  WavePort<1> port({.impedance = 2, .period = kPeriod, .smoothing = kPeriod});
   port.command(Vec<1>(0));
   // The device pushed along a motion for which no wave had paid.
   const auto silent = port.observe({Vec<1>(1), Vec<1>(1e-3), kPeriod});
