@@ -95,6 +95,7 @@ foreach(room core protocol clients/cpp)
 endforeach()
 install(FILES protocol/wire/tendon.proto protocol/WIRE.md protocol/SESSION.md DESTINATION ${CMAKE_INSTALL_DATADIR}/tendon/protocol
         COMPONENT development)
+install(FILES protocol/vectors/golden.md DESTINATION ${CMAKE_INSTALL_DATADIR}/tendon/protocol/vectors COMPONENT development)
 configure_package_config_file(deploy/packaging/tendon-config.cmake.in ${CMAKE_CURRENT_BINARY_DIR}/tendon-config.cmake
                               INSTALL_DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/tendon)
 write_basic_package_version_file(${CMAKE_CURRENT_BINARY_DIR}/tendon-config-version.cmake COMPATIBILITY SameMinorVersion)

@@ -12,7 +12,7 @@
 #include "protocol/wire/codec.h"
 #include "protocol/wire/handshake_codec.h"
 
-// One example of each message. The golden datagrams of WIRE.md use them.
+// One example of each message. protocol/vectors/golden.md shows them.
 
 namespace tendon::examples {
 

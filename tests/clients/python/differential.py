@@ -15,7 +15,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from conftest import ROOT
-from wire_md import PAGE, golden_datagrams
+from golden import PAGE, golden_datagrams
 
 from tendon import codec, limits
 from tendon import tendon_pb2 as pb

@@ -10,7 +10,7 @@ from math import inf, nan
 import pytest
 from stage import KEPT, KEY, Stage
 from stand_in import StandIn
-from test_wire_md import DEVICE_REPORT, PEER_REPORT, REPORT
+from test_golden import DEVICE_REPORT, PEER_REPORT, REPORT
 from world import MS, SECOND, Weather, World
 
 from tendon import (

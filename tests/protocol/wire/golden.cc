@@ -258,7 +258,7 @@ std::string rewritten(std::string_view page) {
   auto unseen = blocks(page);
   for (const auto& [name, datagram] : examples::datagrams()) {
     if (unseen.erase(name) == 0)
-      throw std::invalid_argument("WIRE.md has no block \"" + std::string(kOpening) + name + '"');
+      throw std::invalid_argument("golden.md has no block \"" + std::string(kOpening) + name + '"');
     const std::size_t begin = out.find(std::string(kOpening) + name + '\n') + kOpening.size() + name.size() + 1;
     out.replace(begin, out.find(kClosing, begin) - begin, block(datagram));
   }

@@ -9,8 +9,8 @@
 
 namespace tendon::golden {
 
-/// A cleartext datagram as WIRE.md shows it: one line per field with its bytes in hex and their meaning. Names, types
-/// and enumerators are those of tendon.proto.
+/// A cleartext datagram as protocol/vectors/golden.md shows it: one line per field with its bytes in hex and their
+/// meaning. Names, types and enumerators are those of tendon.proto.
 std::string block(std::span<const std::byte> datagram);
 
 /// Returns the blocks of a page that start with "```golden NAME". The key is the name.

@@ -10,8 +10,8 @@
 #include "tests/protocol/wire/golden.h"
 #include "tests/protocol/wire/vectors.h"
 
-// Rewrites protocol/vectors/ and the golden datagrams of WIRE.md after an intended change of the wire format. The diff
-// shows the change. The target `wire` runs this program, and protoc for the Python and TypeScript clients.
+// Rewrites protocol/vectors/ after an intended change of the wire format. The diff shows the change. protocol/generate
+// runs this program, and protoc for the Python and TypeScript clients.
 
 namespace {
 
@@ -36,8 +36,9 @@ int main(int argc, char** argv) {
   }
   const std::filesystem::path protocol = argv[1];
   try {
-    for (const auto& [name, text] : tendon::vectors::files()) write(protocol / "vectors" / name, text);
-    write(protocol / "WIRE.md", tendon::golden::rewritten(read(protocol / "WIRE.md")));
+    const std::filesystem::path folder = protocol / "vectors";
+    for (const auto& [name, text] : tendon::vectors::files()) write(folder / name, text);
+    write(folder / "golden.md", tendon::golden::rewritten(read(folder / "golden.md")));
   } catch (const std::exception& e) {
     std::cerr << e.what() << '\n';
     return 1;

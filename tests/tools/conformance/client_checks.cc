@@ -321,9 +321,9 @@ void ClientJudge::check_conversation(Session& session) {
   report_.judge("golden-frame", read(from_hex(golden::kState), *golden.add_frames()), "unreadable", "a frame");
   ticks_.insert(1000);
   const bool lives = talk.confirmed(talk.say(golden));
-  report_.judge("golden-frame", lives, "no echo of WIRE.md's golden state", "an echo");
+  report_.judge("golden-frame", lives, "no echo of golden.md's state", "an echo");
   report_.judge("golden-frame", !states.any || talk.listen_until(kPatience, [&] { return states.shown(1000); }),
-                "no force that answers tick 1000", "WIRE.md's golden state is read");
+                "no force that answers tick 1000", "golden.md's state is read");
   states.next = 1001;
 
   check_rekey(talk);

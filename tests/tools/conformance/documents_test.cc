@@ -15,7 +15,7 @@
 namespace tendon::conformance::documents_test {
 namespace {
 
-/// Returns the text of "WIRE.md", or the comments of "stream.h".
+/// Returns the text of a page such as "WIRE.md", or the comments of "stream.h".
 std::string text_of_file(const std::string& name) {
   const std::filesystem::path source(TENDON_SOURCE);
   const bool is_header = name.ends_with(".h");

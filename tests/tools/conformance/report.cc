@@ -14,6 +14,7 @@ namespace {
 
 constexpr std::string_view kWire = "WIRE.md";
 constexpr std::string_view kSession = "SESSION.md";
+constexpr std::string_view kGolden = "vectors/golden.md";
 constexpr std::string_view kStream = "stream.h";
 constexpr std::string_view kHeader = "Header: 16 bytes in the clear";
 constexpr std::string_view kHello = "Type 1, Hello: client → server, always 1200 bytes";
@@ -119,7 +120,7 @@ constexpr std::array kChecks = {
     Check{"out-of-bounds", kBoth, kWire, "Ground rules", "A frame with a value out of bounds is dropped and counted."},
     Check{"newest-wins", kBoth, kSession, kNewest,
           "A received value must have a higher tick, sequence or number than all before, otherwise it is stale"},
-    Check{"golden-frame", kBoth, kWire, "Golden datagrams", "Each line has the bytes in hex, then their meaning."},
+    Check{"golden-frame", kBoth, kGolden, "", "Each line has the bytes in hex, then their meaning."},
     Check{"rekey-followed", kBoth, kWire, kSuite1,
           "the next one, to which it moves on once such a datagram has opened"},
     Check{"old-key-overlap", kBoth, kWire, kSuite1, "the previous one for 2 s after moving on"},

@@ -17,8 +17,8 @@ enum class Side : std::uint8_t { kServer = 1, kClient = 2, kBoth = 3, kWorker = 
 struct Check {
   std::string_view name;
   Side side;
-  std::string_view document;  ///< "WIRE.md", "SESSION.md", "stream.h" (of clients/cpp/worker)
-  std::string_view section;   ///< empty for a header
+  std::string_view document;  ///< "WIRE.md", "SESSION.md", "vectors/golden.md", "stream.h" (of clients/cpp/worker)
+  std::string_view section;   ///< empty: the whole document
   std::string_view sentence;
 };
 
@@ -26,7 +26,7 @@ struct Check {
 std::span<const Check> checks();
 
 /// Returns the document and the anchor of the section on its web page, for example
-/// "WIRE.md#type-2-retry-server--client-48-bytes". For headers, the result is the file name: "stream.h".
+/// "WIRE.md#type-2-retry-server--client-48-bytes". Without a section, the result is the document: "stream.h".
 std::string anchor(const Check& check);
 
 enum class Outcome : std::uint8_t { kUnreached, kPassed, kFailed, kNotApplicable };

@@ -67,7 +67,7 @@ void check_requests(ServerGuest& guest, Conversation& talk) {
   guest.report.judge("request-unknown", refused && refused->code() == pb::CODE_UNSUPPORTED,
                      refused ? refused->ShortDebugString() : "nothing", "CODE_UNSUPPORTED");
 
-  // Sixteen requests in reverse order, without receiving the first answers; 7 is the golden one of WIRE.md.
+  // Sixteen requests in reverse order, without receiving the first answers; 7 is that of golden.md.
   before = talk.heard().size();
   for (std::uint32_t id = 19; id >= 4; --id) {
     pb::Datagram body;

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reads the golden datagrams in protocol/WIRE.md."""
+"""Reads the golden datagrams in protocol/vectors/golden.md."""
 
 import re
 from pathlib import Path
 
-PAGE = Path(__file__).resolve().parents[3] / "protocol" / "WIRE.md"
+PAGE = Path(__file__).resolve().parents[3] / "protocol" / "vectors" / "golden.md"
 
 
 def golden_datagrams(page: str) -> dict[str, bytes]:

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Decodes and encodes the golden datagrams in protocol/WIRE.md.
+// Decodes and encodes the golden datagrams in protocol/vectors/golden.md.
 import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
 import { mkdtempSync, readFileSync, rmSync } from "node:fs";
@@ -37,11 +37,11 @@ function goldenDatagrams(page: string): Map<string, Uint8Array> {
   return found;
 }
 
-const kGolden = goldenDatagrams(readFileSync(join(kRoot, "protocol/WIRE.md"), "utf8"));
+const kGolden = goldenDatagrams(readFileSync(join(kRoot, "protocol/vectors/golden.md"), "utf8"));
 
 function golden(name: string): Uint8Array {
   const bytes = kGolden.get(name);
-  assert.ok(bytes, `WIRE.md has no golden datagram "${name}"`);
+  assert.ok(bytes, `golden.md has no datagram "${name}"`);
   return bytes;
 }
 
@@ -82,7 +82,7 @@ function roundTrip(datagram: Uint8Array): Uint8Array {
   }
 }
 
-describe("WIRE.md", () => {
+describe("golden.md", () => {
   it("has golden datagrams of every kind", () => {
     const expected = ["hello", "retry", "welcome", "refused", "keep-alive", "state", "force", "control", "control-ack", "bye",
       "report", "state-deadband"];

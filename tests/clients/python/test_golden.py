@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Checks that the client writes and reads the golden datagrams in WIRE.md."""
+"""Checks that the client writes and reads the golden datagrams in protocol/vectors/golden.md."""
 
 from dataclasses import replace
 from math import inf, nan
 
 import pytest
-from wire_md import PAGE, golden_datagrams
+from golden import PAGE, golden_datagrams
 
 from tendon import codec
 from tendon.codec import AnswerDatagram, DatagramType, Echo, Header, HelloDatagram, RetryDatagram
