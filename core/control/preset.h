@@ -13,7 +13,7 @@
 
 namespace tendon {
 
-/// Sets of parts that were measured together (tests/tools/lab/README.md). A scene can use a preset instead of single
+/// Sets of parts that were measured together (tests/tools/bench/RESULTS.md). A scene can use a preset instead of single
 /// parts.
 enum class Preset : std::uint8_t {
   kFeel,

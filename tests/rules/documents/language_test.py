@@ -15,7 +15,7 @@ import sys
 sys.dont_write_bytecode = True
 import wrap  # noqa: E402
 
-NOT_PROSE = ("CHANGELOG.md", "tests/tools/bench/RESULTS.md")  # a history; the output of a program
+NOT_PROSE = ("CHANGELOG.md",)  # a history
 TEST = re.compile(r"^\s*(?:TEST|TEST_F|TEST_P|TYPED_TEST|TYPED_TEST_P|RC_GTEST_PROP)\(\s*(\w+),\s*(\w+)", re.M)
 TITLE = re.compile(r"(?<![.\w])(?:test|it|describe)(?:\.(?:only|skip|todo))?\(\s*([\"'`])((?:(?!\1)[^\\]|\\.)*)\1")
 FUNCTION = re.compile(r"^\s*(?:async )?def (test\w*)", re.M)

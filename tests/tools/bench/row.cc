@@ -153,7 +153,7 @@ std::string to_json(const Circumstances& c) {
 
 std::string to_markdown(const Circumstances& c, const std::vector<Row>& rows) {
   std::string page = std::string(kPageBegins) + "\n\nWritten by `" + c.command +
-                     "`; [README.md](README.md) says how each line is measured, and what was done.\n\n" + to_text(c) +
+                     "`; tests/tools/bench/README.md says how each line is measured.\n\n" + to_text(c) +
                      "\nEach line's floor was measured within this run: in turns with it, right after it (sessions, "
                      "512 devices), or once "
                      "(devices). Ratios travel from machine to machine; times do not.\n";

@@ -29,7 +29,7 @@ void add(CLI::App& verb, int& /*exit*/) {
   verb.add_flag("--json", options.json, "one JSON object for each line of the table, and one for its circumstances");
   verb.footer(
       "\nExample: all of it, some minutes, with its page\n"
-      "  tendon-lab bench --fifo 50 --write tests/tools/bench/RESULTS.md\n"
+      "  tendon-lab bench --fifo 50 --write bench.md\n"
       "one part\n  tendon-lab bench --only steps --json\n"
       "cost against devices\n  tendon-lab bench --only 512 --fifo 50 --plot devices\n"
       "\nTimes are those of this machine, now. Exit: 0 measured, whatever the figures; 1 it could not be; 2 wrong "
