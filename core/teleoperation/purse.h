@@ -85,8 +85,6 @@ struct PurseMessage {
 /// exceeds the given total, or if a total decreases although its sequence increases. A message that is not newer is
 /// ignored. If a value of the period is not finite, nothing is given or credited.
 ///
-/// Cost with PositionPosition: 85 ns per period with one peer (README).
-///
 /// Source: derived here; related to the two-layer tank (Franken et al. 2011) and energy-reflecting TDPA (Ryu et al.
 /// 2010).
 ///

@@ -56,7 +56,7 @@ Vec<N> paid_stretch(const Vec<N>& stretch, double stiffness, double energy) noex
 /// change of K under stretch costs ½ ΔK δ², which the accounts pay.
 ///
 /// **Extrapolation.** If a message is 5 ms later than the previous one, y is wrong by 1 mm at 0.2 m/s, which causes
-/// 0.4 N of noise at 400 N/m. See the README for measurements.
+/// 0.4 N of noise at 400 N/m.
 ///
 /// **Felt damping** in free motion, for a sine with the peak speed v̂ and the friction b_f, f_c of the follower:
 ///

@@ -161,7 +161,7 @@ TEST(Pair, AHeldForceIsThatAtTheWallOverAnyNetwork) {
   for (const Law law : {Law::kAol, Law::kAolPlus}) {
     for (const double wall : {500.0, 5000.0}) {
       for (const int round_trip : kRoundTrips) {
-        for (std::uint64_t hand = 0; hand < 4; ++hand) {  // hand 0 is the one of the README, the others are random
+        for (std::uint64_t hand = 0; hand < 4; ++hand) {  // hand 0 has 400 N/m, the others are random
           Dice dice(2000 + hand);
           PairConfig config = pressing(wall, hand == 0 ? 400 : dice.within(150, 600));
           use_law(config, law);
