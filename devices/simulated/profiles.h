@@ -82,8 +82,8 @@ std::span<const OperatorProfile> operator_profiles() noexcept;
 /// Returns null if there is no such profile.
 const OperatorProfile* find_operator_profile(std::string_view name) noexcept;
 
-/// A heavy device of admittance type without a hand: 2 kg, 20 N·s/m, 1 N, and a force sensor. Not a real device; the
-/// parameters are from core/PROOFS.md, "Admittance loop".
+/// A heavy device of admittance type without a hand: 2 kg, 20 N·s/m, 1 N, and a force sensor. Not a real device;
+/// see core/PROOFS.md, "Admittance loop".
 SimulatedDevice::Config admittance_device();
 
 /// One line per number, with its unit, provenance and source.
