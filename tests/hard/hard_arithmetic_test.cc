@@ -63,8 +63,8 @@ TEST(HardArithmetic, AHundredMillionStepsOfTheLedgerAddUpToTheLastBit) {
   EXPECT_LE(error, 2 * last_bit);
   EXPECT_GT(std::abs(plain - 100), 1e-8);
   report(
-      {.hard = "1e8 steps, 28 hours at 1 kHz: what each addition rounds off adds up",
-       .oracle = "1e8 times 1 µJ, in the ledgers of AOL and AOL+: 100 J within two of its last bits",
+      {.hard = "rounding errors of 1e8 steps (28 hours at 1 kHz) accumulate",
+       .oracle = "1e8 times 1 µJ is 100 J within two of the last bits, in the ledgers of AOL and AOL+",
        .result = text(error) + " J off",
        .margin = error > 0 ? std::optional(2 * last_bit / error) : std::nullopt,
        .without = "a plain double: " + text(std::abs(plain - 100)) + " J off; a float ends at " + text(single) + " J"});
@@ -103,11 +103,9 @@ TEST(HardArithmetic, FastMathStopsTheBuildOfEveryRoomThatCatchesNaN) {
     EXPECT_NE(failed, 0) << file;
     EXPECT_NE(why.find(sentence), std::string::npos) << file << '\n' << why;
   }
-  report({.hard =
-              "-ffast-math: isfinite(NaN) is true, a clamp of NaN to ±5 N gives −5 N, a compensated sum is a plain one",
+  report({.hard = "with -ffast-math, isfinite(NaN) is true and rounding errors are not compensated",
           .oracle =
-              "-ffast-math, -Ofast and -ffinite-math-only end the build with a sentence, in core, protocol, server and "
-              "clients; without them nothing is said",
+              "-ffast-math, -Ofast and -ffinite-math-only cause an error message in core, protocol, server and clients",
           .result = std::to_string(stopped) + " flags, " + std::to_string(files.size()) + " files",
           .without = "the #error left out: everything compiles"});
 }
@@ -184,11 +182,9 @@ TEST(HardArithmetic, DenormalsAreOffInHapticStepsAndSoftBodyAnswers) {
   EXPECT_EQ(slow_answers, 0);
   EXPECT_GT(slow_without, 0);
   report(
-      {.hard =
-           "a force that decays ends in numbers below 2.2e-308, with which x86-64 computes some hundred times slower",
+      {.hard = "a decaying force becomes a denormal number, with which x86-64 is some hundred times slower",
        .oracle =
-           "in every read and apply of a haptic step they are 0, though a driver has put the mode back; no answer of a "
-           "body that swings out has one",
+           "denormals are 0 in all haptic steps, even if a driver changes the mode, and in all answers of a soft body",
        .result = std::to_string(device.flushed) + " of " + std::to_string(device.calls) + " calls; " +
                  std::to_string(slow_answers) + " of " + std::to_string(kAnswers) + " answers",
        .without = "DenormalsOff left out: " + std::to_string(slow_without) + " answers"});
@@ -324,14 +320,10 @@ TEST(HardArithmetic, NaNIsCountedAndLeavesServerAndEngineAsTheyWere) {
     EXPECT_EQ(spoilt.world.server().stats().controller.invalid, before.invalid);
     for (const std::uint64_t number : spoilt.bits) EXPECT_TRUE(std::isfinite(std::bit_cast<double>(number)));
   }
-  report(
-      {.hard =
-           "NaN, Inf, 1e300 on the wire, in a force or in a position: one of them in a filter or a mesh stays for ever",
-       .oracle =
-           "each is counted; 1 s later every number of device, controller, engine and soft body is that of a twin that "
-           "was sent nothing, to the last bit; a denormal is a number",
-       .result = std::to_string(refused) + " refused, " + std::to_string(compared) + " numbers equal",
-       .without = "the codec's bound left out: the twins part"});
+  report({.hard = "NaN, Inf or 1e300 in a message stays in a filter or a mesh for ever",
+          .oracle = "each is counted; 1 s later all numbers are equal to those of a twin without them, to the last bit",
+          .result = std::to_string(refused) + " refused, " + std::to_string(compared) + " numbers equal",
+          .without = "the codec's bound left out: the twins part"});
 }
 
 }  // namespace
