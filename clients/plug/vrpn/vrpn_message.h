@@ -11,9 +11,9 @@
 
 #include "protocol/messages.h"
 
-// Encoding of VRPN messages. VRPN.md specifies each layout and contains golden messages, which a test compares with
-// these functions. All numbers are big-endian. The input is untrusted: read functions return nothing if bytes are
-// missing, left over, or contain numbers that are not finite.
+// Encoding of VRPN messages. VRPN.md specifies each layout, and GOLDEN.md contains golden messages, which a test
+// compares with these functions. All numbers are big-endian. The input is untrusted: read functions return nothing if
+// bytes are missing, left over, or contain numbers that are not finite.
 //
 // Thread-safe, realtime-safe: yes, except functions that append to a vector.
 

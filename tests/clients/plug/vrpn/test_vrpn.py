@@ -44,7 +44,7 @@ def stage(tmp_path_factory):
 
 
 def test_the_golden_messages_are_what_this_client_says_and_reads():
-    page = (ROOT / "clients" / "plug" / "vrpn" / "VRPN.md").read_text(encoding="utf-8")
+    page = (ROOT / "clients" / "plug" / "vrpn" / "GOLDEN.md").read_text(encoding="utf-8")
     golden = {}
     for name, block in re.findall(r"^```golden (\S+)\n(.*?)^```", page, re.MULTILINE | re.DOTALL):
         golden[name] = bytes.fromhex(" ".join(line.partition(";")[0] for line in block.splitlines()))
