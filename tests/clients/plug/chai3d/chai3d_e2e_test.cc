@@ -101,7 +101,7 @@ TEST(Chai3d, AProgramFindsTheDeviceAndMovesWithItOneTurnAStep) {
   EXPECT_GT(most, 0.010);
   std::printf("%.1f %% of a core, %.0f turns in %.3f s, getter p99 %.2f us\n", 100 * used / took,
               number_in(end, "turns"), took, number_in(end, "getter_p99_us"));
-  // Measured: 8 % of a core on an idle machine (README.md). The bound only detects a loop that does not sleep.
+  // Measured: 8 % of a core on an idle machine. The bound only detects a loop that does not sleep.
   EXPECT_LT(used / took, 0.25) << "of a core";
 }
 
