@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Measures the tables in clients/mujoco/README.md: the cost of a step and the force on a sphere 2 mm deep in B1, for
-// several meshes. Then it measures the static stiffness of B1 under a patch (tests/tools/lab/ACCURACY.md) and the
-// cost of an answer for the peg wedged in its hole. Run tests/clients/typescript/run mujoco build first.
+// Measures the cost of a step and the force on a sphere 2 mm deep in B1, for several meshes. Then it measures the
+// static stiffness of B1 under a patch (tests/tools/lab/ACCURACY.md) and the cost of an answer for the peg wedged in
+// its hole. Run tests/clients/typescript/run mujoco build first.
 import { readFileSync } from "node:fs";
 import { TouchableScene, zUp } from "../../../clients/mujoco/build/clients/mujoco/src/index.js";
 import { press } from "../../../clients/mujoco/build/tests/clients/mujoco/pressed_block.js";
