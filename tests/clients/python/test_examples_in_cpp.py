@@ -150,6 +150,15 @@ def test_the_gallery_shows_each_example_with_a_command_in_both_languages():
     assert {path.stem for path in IN_CPP.glob("*.cc")} == {*RENDERING, "echo_motion", "robot"}
 
 
+def test_the_quickstart_shows_the_wall_in_each_language_word_for_word():
+    page = (ROOT / "clients" / "QUICKSTART.md").read_text(encoding="utf-8")
+    for fence, name in (("cpp", "cpp"), ("python", "python"), ("ts", "typescript")):
+        (block,) = re.findall(rf"^```{fence}\n(.*?)^```", page, re.M | re.S)
+        (source,) = (ROOT / "clients" / name / "examples").glob("virtual_wall.*")
+        code = source.read_text(encoding="utf-8")
+        assert block == re.sub(r"\A(#!.*\n)?(//|#) SPDX.*\n", "", code), source
+
+
 @pytest.fixture
 def draw(monkeypatch: pytest.MonkeyPatch) -> Callable[..., int]:
     """Runs clients/examples/draw for 1.8 s. Returns the exit code."""
