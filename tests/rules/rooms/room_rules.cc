@@ -2,8 +2,6 @@
 #include "tests/rules/rooms/room_rules.h"
 
 #include <algorithm>
-#include <array>
-#include <cctype>
 #include <cstddef>
 #include <fstream>
 #include <initializer_list>
@@ -14,13 +12,13 @@
 #include <set>
 #include <string>
 #include <string_view>
-#include <utility>
 #include <vector>
+
+#include "tests/rules/rooms/citations.h"
+#include "tests/rules/rooms/text.h"
 
 namespace tendon::rooms {
 namespace {
-
-using Names = std::vector<std::string_view>;
 
 // ---- The rules, as tables -------------------------------------------------------------------------------------------
 
@@ -42,8 +40,6 @@ const std::vector<Room>& rooms() {
   };
   return kRooms;
 }
-
-const Names kRoomFolders = {"clients", "core", "deploy", "devices", "protocol", "server", "tests"};
 
 const Names kAtTheRoot = {".ci",          ".dockerignore",  ".clang-format",     ".clang-tidy",     ".gitignore",
                           "CHANGELOG.md", "CMakeLists.txt", "CMakePresets.json", "CONTRIBUTING.md", "LICENSE",
@@ -143,42 +139,12 @@ const Names kClockReaders = {
     "tests/tools/injector/proxy/real_time.cc", "tests/tools/conformance/udp_wire.cc",
     "tests/tools/conformance/worker_wire.cc", "*_main.cc"};
 
-/// A path with one of these endings is a citation when its first folder is a room. A page (.md) always is one.
-const Names kCitedSources = {"*.h",  "*.cc",   "*.py",  "*.ts",    "*.mjs",  "*.proto",
-                             "*.sh", "*.toml", "*.csv", "*.cmake", "*.html", "*.css"};
-
-/// Cited pages of other projects.
-const Names kPagesElsewhere = {"docs/spec.md"};
-
-constexpr std::string_view kProofs = "core/PROOFS.md";
-
 // ---- Reading --------------------------------------------------------------------------------------------------------
-
-bool one_of(std::string_view path, const Names& patterns) {
-  return std::ranges::any_of(patterns, [&](std::string_view pattern) {
-    if (pattern.starts_with('*')) {
-      return path.ends_with(pattern.substr(1));
-    }
-    return pattern.ends_with('/') ? path.starts_with(pattern) : path == pattern;
-  });
-}
-
-std::string_view first_folder(std::string_view path) { return path.substr(0, path.find('/')); }
 
 /// "clients/cpp/" for "clients/cpp/run.cc".
 std::string_view guest_folder(std::string_view path) {
   const auto end = path.find('/', path.find('/') + 1);
   return end == std::string_view::npos ? std::string_view() : path.substr(0, end + 1);
-}
-
-std::vector<std::string_view> lines_of(std::string_view text) {
-  std::vector<std::string_view> lines;
-  while (!text.empty()) {
-    const auto end = text.find('\n');
-    lines.push_back(text.substr(0, end));
-    text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
-  }
-  return lines;
 }
 
 struct Include {
@@ -187,84 +153,10 @@ struct Include {
   std::string name;
 };
 
-bool is_cpp(std::string_view path) { return path.ends_with(".h") || path.ends_with(".cc"); }
-
 bool is_source(const File& file) {
   return one_of(file.path, {"*.h", "*.cc", "*.h.in", "*.cc.in", "*.cmake.in", "*.proto", "*.cmake", "*CMakeLists.txt",
                             "*.mjs", "*.js", "*.ts", "*.py", "*.sh", "*.toml"}) ||
          file.text.starts_with("#!");
-}
-
-std::string join(std::initializer_list<std::string_view> parts) {
-  std::string all;
-  for (const auto part : parts) {
-    all += part;
-  }
-  return all;
-}
-
-/// Calls `comment` with the range of every comment of a C++ source, and `literal` with the inside of every string and
-/// character literal. The file name of an #include "…" is not a literal.
-template <class OnComment, class OnLiteral>
-void for_each_comment_and_literal(std::string_view text, const OnComment& comment, const OnLiteral& literal) {
-  const auto end_after = [&](std::string_view mark, std::size_t from) {
-    const auto at = text.find(mark, from);
-    return at == std::string_view::npos ? text.size() : at + mark.size();
-  };
-  // Returns the end of a literal that begins at `from` with `quote`.
-  const auto end_of_literal = [&](std::size_t from, char quote) {
-    auto i = from + 1;
-    while (i < text.size() && text[i] != quote && text[i] != '\n') {
-      i += text[i] == '\\' ? 2 : 1;
-    }
-    return std::min(i, text.size());
-  };
-  const auto is_name = [](char c) { return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_'; };
-
-  bool in_include = false;
-  for (std::size_t i = 0; i < text.size();) {
-    const auto rest = text.substr(i);
-    if (text[i] == '\n') {
-      in_include = false;
-      ++i;
-    } else if (text[i] == '#') {
-      in_include = rest.substr(1).find_first_not_of(" \t") != std::string_view::npos &&
-                   rest.substr(1 + rest.substr(1).find_first_not_of(" \t")).starts_with("include");
-      ++i;
-    } else if (rest.starts_with("//")) {
-      const auto end = std::min(text.find('\n', i), text.size());
-      comment(i, end);
-      i = end;
-    } else if (rest.starts_with("/*")) {
-      const auto end = end_after("*/", i + 2);
-      comment(i, end);
-      i = end;
-    } else if (rest.starts_with("R\"") && (i == 0 || !is_name(text[i - 1]))) {
-      const auto open = text.find('(', i);
-      const auto mark = open == std::string_view::npos ? std::string_view() : text.substr(i + 2, open - i - 2);
-      const auto end = end_after(join({")", mark, "\""}), i + 2);
-      literal(i, end);
-      i = end;
-    } else if (text[i] == '"' && !in_include) {
-      const auto end = end_of_literal(i, '"');
-      literal(i + 1, end);
-      i = end + 1;
-    } else if (text[i] == '\'' && (i == 0 || !is_name(text[i - 1]))) {  // not the digit separator in 1'000
-      const auto end = end_of_literal(i, '\'');
-      literal(i + 1, end);
-      i = end + 1;
-    } else {
-      ++i;
-    }
-  }
-}
-
-/// Returns `text` with a space in place of each character except for line ends.
-std::string spaces_for(std::string_view text) {
-  std::string spaces(text);
-  std::ranges::replace_if(
-      spaces, [](char c) { return c != '\n'; }, ' ');
-  return spaces;
 }
 
 std::string list(const Names& names) {
@@ -321,8 +213,6 @@ std::optional<std::string> broken_by_library_include(const std::string& path, co
   }
   return std::nullopt;
 }
-
-bool contains(std::string_view line, std::string_view word) { return line.find(word) != std::string_view::npos; }
 
 void check_includes(const File& file, const std::vector<std::string_view>& lines, std::vector<Finding>& findings) {
   static const std::regex kInclude(R"re(^\s*#\s*include\s*(["<])([^">]*)[">])re");
@@ -424,168 +314,6 @@ void check_first_lines(const File& file, std::vector<Finding>& findings) {
   }
 }
 
-// ---- The rule about citations ---------------------------------------------------------------------------------------
-
-/// The names that can be cited. The views refer to the tree.
-struct Citable {
-  std::set<std::string_view> endings;   ///< "x.cc" and "core/x.cc" for core/x.cc
-  std::set<std::string_view> sections;  ///< headings "## 1. Name" of core/PROOFS.md, without the number
-};
-
-Citable citable_in(const std::vector<File>& tree) {
-  Citable citable;
-  for (const auto& file : tree) {
-    const std::string_view path = file.path;
-    for (std::size_t at = 0; at != std::string_view::npos;) {
-      citable.endings.insert(path.substr(at));
-      const auto slash = path.find('/', at);
-      at = slash == std::string_view::npos ? slash : slash + 1;
-    }
-    if (path != kProofs) {
-      continue;
-    }
-    for (auto line : lines_of(file.text)) {
-      if (line.starts_with("## ")) {
-        line.remove_prefix(std::min(line.find_first_not_of("# 0123456789."), line.size()));
-        citable.sections.insert(line);
-      }
-    }
-  }
-  return citable;
-}
-
-/// Returns the text of a page, or the comments of a source without their marks, at the same lines and columns.
-std::string prose_of(const File& file) {
-  const std::string_view text = file.text;
-  if (file.path.ends_with(".md")) {
-    return file.text;
-  }
-  std::string prose = spaces_for(text);
-  const auto keep = [&](std::size_t from, std::size_t to) { prose.replace(from, to - from, text, from, to - from); };
-  if (is_cpp(file.path)) {
-    for_each_comment_and_literal(text, keep, [](std::size_t, std::size_t) {});
-  } else {
-    std::size_t begin = 0;
-    for (const auto line : lines_of(text)) {
-      const auto first = std::min(line.find_first_not_of(" \t"), line.size());
-      auto mark = line.find("//");
-      while (mark != std::string_view::npos && mark > 0 && line[mark - 1] == ':') {  // an address
-        mark = line.find("//", mark + 2);
-      }
-      mark = line.substr(first).starts_with('*') ? first : std::min(mark, line.find('#'));
-      if (mark != std::string_view::npos) {
-        keep(begin + mark, begin + line.size());
-      }
-      begin += line.size() + 1;
-    }
-  }
-  bool front = true;  // only spaces and marks before this character of its line
-  for (char& c : prose) {
-    if (c == '\n') {
-      front = true;
-    } else if (front && (c == '/' || c == '*' || c == '#' || c == '<' || c == '!')) {
-      c = ' ';
-    } else if (c != ' ' && c != '\t') {
-      front = false;
-    }
-  }
-  return prose;
-}
-
-bool is_of_path(char c) {
-  return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_' || c == '.' || c == '/' || c == '-';
-}
-
-/// Returns whether `name` cites a file of this tree. The name "x" is a placeholder.
-bool names_a_file(std::string_view name) {
-  if (name.starts_with('/') || name.substr(name.rfind('/') + 1).starts_with('.') || one_of(name, kPagesElsewhere) ||
-      contains(name, "/x.") || contains(name, "/x_") || contains(name, "/x/")) {
-    return false;
-  }
-  const bool in_a_room = std::ranges::find(kRoomFolders, first_folder(name)) != kRoomFolders.end();
-  return name.ends_with(".md") || (in_a_room && contains(name, "/") && one_of(name, kCitedSources));
-}
-
-void check_cited_files(const File& file, std::string_view prose, const Citable& citable,
-                       std::vector<Finding>& findings) {
-  const auto folder = std::filesystem::path(file.path).parent_path();
-  int number = 0;
-  for (const auto line : lines_of(prose)) {
-    ++number;
-    if (contains(line, "include \"")) {
-      continue;
-    }
-    for (std::size_t from = 0; from < line.size();) {
-      if (!is_of_path(line[from])) {
-        ++from;
-        continue;
-      }
-      auto to = from;
-      while (to < line.size() && is_of_path(line[to])) {
-        ++to;
-      }
-      auto name = line.substr(from, to - from);
-      while (name.ends_with('.')) {  // the end of a sentence
-        name.remove_suffix(1);
-      }
-      // The name is a part of a URL, a variable or a pattern.
-      const bool part = (from > 0 && contains(":~@$<>{}*\\", line.substr(from - 1, 1))) ||
-                        (to < line.size() && contains("<>{}*$", line.substr(to, 1)));
-      from = to;
-      if (part || !names_a_file(name)) {
-        continue;
-      }
-      const auto beside = (folder / name).lexically_normal().generic_string();
-      if (!citable.endings.contains(name) && !citable.endings.contains(beside)) {
-        findings.push_back({file.path, number, join({"cites ", name, ", which does not exist"})});
-      }
-    }
-  }
-}
-
-/// Finds `core/PROOFS.md, "Output bound"` and `core/PROOFS.md, "Output bound" and "Late holds"`, also over the end of a
-/// line.
-void check_cited_sections(const File& file, std::string_view prose, const Citable& citable,
-                          std::vector<Finding>& findings) {
-  constexpr std::string_view kSpace = " \t\n";
-  for (auto at = prose.find(kProofs); at != std::string_view::npos; at = prose.find(kProofs, at + 1)) {
-    const auto number = 1 + static_cast<int>(std::ranges::count(prose.substr(0, at), '\n'));
-    auto rest = prose.substr(at + kProofs.size());
-    const auto skip = [&rest](std::string_view characters) {
-      rest.remove_prefix(std::min(rest.find_first_not_of(characters), rest.size()));
-    };
-    skip("`)");
-    if (!rest.starts_with(',')) {
-      continue;
-    }
-    while (true) {
-      skip(",");
-      skip(kSpace);
-      if (rest.starts_with("and")) {
-        rest.remove_prefix(3);
-        skip(kSpace);
-      }
-      const auto end = rest.starts_with('"') ? rest.find('"', 1) : std::string_view::npos;
-      if (end == std::string_view::npos) {
-        break;
-      }
-      std::string name;
-      for (const char c : rest.substr(1, end - 1)) {
-        const bool space = contains(kSpace, std::string_view(&c, 1));
-        if (!space) {
-          name += c;
-        } else if (!name.ends_with(' ')) {
-          name += ' ';
-        }
-      }
-      if (!citable.sections.contains(name)) {
-        findings.push_back({file.path, number, join({kProofs, " has no section \"", name, "\""})});
-      }
-      rest.remove_prefix(end + 1);
-    }
-  }
-}
-
 // ---- The rules about the tree ---------------------------------------------------------------------------------------
 
 void check_places(const std::vector<File>& tree, std::vector<Finding>& findings) {
@@ -617,9 +345,7 @@ std::vector<Finding> check(const std::vector<File>& tree) {
   for (const auto& file : tree) {
     std::vector<Finding> in_file;
     if (is_source(file) || (file.path.ends_with(".md") && file.path != "CHANGELOG.md")) {
-      const auto prose = prose_of(file);
-      check_cited_files(file, prose, citable, in_file);
-      check_cited_sections(file, prose, citable, in_file);
+      check_citations(file, citable, in_file);
     }
     if (is_source(file)) {
       check_first_lines(file, in_file);
