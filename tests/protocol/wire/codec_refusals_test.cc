@@ -514,27 +514,6 @@ TEST(Codec, StiffnessHasOneThreeOrNineEntries) {
   }
 }
 
-TEST(Codec, NineStiffnessEntriesAreRowByRow) {
-  DataReader reader;
-  const auto* content = reader.read(datagram_with(raw_force([](RawProtobuf& force) {
-    force.message(4, RawProtobuf().packed(2, {0, 1, 2, 3, 4, 5, 6, 7, 8}));
-  })));
-  ASSERT_NE(content, nullptr);
-  ASSERT_EQ(content->frames.size(), 1U);
-  EXPECT_EQ(std::get<ForceCommand>(content->frames[0]).model->stiffness(1, 0), 3.0);
-}
-
-TEST(Codec, AStiffnessTravelsInItsShortestForm) {
-  ForceCommand force = examples::force();
-  const auto size = [&](const Mat3& stiffness) {
-    force.model->stiffness = stiffness;
-    return data(1, {}, force).size();
-  };
-  const std::size_t isotropic = size(2000 * Mat3::Identity());
-  EXPECT_EQ(size(Vec3(1, 2, 3).asDiagonal()), isotropic + 16);
-  EXPECT_GE(size(Mat3::Constant(1)), isotropic + 64);
-}
-
 TEST(Codec, FramesAndRequestsOfANewerPeerAreNoError) {
   DataReader reader;
   const auto* content = reader.read(datagram_with(RawProtobuf().text(100, "what we do not know")));
@@ -587,15 +566,6 @@ TEST(Codec, OurOwnTextIsCutToSizeAtACharacterAndWhereItIsNotUtf8) {
   EXPECT_EQ(reason("good\xED\xA0\x80"), "good");      // surrogate
   EXPECT_EQ(reason("good\xF4\x90\x80\x80"), "good");  // beyond U+10FFFF
   EXPECT_EQ(reason("good\xE2\x82"), "good");          // truncated
-}
-
-TEST(Codec, AForceIsValidForWholeMicrosecondsRoundedUp) {
-  ForceCommand force = examples::force();
-  force.valid_for = Duration{1};
-  DataReader reader;
-  const auto* content = read(reader, data(1, {}, force));
-  ASSERT_EQ(content->frames.size(), 1U);
-  EXPECT_EQ(std::get<ForceCommand>(content->frames[0]).valid_for, std::chrono::microseconds(1));
 }
 
 }  // namespace

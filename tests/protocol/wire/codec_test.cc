@@ -478,5 +478,35 @@ TEST(Codec, ASettingComesOutAsItWentIn) {
   }
 }
 
+TEST(Codec, AStiffnessTravelsInItsShortestForm) {
+  ForceCommand force = examples::force();
+  const auto size = [&](const Mat3& stiffness) {
+    force.model->stiffness = stiffness;
+    return data(1, {}, force).size();
+  };
+  const std::size_t isotropic = size(2000 * Mat3::Identity());
+  EXPECT_EQ(size(Vec3(1, 2, 3).asDiagonal()), isotropic + 16);
+  EXPECT_GE(size(Mat3::Constant(1)), isotropic + 64);
+}
+
+TEST(Codec, NineStiffnessEntriesAreRowByRow) {
+  DataReader reader;
+  const auto* content = reader.read(datagram_with(raw_force([](RawProtobuf& force) {
+    force.message(4, RawProtobuf().packed(2, {0, 1, 2, 3, 4, 5, 6, 7, 8}));
+  })));
+  ASSERT_NE(content, nullptr);
+  ASSERT_EQ(content->frames.size(), 1U);
+  EXPECT_EQ(std::get<ForceCommand>(content->frames[0]).model->stiffness(1, 0), 3.0);
+}
+
+TEST(Codec, AForceIsValidForWholeMicrosecondsRoundedUp) {
+  ForceCommand force = examples::force();
+  force.valid_for = Duration{1};
+  DataReader reader;
+  const auto* content = read(reader, data(1, {}, force));
+  ASSERT_EQ(content->frames.size(), 1U);
+  EXPECT_EQ(std::get<ForceCommand>(content->frames[0]).valid_for, std::chrono::microseconds(1));
+}
+
 }  // namespace
 }  // namespace tendon::codec_test
