@@ -110,8 +110,9 @@ void ClientHandshake::settle(const AnswerDatagram& datagram) {
       accepted.keys = {split.initiator_to_responder, split.responder_to_initiator, suite};
     }
     if (accepted.keys && !contains(suites_, accepted.keys->suite)) {
-      outcome_ = Refused{Code::kUnsupported, "the server seals by " + names_of({accepted.keys->suite}) +
-                                                 ", this client by " + names_of(suites_) + " only"};
+      outcome_ =
+          Refused{Code::kUnsupported, "no common cipher suite: the server uses " + names_of({accepted.keys->suite}) +
+                                          ", this client only accepts " + names_of(suites_)};
     } else {
       outcome_ = std::move(accepted);
     }

@@ -84,8 +84,8 @@ NetworkLoop::Config network_config(const Assembly::Config& assembly, const Scene
   NetworkLoop::Config config = assembly.network;
   std::erase_if(config.suites, [&](Suite suite) { return !contains(scene.network.suites, suite); });
   if (config.suites.empty()) {
-    throw std::invalid_argument("network.suites: this processor has no AES instructions, so it cannot seal by " +
-                                names_of(scene.network.suites) + " only: expected chacha20-poly1305 besides");
+    throw std::invalid_argument("network.suites: this processor has no AES instructions, which are required for " +
+                                names_of(scene.network.suites) + ": add chacha20-poly1305");
   }
   config.takeover = scene.network.takeover;
   config.max_observers = scene.network.max_observers;

@@ -27,7 +27,8 @@ std::function<void(int)> tell_guardian(Guardian& guardian, const Scene& scene, c
   const ZeroPacket zero = ZeroPacket::usb(driver.out, std::as_bytes(std::span(driver.zero_packet)));
   return [&guardian, zero, device = scene.loop.device, name = scene.name](int node) {
     const bool heard = node >= 0 ? guardian.guard(device, node, zero) : guardian.forget(device);
-    if (!heard) log::error(name + ": the guardian process is dead: should this one be killed, forces stay on");
+    if (!heard)
+      log::error(name + ": the guardian process has died: if the server is killed, the device keeps its last force");
   };
 }
 

@@ -25,9 +25,9 @@ const char* describe(HapticController::Fault fault) {
     case HapticController::Fault::kPositionNotFinite:
       return "the device measured a position that is not a number";
     case HapticController::Fault::kDeviceSilent:
-      return "the device has stopped answering";
+      return "the device has stopped responding";
     case HapticController::Fault::kPositionJumped:
-      return "the device's position has jumped further than a hand can move: its encoder has wrapped or lost count";
+      return "the position has jumped further than a hand can move: the encoder has wrapped around or lost counts";
   }
   return "unknown";
 }
@@ -41,13 +41,13 @@ std::string describe(Device::State state, const Scene& scene) {
     case Device::State::kFirmware: {
       const auto* falcon = std::get_if<falcon::Config>(&scene.device);
       return falcon != nullptr && !falcon->firmware
-                 ? "the device has no firmware, and no file was named to give it: --falcon-firmware FILE"
-                 : "the device is being given its firmware";
+                 ? "the device has no firmware, and no firmware file is set: use --falcon-firmware FILE"
+                 : "the firmware is being loaded into the device";
     }
     case Device::State::kUnhomed:
-      return "the device has to be " + std::string(scene.driver().homing);
+      return "the device must be " + std::string(scene.driver().homing);
     case Device::State::kHomed:
-      return scene.driver().moves_a_hand ? "the device is homed" : "the device is there";
+      return scene.driver().moves_a_hand ? "the device is homed" : "the device is ready";
   }
   return "unknown";
 }
@@ -175,7 +175,7 @@ void LogLoop::record_all(LocalTime now) {
     datagrams_lost += news(network.mail->datagrams_lost, network.datagrams_lost);
   }
   if (steps_lost > 0 || datagrams_lost > 0) {
-    say(Level::kWarning, "the log thread could not follow: " + std::to_string(steps_lost) + " steps and " +
+    say(Level::kWarning, "the log thread is too slow: " + std::to_string(steps_lost) + " steps and " +
                              std::to_string(datagrams_lost) + " datagrams are missing");
     if (recorder_) recorder_->lost({.at = now, .steps = steps_lost, .datagrams = datagrams_lost});
   }
@@ -194,7 +194,7 @@ void LogLoop::record_left_out(LocalTime now) {
   }
   if (strangers > 0) recorder_->lost({.at = now, .cause = LossRecord::Cause::kSample, .strangers = strangers});
   if (datagrams > 0) {
-    say(Level::kWarning, std::to_string(datagrams) + " datagrams are not recorded: more bytes came in a second than " +
+    say(Level::kWarning, std::to_string(datagrams) + " datagrams are not recorded: their rate exceeds " +
                              "[recording] datagrams_kb_per_s");
     recorder_->lost({.at = now, .datagrams = datagrams, .cause = LossRecord::Cause::kByteBudget});
   }
@@ -241,7 +241,7 @@ void LogLoop::report_overruns(LocalTime now, ThreadLog& thread) {
   const std::size_t others = thread.devices.size() - 1;
   say(Level::kWarning, *thread.devices.front(),
       std::to_string(due->count) + " overruns in the last " + (due->of_a_minute ? "minute" : "second") +
-          (others > 0 ? ", as of " + std::to_string(others) + " more on its thread" : "") +
+          (others > 0 ? ", also of " + std::to_string(others) + " other devices on this thread" : "") +
           "; longest interval so far " +
           std::to_string(std::chrono::duration_cast<std::chrono::microseconds>(longest).count()) + " µs");
 }
@@ -256,7 +256,7 @@ void LogLoop::report_trouble(DeviceLog& device) {
   if (takes_records_ && device.of.mail.flight.frozen()) {
     if (now.fault != HapticController::Fault::kNone) {
       say(Level::kError, device,
-          std::string("fault: ") + describe(now.fault) + "; force is zero until a controller rearms");
+          std::string("fault: ") + describe(now.fault) + "; the force is zero until a client rearms the device");
     }
     save_flight(device);
   }
@@ -268,12 +268,12 @@ void LogLoop::report_safety(DeviceLog& device) {
   const SafeDevice::Status now = device.of.safe->status();
   const SafeDevice::Status before = std::exchange(device.told.safety, now);
   if (now.faults > before.faults) {
-    say(Level::kError, device, "no force any more: " + std::string(to_string(now.last_fault)));
+    say(Level::kError, device, "fault of the safety layer: " + std::string(to_string(now.last_fault)));
   }
   const bool armed = now.state == SafetyState::kArmed;
   const bool was_armed = before.state == SafetyState::kArmed;
   if (armed && !was_armed) say(Level::kInfo, device, "the device is armed");
-  if (was_armed && now.state < SafetyState::kArmed) say(Level::kInfo, device, "the device is no longer armed");
+  if (was_armed && now.state < SafetyState::kArmed) say(Level::kInfo, device, "the device is disarmed");
 }
 
 void LogLoop::report_counts(DeviceLog& device) {
@@ -303,9 +303,9 @@ void LogLoop::save_flight(DeviceLog& device) {
                                   devices_.size() == 1 ? "" : device.of.scene.name);
     Mailboxes& mail = device.of.mail;
     write_flight(mail.flight, {.scene = scene_record(device.of.scene), .started = started_}, mail.ways, *sink);
-    say(Level::kError, "the steps before the fault are in " + sink->path().string());
+    say(Level::kError, "the steps before the fault are saved in " + sink->path().string());
   } catch (const std::exception& problem) {
-    say(Level::kError, std::string("the steps before the fault are lost: ") + problem.what());
+    say(Level::kError, std::string("cannot save the steps before the fault: ") + problem.what());
   }
   device.of.mail.flight.thaw();
 }

@@ -120,14 +120,16 @@ void stop_this_process(Server& server, UnblockedOutput& output) {
   sigaddset(&going_on, SIGCONT);
   constexpr timespec kNow{};
   server.suspend();
-  log::warn("stopped by SIGTSTP: no force until it goes on (SIGCONT, `fg` or `bg`) and the device is armed again");
+  log::warn(
+      "stopped by SIGTSTP: the force is zero until the process continues (SIGCONT, `fg` or `bg`) and the device is "
+      "armed again");
   output.flush();
   if (sigtimedwait(&going_on, nullptr, &kNow) < 0) {
     ::kill(::getpid(), SIGSTOP);
     sigtimedwait(&going_on, nullptr, &kNow);
   }
   server.resume();
-  log::info("it goes on");
+  log::info("continued after SIGCONT");
 }
 
 // Waits for a signal or, if `duration_s` is not zero, for this time, and notifies the watchdog of the service manager.
@@ -150,7 +152,7 @@ std::string wait_for_the_end(const sigset_t& signals, double duration_s, Server&
     }
     if (signal > 0) return "signal " + std::to_string(signal);
     if (errno == EINTR) continue;  // after SIGSTOP and SIGCONT
-    if (left && (*left -= wait) <= Duration::zero()) return "its duration is over";
+    if (left && (*left -= wait) <= Duration::zero()) return "the duration has ended";
   }
 }
 
@@ -305,7 +307,7 @@ int run(const std::vector<Scene>& scenes, double duration_s, bool json) {
   if (recording) {
     const std::filesystem::path& wanted = scenes.front().recording->path;
     log::info("recording to " + recording->string() +
-              (*recording == wanted ? "" : ": there is a " + wanted.string() + " already"));
+              (*recording == wanted ? "" : ", because " + wanted.string() + " exists"));
   }
   if (json) {
     Json listening = {{"event", "listening"}, {"address", to_string(server.address())}};
@@ -321,11 +323,11 @@ int run(const std::vector<Scene>& scenes, double duration_s, bool json) {
             " overruns, " + std::to_string(summary.network.forces) + " forces");
   if (summary.recording && summary.recording->parts_not_kept > 0) {
     log::info(std::to_string(summary.recording->parts_not_kept) + " of " + std::to_string(summary.recording->parts) +
-              " recorded files not kept: no fault ([recording] keep)");
+              " recorded files were deleted because they contain no fault ([recording] keep)");
   }
   if (json) lines.add(in_json(summary));
   if (!summary.recording || summary.recording->complete()) return 0;
-  log::error("the recording is not whole: " + what_is_missing(*summary.recording));
+  log::error("the recording is incomplete: " + what_is_missing(*summary.recording));
   return kFailed;
 }
 
@@ -371,7 +373,8 @@ void set_falcon(std::vector<Scene>& scenes, const OptionalPath& firmware, bool a
     if (firmware) falcon->firmware = firmware;
     if (accept_unknown_firmware) falcon->accept_unknown_firmware = true;
   }
-  if (firmware && !any) throw std::invalid_argument("--falcon-firmware: no scene has [device] kind = \"falcon\"");
+  if (firmware && !any)
+    throw std::invalid_argument("--falcon-firmware: expected a scene with [device] kind = \"falcon\"");
 }
 
 void dial_instead(std::vector<Scene>& scenes, const Address& server) {
@@ -414,10 +417,10 @@ int make_key(const std::string& name, const std::string& file, bool observer) {
     fill_random(key.key.bytes());
     write_key_file(file, key);
     std::cerr << "Wrote " << file << ", a key for " << (observer ? "an observer" : "a controller")
-              << ". The server and the client each need a copy, over a way that you trust.\n"
-                 "  on the server, in the folder of its scene:  mkdir -p -m 700 keys && cp "
+              << ". Copy it to the server and to the client over a trusted connection.\n  on the server, in the folder "
+                 "of the scene:  mkdir -p -m 700 keys && cp "
               << file << " keys/\n"
-              << "  in its scene:                               [network]\n"
+              << "  in the scene:                               [network]\n"
                  "                                              keys = \"keys\"\n"
                  "  the client:                                 "
               << (observer ? "tendon-dash" : "virtual_wall") << " --key " << file << " --server HOST:47100\n";
@@ -432,25 +435,23 @@ int make_key(const std::string& name, const std::string& file, bool observer) {
 
 int main(int argc, char** argv) {
   CLI::App app(
-      "The haptics server. Runs the device loop and the output limiter beside the device, and lets remote physics\n"
-      "engines send forces over UDP.\n",
+      "Run the haptics server. It runs the control loop and the output limiter next to the device, and receives "
+      "forces\n"
+      "from remote physics engines over UDP.\n",
       "tendond");
   usage::dress(app);
   app.footer(
       "Examples:\n"
       "  tendond deploy/scenes/demo.toml --record run.mcap\n"
-      "  tendond deploy/scenes/left.toml deploy/scenes/right.toml\n"
-      "\n"
-      "The second one has two devices. [network] and [recording] are in the first scene only. [device] count = 512 in "
-      "a\n"
-      "scene makes many simulated devices.\n"
-      "\n"
+      "  tendond deploy/scenes/left.toml deploy/scenes/right.toml\n\n"
+      "The second example runs two devices. [network] and [recording] are only allowed in the first scene. Use "
+      "[device]\n"
+      "count = 512 in a scene for many simulated devices.\n\n"
       "Files:\n"
-      "  /etc/tendon/scene.toml     the scene of the service tendond\n"
-      "  /usr/share/tendon/scenes   scenes to start from\n"
-      "\n"
-      "Exit: 0 done; 1 a file, a port or a device cannot be used, or the recording is not whole;\n"
-      "2 wrong usage, or a mistake in a scene.");
+      "  /etc/tendon/scene.toml     scene of the service tendond\n"
+      "  /usr/share/tendon/scenes   example scenes\n\n"
+      "Exit: 0 success; 1 a file, a port or a device cannot be used, or the recording is incomplete;\n"
+      "2 wrong usage, or an error in a scene.");
   std::vector<std::filesystem::path> scene_files;
   std::string record;
   std::string listen;
@@ -463,73 +464,84 @@ int main(int argc, char** argv) {
   auto* scene_option = app.add_option("SCENE", scene_files, "Scene files (TOML), one for each device");
   scene_option->expected(1, static_cast<int>(limits::kMaxDevices))->check(CLI::Validator(meant_command, ""));
   app.add_option("--record", record,
-                 "Record to this MCAP file, whatever the scene's [recording] says. A file that is there is never "
-                 "overwritten: run.mcap goes on as run-2.mcap")
+                 "Record to this MCAP file instead of that in [recording] of the scene. Existing files are never "
+                 "overwritten: if run.mcap exists, run-2.mcap is written")
       ->type_name("FILE.mcap");
-  app.add_option("--listen", listen, "Where to listen, whatever the scene says; port 0 lets the system choose")
+  app.add_option("--listen", listen,
+                 "Receive datagrams at this address instead of [network] listen of the scene. Port 0: a free port")
       ->type_name("HOST:PORT");
-  app.add_option("--dial", dial, "The server to couple with, instead of that of [teleoperation]")
+  app.add_option("--dial", dial, "Connect to this server instead of [teleoperation] dial of the scene")
       ->type_name("HOST:PORT");
   app.add_option("--duration-s", duration_s,
-                 "Stop so many seconds after the first haptic step; 0 = at SIGINT or SIGTERM")
+                 "Stop this number of seconds after the first haptic step. 0: run until SIGINT or SIGTERM")
       ->capture_default_str();
-  app.add_flag(
-      "--without-limiter", without_limiter,
-      "Turn off the output limiter, and in a coupling the energy sharing and the delay-dependent stiffness. Simulated "
-      "devices only");
+  app.add_flag("--without-limiter", without_limiter,
+               "Disable the output limiter, and in a coupling the energy sharing and the delay-dependent stiffness. "
+               "For simulated devices only");
   std::string firmware;
   bool accept_unknown_firmware = false;
-  constexpr const char* kFalcon = "A Novint Falcon";
+  constexpr const char* kFalcon = "Novint Falcon";
   constexpr const char* kAbout = "Print and exit";
   const auto add_firmware = [&](CLI::App& to) {
-    to.add_option("--falcon-firmware", firmware, "File with a Novint Falcon's firmware, whatever the scene says")
+    to.add_option("--falcon-firmware", firmware,
+                  "Load the firmware of a Novint Falcon from this file instead of [device] firmware of the scene")
         ->type_name("FILE")
         ->group(kFalcon);
-    to.add_flag("--accept-unknown-firmware", accept_unknown_firmware, "Take a firmware that is none of the known files")
+    to.add_flag("--accept-unknown-firmware", accept_unknown_firmware,
+                "Accept a firmware file that is not one of the known files")
         ->group(kFalcon);
   };
   add_firmware(app);
   app.add_flag("--json", json,
-               "One JSON object per line on stdout: listening; welcomed and left, for each session; stopped");
-  app.add_flag("--profiles", profiles, "The profiles of devices and operators, and how each of their numbers is known")
+               "Print JSON on stdout, one object per line: listening; welcomed and left for each session; stopped");
+  app.add_flag("--profiles", profiles, "Print the profiles of devices and operators, with the source of each number")
       ->group(kAbout);
-  auto* scene_help = app.add_option("--scene-help", table, "The tables of a scene; of one TABLE, or of all, every key")
-                         ->type_name("[TABLE]")
-                         ->expected(0, 1)
-                         ->group(kAbout);
+  auto* scene_help =
+      app.add_option("--scene-help", table,
+                     "Print the tables of a scene file, or all keys of one TABLE, or of all tables with \"all\"")
+          ->type_name("[TABLE]")
+          ->expected(0, 1)
+          ->group(kAbout);
   std::string key_name;
   std::string key_file;
   bool observer = false;
   auto* keygen = app.add_subcommand(
-      "keygen", "Make a key for one client: `tendond keygen wall` writes wall.key, which only you may read");
+      "keygen", "Create a key for a client: `tendond keygen wall` writes wall.key, which is only readable by you");
   keygen->footer(
-      "\nExample: tendond keygen wall\n\nExit: 0 done; 1 the file is there or cannot be written; 2 wrong usage.");
-  keygen->add_option("NAME", key_name, "The client's name on this server")->required();
-  keygen->add_option("--out", key_file, "Write to this file instead of NAME.key")->type_name("FILE");
-  keygen->add_flag("--observer", observer, "A key whose owner may watch, but send no forces");
-  auto* explainer = app.add_subcommand(
-      "explain",
-      "What a scene runs and leaves out, and what each part adds to a haptic step: `tendond explain demo.toml`");
+      "\n"
+      "Example: tendond keygen wall\n\n"
+      "Exit: 0 success; 1 the file exists or cannot be written; 2 wrong usage.");
+  keygen->add_option("NAME", key_name, "Name of the client at this server")->required();
+  keygen->add_option("--out", key_file, "Write the key to this file instead of NAME.key")->type_name("FILE");
+  keygen->add_flag("--observer", observer, "Create a key for an observer, which cannot send forces");
+  auto* explainer = app.add_subcommand("explain",
+                                       "List the parts of a scene that are on and off, and measure the cost of each "
+                                       "part in a haptic step: `tendond explain demo.toml`");
   explainer->footer(
-      "\nExample: tendond explain deploy/scenes/demo.toml\n\nExit: 0 done; 2 wrong usage or a wrong scene.");
+      "\n"
+      "Example: tendond explain deploy/scenes/demo.toml\n\n"
+      "Exit: 0 success; 1 a file cannot be read; 2 wrong usage, or an error in a scene.");
   explainer->add_option("SCENE", scene_files, "Scene files")->required();
-  explainer->add_flag("--json", json, "One JSON object per scene on stdout");
-  auto* devices = app.add_subcommand(
-      "devices", "What is plugged in, what it lacks, and how to mend that: `tendond devices --falcon-firmware FILE`");
-  devices->footer("\nExample: tendond devices\n\nExit: 0 done; 1 USB cannot be read; 2 wrong usage.");
+  explainer->add_flag("--json", json, "Print JSON on stdout, one object per scene");
+  auto* devices = app.add_subcommand("devices",
+                                     "List the connected devices, what each of them requires, and how to fix it: "
+                                     "`tendond devices --falcon-firmware FILE`");
+  devices->footer("\nExample: tendond devices\n\nExit: 0 success; 1 USB is not available; 2 wrong usage.");
   add_firmware(*devices);
-  devices->add_flag("--json", json, "One JSON object per device on stdout");
-  auto* doctor = app.add_subcommand(
-      "doctor",
-      "How late a haptic thread would wake on this machine, and what to change for it. Takes two seconds and changes "
-      "nothing: `tendond doctor`");
-  doctor->footer("\nExample: tendond doctor\n\nExit: 0 done; 2 wrong usage.");
-  doctor->add_flag("--json", json, "One JSON object on stdout");
-  app.set_help_flag("-h,--help", "This text")->group(kAbout);
-  app.set_version_flag("--version", version_text(), "The version and the commit")->group(kAbout);
+  devices->add_flag("--json", json, "Print JSON on stdout, one object per device");
+  auto* doctor =
+      app.add_subcommand("doctor",
+                         "Measure the wake-up latency of a haptic thread on this machine, and recommend changes. This "
+                         "takes two seconds and does not change any settings: `tendond doctor`");
+  doctor->footer("\nExample: tendond doctor\n\nExit: 0 success; 2 wrong usage.");
+  doctor->add_flag("--json", json, "Print JSON on stdout, one object");
+  app.set_help_flag("-h,--help", "Print this help")->group(kAbout);
+  app.set_version_flag("--version", version_text(), "Print the version and the commit")->group(kAbout);
   try {
     usage::parse(app, argc, argv);
     if (profiles) {
+      std::cout
+          << "Each number is measured, quoted from a source, recalled from a source (not verified), or assumed.\n\n";
       for (const DeviceProfile& profile : device_profiles()) std::cout << provenance_table(profile) << '\n';
       for (const OperatorProfile& profile : operator_profiles()) std::cout << provenance_table(profile) << '\n';
       return 0;
@@ -578,7 +590,7 @@ int main(int argc, char** argv) {
     log::error(problem.what());
     return kWrongUsage;
   } catch (const std::bad_alloc&) {
-    log::error("there is too little memory; does `ulimit -v` limit it?");
+    log::error("out of memory; check the limit in `ulimit -v`");
     return kFailed;
   } catch (const std::exception& problem) {
     log::error(problem.what());

@@ -196,11 +196,10 @@ std::uint32_t NetworkLoop::take_connection_id() {
 void NetworkLoop::admit(LocalTime now, const Address& from, const Doorman::Guest& guest,
                         std::span<const std::byte> hello) {
   if (answer_again(now, from, guest)) return;
-  if (guest.version == 0) return refuse(now, from, guest, {Code::kUnsupported, "no protocol version in common"});
+  if (guest.version == 0) return refuse(now, from, guest, {Code::kUnsupported, "no common protocol version"});
   if (!guest.suite) {
-    return refuse(
-        now, from, guest,
-        {Code::kUnsupported, "this server seals by " + names_of(config_.suites) + " only, and you do not offer it"});
+    return refuse(now, from, guest,
+                  {Code::kUnsupported, "no common cipher suite: this server only accepts " + names_of(config_.suites)});
   }
   auto claimed = Admission::seats_of(guest.hello, config_.devices);
   if (auto* const cannot_be = std::get_if<Refusal>(&claimed)) return refuse(now, from, guest, std::move(*cannot_be));
@@ -262,9 +261,9 @@ void NetworkLoop::open(LocalTime now, Guest guest) {
   for (Guest& present : guests_) {
     if (present.gone || !Admission::takes_the_place_of(present, guest.address, guest.key, guest.seats)) continue;
     if (present.address == guest.address) {
-      leave(present, "started again");
+      leave(present, "the client has restarted");
     } else {
-      present.session.close(Code::kReplaced, "a program with the same key has taken this place");
+      present.session.close(Code::kReplaced, "a program with the same key has replaced this session");
       send_all(now, present);
       ++stats_.replaced;
       leave(present, "replaced by a program with the same key");
@@ -276,7 +275,7 @@ void NetworkLoop::open(LocalTime now, Guest guest) {
          "welcomed " + std::string(guest.role == Role::kController ? "controller" : "observer") + " \"" + guest.name +
              "\" at " + to_string(guest.address) +
              (guest.key != nullptr
-                  ? " with the key \"" + guest.key->name + "\", sealed by " + names_of({guest.session.suite()})
+                  ? " with the key \"" + guest.key->name + "\", encrypted by " + names_of({guest.session.suite()})
                   : ""),
          change_of(guest, true, ""));
   if (guest.role == Role::kController) guest.meter.emplace(now);
@@ -307,7 +306,7 @@ void NetworkLoop::dispossess(LocalTime now, Guest& loser, const Guest& winner, c
   const LeaseLost news{.device = number_of(lost.device), .channel = lost.channel, .to = winner.name};
   if (loser.has<kFeatureChannels>() && loser.session.request(news)) return;
   // The client does not support LeaseLost, or has too many open requests.
-  loser.session.close(Code::kReplaced, "\"" + winner.name + "\" has taken this place");
+  loser.session.close(Code::kReplaced, "\"" + winner.name + "\" has replaced this session");
   send_all(now, loser);
   ++stats_.replaced;
   leave(loser, "replaced by \"" + winner.name + "\"");
@@ -320,13 +319,13 @@ void NetworkLoop::adapt(LocalTime now, Guest& guest) {
   guest.adaptation->observe(now, link.round_trip, link.seen_outgoing, link.lost_outgoing);
   const std::uint32_t one_in = guest.adaptation->one_in();
   if (one_in != before) {
-    notice(one_in > before, "\"" + guest.name + "\" is sent one state in " + std::to_string(one_in) +
-                                (one_in > before ? ": the way to it is full" : " again"));
+    notice(one_in > before, "\"" + guest.name + "\" receives one state in " + std::to_string(one_in) +
+                                (one_in > before ? ": the network to it is congested" : " again"));
   }
   if (std::exchange(guest.hopeless, guest.adaptation->hopeless()) != guest.hopeless) {
     notice(guest.hopeless,
-           "the link of \"" + guest.name +
-               (guest.hopeless ? "\" loses too much to be of use: its forces are not taken" : "\" is of use again"));
+           "the connection to \"" + guest.name +
+               (guest.hopeless ? "\" loses too many datagrams: its forces are ignored" : "\" is usable again"));
   }
 }
 
@@ -521,12 +520,12 @@ void NetworkLoop::leave(Guest& guest, const std::string& how) {
 
 void NetworkLoop::close(LocalTime now) {
   ports_.close(now);
-  const std::string why = "the server is going down";
+  const std::string why = "the server is shutting down";
   for (Guest& guest : guests_) {
     guest.session.close(Code::kShutdown, why);
     send_all(now, guest);
     stats_.add(guest);
-    notice(false, "\"" + guest.name + "\" is sent away: " + why, change_of(guest, false, why));
+    notice(false, "\"" + guest.name + "\" is disconnected: " + why, change_of(guest, false, why));
   }
   guests_.clear();
   half_open_.clear();

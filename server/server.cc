@@ -57,8 +57,8 @@ std::unique_ptr<Announcer> announcer_of(const std::vector<Scene>& scenes, const 
 const std::vector<Scene>& checked(const std::vector<Scene>& scenes) {
   if (scenes.front().network.busy && processors_allowed() == 1) {
     throw std::runtime_error(
-        "[network] busy = true takes a whole processor, and this server may run on one only: nothing else would get "
-        "its turn");
+        "[network] busy = true requires a whole processor, but this server can only use one processor, which its other "
+        "threads also need");
   }
   return scenes;
 }

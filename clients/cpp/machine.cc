@@ -28,7 +28,7 @@ Punctual::~Punctual() {
 Seed seed_from_system() {
   Seed seed;
   if (getrandom(seed.bytes.data(), seed.bytes.size(), 0) != static_cast<ssize_t>(seed.bytes.size())) {
-    throw std::runtime_error("the system gives no random numbers");
+    throw std::runtime_error("cannot read random numbers from the system");
   }
   return seed;
 }

@@ -52,8 +52,7 @@ void check(const typename AolPlus<Blocks, Size>::Config& config) {
       expect(bounded->most[i] > 0, "bounded_acceleration.most", bounded->most[i], "a number above 0");
     }
     if (!config.parts.shaping) {
-      throw std::invalid_argument(
-          "bounded_acceleration needs shaping: nothing else would limit how hard a wall may be");
+      throw std::invalid_argument("bounded_acceleration requires shaping, because nothing else limits the stiffness");
     }
     if (config.parts.latency_reserve) {
       throw std::invalid_argument(

@@ -40,22 +40,22 @@ std::vector<PluggedDevice> report_devices(std::span<const usb::PluggedIn> plugge
     PluggedDevice report{
         .name = std::string(driver->name), .kind = std::string(driver->kind), .plugged = one, .lacks = {}};
     if (!one.has_node) {
-      report.lacks.push_back({"there is no " + one.node + " here, although the kernel has the device",
-                              "give it to this container: docker run -v /dev/bus/usb:/dev/bus/usb "
-                              "--device-cgroup-rule 'c 189:* rmw'"});
+      report.lacks.push_back(
+          {"there is no " + one.node + ", although the kernel has found the device",
+           "pass it to this container: docker run -v /dev/bus/usb:/dev/bus/usb --device-cgroup-rule 'c 189:* rmw'"});
     } else if (!one.may_open) {
       report.lacks.push_back(
-          {"this user may not open " + one.node,
-           "copy deploy/udev/60-tendon.rules to /etc/udev/rules.d, run `udevadm control --reload`, unplug the device "
-           "and in; who is not logged in at this machine itself has to be in the group plugdev"});
+          {"this user has no permission to open " + one.node,
+           "copy deploy/udev/60-tendon.rules to /etc/udev/rules.d, run `udevadm control --reload`, then unplug the "
+           "device and plug it in again; users who are not logged in locally must be in the group plugdev"});
     }
     if (falcon && !firmware_problem) {
       report.lacks.push_back(
-          {"no firmware file, which it wants after each time without power",
-           "give the file of your own Novint software by --falcon-firmware FILE, or as `firmware` in the scene's "
-           "[device]; Tendon may not bring it (devices/falcon/README.md)"});
+          {"no firmware file, which the device requires each time it is powered on",
+           "use the file of your own Novint software with --falcon-firmware FILE, or with `firmware` in [device] of "
+           "the scene; Tendon cannot include it (devices/falcon/README.md)"});
     } else if (falcon && !firmware_problem->empty()) {
-      report.lacks.push_back({*firmware_problem, "give the file of your own Novint software"});
+      report.lacks.push_back({*firmware_problem, "use the file of your own Novint software"});
     }
     reports.push_back(std::move(report));
   }
@@ -64,7 +64,7 @@ std::vector<PluggedDevice> report_devices(std::span<const usb::PluggedIn> plugge
 
 std::string in_words(std::span<const PluggedDevice> devices) {
   if (devices.empty()) {
-    return "no device that Tendon has a driver for is plugged in; a Falcon needs its own power supply besides USB\n";
+    return "no device with a Tendon driver is connected; a Falcon also requires its own power supply\n";
   }
   std::ostringstream text;
   for (const PluggedDevice& device : devices) {

@@ -62,7 +62,7 @@ Finding kernel(const fs::path& root) {
   if (text_of(root / "sys/kernel/realtime") == "1") return {"kernel", release + ", PREEMPT_RT", ""};
   if (release.empty()) return {"kernel", "unknown", ""};
   return {"kernel", release + ", without PREEMPT_RT",
-          "a kernel with PREEMPT_RT bounds how late a thread may wake: linux-image-rt-amd64 on Debian"};
+          "use a kernel with PREEMPT_RT, which bounds the wake-up latency: linux-image-rt-amd64 on Debian"};
 }
 
 Finding tick(const fs::path& root) {
@@ -70,9 +70,9 @@ Finding tick(const fs::path& root) {
   const std::string hz = value_after(config, "CONFIG_HZ=");
   if (hz.empty()) return {"tick", "unknown", ""};
   if (value_after(config, "CONFIG_HIGH_RES_TIMERS=") == "y") {
-    return {"tick", hz + " Hz, and timers that do not wait for it", ""};
+    return {"tick", hz + " Hz, with high-resolution timers", ""};
   }
-  return {"tick", hz + " Hz, and timers that wait for it", "a kernel with CONFIG_HIGH_RES_TIMERS"};
+  return {"tick", hz + " Hz, without high-resolution timers", "use a kernel with CONFIG_HIGH_RES_TIMERS"};
 }
 
 Finding governor(const fs::path& root) {
@@ -86,7 +86,7 @@ Finding governor(const fs::path& root) {
   std::string all;
   for (const std::string& name : governors) all += (all.empty() ? "" : ", ") + name;
   if (governors == std::set<std::string>{"performance"}) return {"governor", all, ""};
-  return {"governor", all, "`cpupower frequency-set -g performance`: a processor that has slowed down wakes late"};
+  return {"governor", all, "run `cpupower frequency-set -g performance`: a processor at a low frequency wakes up late"};
 }
 
 Finding autosuspend(const fs::path& root) {
@@ -94,7 +94,8 @@ Finding autosuspend(const fs::path& root) {
   if (!seconds) return {"usb_autosuspend", "unknown", ""};
   if (*seconds < 0) return {"usb_autosuspend", "off", ""};
   return {"usb_autosuspend", "after " + std::to_string(*seconds) + " s",
-          "`usbcore.autosuspend=-1` to the kernel, or a udev rule with ATTR{power/control}=\"on\" for the device"};
+          "set the kernel parameter `usbcore.autosuspend=-1`, or a udev rule with ATTR{power/control}=\"on\" for the "
+          "device"};
 }
 
 Finding priority_limit(const fs::path& root) {
@@ -103,8 +104,8 @@ Finding priority_limit(const fs::path& root) {
   if (limit.empty()) return {"rtprio_limit", "unknown", ""};
   if (!number || *number >= kHapticPriority) return {"rtprio_limit", limit, ""};
   return {"rtprio_limit", limit,
-          "LimitRTPRIO=" + std::to_string(kHapticPriority) +
-              " in the unit, or rtprio in /etc/security/limits.d (root needs none)"};
+          "set LimitRTPRIO=" + std::to_string(kHapticPriority) +
+              " in the systemd unit, or rtprio in /etc/security/limits.d (not required for root)"};
 }
 
 Finding memory_limit(const fs::path& root) {
@@ -112,8 +113,8 @@ Finding memory_limit(const fs::path& root) {
   if (limit.empty()) return {"memlock_limit", "unknown", ""};
   if (!number_of(limit)) return {"memlock_limit", limit, ""};
   return {"memlock_limit", limit + " bytes",
-          "LimitMEMLOCK=infinity in the unit, or memlock in /etc/security/limits.d (root needs none): a server locks "
-          "some 14 MB, and 1 MB for each further device; while it records, more"};
+          "set LimitMEMLOCK=infinity in the systemd unit, or memlock in /etc/security/limits.d (not required for "
+          "root): a server locks about 14 MB, 1 MB for each further device, and more while recording"};
 }
 
 Finding isolation(const fs::path& root) {
@@ -121,13 +122,12 @@ Finding isolation(const fs::path& root) {
   const std::string isolated = text_of(root / "sys/devices/system/cpu/isolated");
   const std::string without_tick = text_of(root / "sys/devices/system/cpu/nohz_full");
   if (isolated.empty()) {
-    return {
-        "isolated_cpus", "none",
-        "where other programs load this machine: `isolcpus=N nohz_full=N rcu_nocbs=N` to the kernel, and `cpu = N` in "
-        "the scene's [loop]"};
+    return {"isolated_cpus", "none",
+            "if other programs run on this machine, set the kernel parameters `isolcpus=N nohz_full=N rcu_nocbs=N`, "
+            "and `cpu = N` in [loop] of the scene"};
   }
   const bool some = !without_tick.empty() && without_tick != "(null)";
-  return {"isolated_cpus", isolated + (some ? ", without tick " + without_tick : ""), ""};
+  return {"isolated_cpus", isolated + (some ? ", without a tick: " + without_tick : ""), ""};
 }
 
 /// Checks the exit latency of the deepest sleep state. A running server may disable this state.
@@ -143,16 +143,17 @@ Finding sleep(const fs::path& root) {
   const std::string found = "up to " + std::to_string(*deepest) + " µs to wake";
   if (*deepest <= kNoticed) return {"cpu_sleep", found, ""};
   if (access((root / "dev/cpu_dma_latency").c_str(), W_OK) == 0) {
-    return {"cpu_sleep", found + " (the server forbids it while it runs)", ""};
+    return {"cpu_sleep", found + " (disabled while the server is running)", ""};
   }
-  return {"cpu_sleep", found,
-          "a udev rule that lets the server forbid it: KERNEL==\"cpu_dma_latency\", GROUP=\"plugdev\", MODE=\"0660\""};
+  return {
+      "cpu_sleep", found,
+      "allow the server to disable it with a udev rule: KERNEL==\"cpu_dma_latency\", GROUP=\"plugdev\", MODE=\"0660\""};
 }
 
 Finding slack(const fs::path& root) {
   const auto ns = number_of(text_of(root / "proc/self/timerslack_ns"));
   if (!ns) return {"timer_slack", "unknown", ""};
-  return {"timer_slack", std::to_string(*ns) + " ns (the server asks for 1 ns for its own threads)", ""};
+  return {"timer_slack", std::to_string(*ns) + " ns (the server requests 1 ns for its own threads)", ""};
 }
 
 Finding throttling(const fs::path& root) {
@@ -162,14 +163,15 @@ Finding throttling(const fs::path& root) {
   if (*runtime < 0) return {"rt_throttling", "off", ""};
   return {"rt_throttling",
           std::to_string(*runtime) + " of each " + std::to_string(*period) + " µs for real-time threads",
-          *runtime * 2 < *period ? "`sysctl kernel.sched_rt_runtime_us=950000`, the kernel's default" : ""};
+          *runtime * 2 < *period ? "run `sysctl kernel.sched_rt_runtime_us=950000`, the default of the kernel" : ""};
 }
 
 Finding machine(const fs::path& root) {
   const std::string cpus = text_of(root / "proc/cpuinfo");
   if (cpus.empty()) return {"machine", "unknown", ""};
   if (cpus.find(" hypervisor") == std::string::npos) return {"machine", "not virtual", ""};
-  return {"machine", "virtual", "not for a real device: the host may stop the whole machine for 20 ms and more"};
+  return {"machine", "virtual",
+          "do not use it for a real device: the host can stop the whole machine for 20 ms and more"};
 }
 
 Finding aes(const fs::path& root) {
@@ -180,10 +182,11 @@ Finding aes(const fs::path& root) {
     return std::find(std::istream_iterator<std::string>(words), {}, flag) != std::istream_iterator<std::string>();
   };
   if (has("aes") && has("pclmulqdq")) {
-    return {"aes", "in hardware: sessions are sealed by " + names_of(all_suites()), ""};
+    return {"aes", "in hardware: sessions are encrypted with " + names_of(all_suites()), ""};
   }
-  return {"aes", "none: sessions are sealed by " + names_of({Suite::kNoise}),
-          "sealing by AES costs half of that, and less: in a virtual machine, a CPU model that shows the host's AES"};
+  return {"aes", "none: sessions are encrypted with " + names_of({Suite::kNoise}),
+          "AES requires half of the time or less: in a virtual machine, use a CPU model with the AES instructions of "
+          "the host"};
 }
 
 /// Returns 5 for "0-3,5".
@@ -204,9 +207,11 @@ Finding processors(const fs::path& root) {
   const auto count = count_of(text_of(root / "sys/devices/system/cpu/online"));
   if (!count) return {"processors", "unknown", ""};
   if (*count == 1) {
-    return {"processors", "1", "another one for the network thread and engines; `[network] busy = true` is refused"};
+    return {"processors", "1",
+            "use a machine with 2 or more processors, for the network thread and the engines; `[network] busy = true` "
+            "is refused"};
   }
-  return {"processors", std::to_string(*count) + " (`[network] busy = true` would take one of them all the time)", ""};
+  return {"processors", std::to_string(*count) + " (`[network] busy = true` uses a whole one)", ""};
 }
 
 double us(Duration time) { return seconds(time) * 1e6; }
@@ -256,11 +261,11 @@ Diagnosis diagnose(const WakeUpClock& clock) {
 
 std::string in_words(const Diagnosis& diagnosis) {
   std::ostringstream out;
-  out << "how late a thread wakes:\n";
+  out << "Wake-up latency of a thread:\n";
   add_words(out, "ordinary", diagnosis.ordinary);
-  add_words(out, "as haptic thread", diagnosis.realtime);
-  for (const std::string& refused : diagnosis.refused) out << "  refused: " << refused << '\n';
-  out << "what the machine is like:\n";
+  add_words(out, "haptic thread", diagnosis.realtime);
+  for (const std::string& refused : diagnosis.refused) out << "  not possible: " << refused << '\n';
+  out << "Settings of the machine:\n";
   for (const auto& [key, found, advice] : diagnosis.findings) {
     out << "  " << std::left << std::setw(18) << key << found << '\n';
     if (!advice.empty()) out << "                    → " << advice << '\n';

@@ -192,12 +192,13 @@ void put_coupling(const Coupling::Config& coupling, const LimiterConfig& limiter
   const bool springs =
       coupling.method == CouplingMethod::kPositionPosition || coupling.method == CouplingMethod::kSetPosition;
   const auto& spring = coupling.spring;
-  text << std::right << "teleoperation: the " << (leads ? "leader" : "follower") << " of a coupling by "
-       << to_string(coupling.method) << (coupling.purse ? ", whose ports pay each other" : "") << ".\n";
+  text << std::right << "Teleoperation: the " << (leads ? "leader" : "follower") << " of a coupling by "
+       << to_string(coupling.method) << (coupling.purse ? " with shared energy accounts" : "") << ".\n";
   if (coupling.method == CouplingMethod::kPassivity) {
-    text << "  the follower's spring has " << spring.stiffness << " N/m at every round trip; in free motion the leader "
+    text << "  the stiffness of the follower's spring is " << spring.stiffness
+         << " N/m at every round trip; in free motion the leader "
          << "feels a damper of " << spring.own_damping << " to " << 2 * spring.own_damping
-         << " N·s/m, and what it takes to move the follower\n";
+         << " N·s/m, and the force that moves the follower\n";
   }
   if (coupling.rate) {
     const double scale = coupling.map.position_scale * 1e3;
@@ -206,8 +207,8 @@ void put_coupling(const Coupling::Config& coupling, const LimiterConfig& limiter
          << coupling.rate->max_speed * scale << " mm/s\n";
   }
   if (!waves && !springs) return;
-  text << "  the two limiters let no stiffness above " << std::llround(operational_stiffness(limiter) / 2)
-       << " N/m be felt, if the other end is like this one\n"
+  text << "  the limiters reduce the stiffness to at most " << std::llround(operational_stiffness(limiter) / 2)
+       << " N/m, if the other end has the same configuration\n"
        << "  round trip      stiffness   in free motion like a " << (waves ? "mass" : "damper") << " of\n";
   for (const int ms : {2, 10, 50, 200, 600}) {
     const double loop = ms * 1e-3;
@@ -227,17 +228,18 @@ void put_coupling(const Coupling::Config& coupling, const LimiterConfig& limiter
 std::string spoken_here(const Suites& wanted) {
   Suites here = suites_of_this_machine();
   std::erase_if(here, [&](Suite suite) { return !contains(wanted, suite); });
-  if (here.empty()) return "nothing that this processor can: it has no AES instructions";
+  if (here.empty()) return "no cipher that this processor supports: it has no AES instructions";
   const bool lacks_one = contains(wanted, Suite::kAesGcm) && !contains(here, Suite::kAesGcm);
   return names_of(here) + (lacks_one ? " (this processor has no AES instructions)" : "");
 }
 
 std::string when_frozen(const Driver& driver) {
   if (!driver.moves_a_hand) return "";
-  const std::string device = "frozen with its guardian (docker pause): the " + std::string(driver.name);
+  const std::string device =
+      "If the server and its guardian are frozen (docker pause): the " + std::string(driver.name);
   if (driver.watchdog == Duration::zero()) return device + " keeps its last force";
-  return device + " lets go after " + std::to_string(driver.watchdog / std::chrono::milliseconds(1)) +
-         " ms by its own watchdog";
+  return device + " removes the force after " + std::to_string(driver.watchdog / std::chrono::milliseconds(1)) +
+         " ms with its own watchdog";
 }
 
 }  // namespace
@@ -247,7 +249,7 @@ std::string in_words(const Scene& scene, const Explanation& explanation) {
   std::size_t width = 0;
   for (const auto& part : parts) width = std::max(width, part.key.size());
   std::ostringstream text;
-  text << scene.name << ": a haptic step each " << seconds(scene.loop.period) * 1e6 << " µs, limiter "
+  text << scene.name << ": one haptic step every " << seconds(scene.loop.period) * 1e6 << " µs, limiter "
        << info(scene.loop.control.limiter.law).name << '\n';
   const auto put = [&](const std::string& heading, const auto& belongs, bool with_cost) {
     if (std::ranges::none_of(explanation.parts, belongs)) return;
@@ -261,37 +263,38 @@ std::string in_words(const Scene& scene, const Explanation& explanation) {
   using Part = Explanation::Part;
   const auto shows = [least = resolution_ns](double ns) { return std::abs(ns) >= least; };
   put(
-      "runs, and adds to a step", [&](const Part& part) { return part.cost_ns && shows(*part.cost_ns); }, true);
+      "On, with the cost per step", [&](const Part& part) { return part.cost_ns && shows(*part.cost_ns); }, true);
   put(
-      "runs, and adds less than the " + std::to_string(std::llround(std::ceil(resolution_ns))) +
-          " ns that can be measured here",
+      "On, with a cost below the " + std::to_string(std::llround(std::ceil(resolution_ns))) +
+          " ns that can be measured on this machine",
       [&](const Part& part) { return part.cost_ns && !shows(*part.cost_ns); }, false);
   put(
-      "off in this scene", [](const Part& part) { return !part.cost_ns; }, false);
-  text << "a whole step: " << std::llround(step_ns) << " ns of processor time, of which " << std::llround(device_ns)
-       << " ns are the simulated device"
-       << (!std::holds_alternative<SimulatedDevice::Config>(scene.device) ? ", which stands in for the real one" : "")
-       << "; measured here and now, ± " << std::llround(std::ceil(resolution_ns)) << " ns\n";
+      "Off in this scene", [](const Part& part) { return !part.cost_ns; }, false);
+  text << "Whole step: " << std::llround(step_ns) << " ns of processor time, including " << std::llround(device_ns)
+       << " ns for the simulated device"
+       << (!std::holds_alternative<SimulatedDevice::Config>(scene.device) ? " that replaces the real device" : "")
+       << "; measured on this machine just now, ± " << std::llround(std::ceil(resolution_ns)) << " ns\n";
   if (scene.count > 1) {
     const double share = 1e-9 * step_ns * scene.count / seconds(scene.loop.period);
-    text << "device.count: " << scene.count << " such devices, " << scene.name_of(0) << " to "
+    text << "device.count: " << scene.count << " devices, " << scene.name_of(0) << " to "
          << scene.name_of(scene.count - 1) << "; their steps take " << std::llround(100 * share)
-         << " % of a processor, and each 1 MB, without a recording\n";
+         << " % of a processor; each device requires 1 MB of memory, without a recording\n";
   }
   if (const auto& coupling = scene.loop.control.coupling) put_coupling(*coupling, scene.loop.control.limiter, text);
   for (const CoupledLeader& leader : scene.loop.control.leaders) {
-    text << "  " << scene.channels[leader.channel].name << " counts " << leader.share << " of that\n";
+    text << "  " << scene.channels[leader.channel].name << " has a share of " << leader.share << "\n";
   }
-  text << "the limiter's promise: " << promise_of(scene.loop.control.limiter) << '\n';
-  text << "its haptic thread: "
-       << (scene.shares_thread() ? "one with all devices without a plug that have this period and processor\n"
-                                 : "its own, so that no other device waits for its plug\n");
+  text << "Guarantee of the limiter: " << promise_of(scene.loop.control.limiter) << '\n';
+  text << "Haptic thread: "
+       << (scene.shares_thread() ? "shared with all devices without a plug that have the same period and processor\n"
+                                 : "a separate thread, so that other devices do not wait for its USB transfers\n");
   if (const std::string frozen = when_frozen(scene.driver()); !frozen.empty()) text << frozen << '\n';
-  text << "in other threads: " << scene.channels.size() << (scene.channels.size() == 1 ? " channel" : " channels")
-       << " for engines" << (scene.network.keys ? ", sealed by " + spoken_here(scene.network.suites) : "") << ", "
+  text << "Other threads: " << scene.channels.size() << (scene.channels.size() == 1 ? " channel" : " channels")
+       << " for engines" << (scene.network.keys ? ", encrypted with " + spoken_here(scene.network.suites) : "") << ", "
        << (scene.recording ? "a recording" : "no recording")
        << (scene.discovery && scene.discovery->announce ? ", announced on the network" : "") << '\n';
-  if (scene.network.busy) text << "network.busy: its thread never sleeps and takes a whole processor, all the time\n";
+  if (scene.network.busy)
+    text << "network.busy: the network thread polls instead of sleeping, and always uses a whole processor\n";
   return text.str();
 }
 

@@ -68,8 +68,8 @@ std::variant<std::vector<Seat>, Refusal> Admission::seats_of(const Hello& hello,
       const auto name = [&](std::size_t place) { return "\"" + name_of(devices[place]) + "\""; };
       const std::size_t first = seats.front().device - number_of(seats.front().device);
       const std::size_t last = std::min<std::size_t>(first + limits::kMaxDevices, devices.size()) - 1;
-      return Refusal{Code::kInvalid, "a session has devices of one bank: " + name(first) + " to " + name(last) +
-                                         ", and not " + name(*device)};
+      return Refusal{Code::kInvalid, "all devices of a session must be in the same bank: expected " + name(first) +
+                                         " to " + name(last) + ", and not " + name(*device)};
     }
     const auto& channels = devices[*device].about.channels;
     const auto channel = claim.role == Role::kController ? place_of(channels, claim.channel) : 0;
@@ -77,11 +77,12 @@ std::variant<std::vector<Seat>, Refusal> Admission::seats_of(const Hello& hello,
     const bool twice = std::any_of(seats.begin(), seats.end(), [&](const Seat& seat) {
       return seat.device == *device && seat.channel == *channel && seat.role == claim.role;
     });
-    if (twice) return Refusal{Code::kInvalid, "the same is claimed twice"};
+    if (twice) return Refusal{Code::kInvalid, "the same channel is claimed twice"};
     highest = std::max(highest, claim.role);
     seats.push_back({.device = *device, .channel = *channel, .role = claim.role, .by_name = true});
   }
-  if (highest != hello.role) return Refusal{Code::kInvalid, "the role is not the highest of the claims'"};
+  if (highest != hello.role)
+    return Refusal{Code::kInvalid, "the role of the Hello is not the highest role of its claims"};
   return seats;
 }
 
@@ -100,11 +101,11 @@ std::optional<Refusal> Admission::reason_to_refuse(const Address& from, const Cl
                                                    const std::vector<Guest>& guests) const {
   const bool let_in = config_.keys == 0 || (config_.needs_no_key != nullptr && config_.needs_no_key(from));
   if (key == nullptr && !let_in) {
-    return Refusal{Code::kDenied, "this server lets in those who have a key: --key FILE"};
+    return Refusal{Code::kDenied, "this server only accepts clients with a key: use --key FILE"};
   }
   const bool controls = std::any_of(seats.begin(), seats.end(), is_controller);
   if (!may(key, controls ? Role::kController : Role::kObserver)) {
-    return Refusal{Code::kDenied, "the key \"" + key->name + "\" is an observer's"};
+    return Refusal{Code::kDenied, "the key \"" + key->name + "\" only permits observers"};
   }
   for (const Seat& seat : seats) {
     const ServedDevice& device = devices[seat.device];
@@ -113,7 +114,7 @@ std::optional<Refusal> Admission::reason_to_refuse(const Address& from, const Cl
     if (!is_controller(seat) || holder == nullptr || can_wait) continue;
     if (takes_the_place_of(*holder, from, key, seats)) continue;
     return Refusal{Code::kBusy, "the device is controlled by \"" + holder->name + "\" at " +
-                                    to_string(holder->address) + "; observers are welcome"};
+                                    to_string(holder->address) + "; it only accepts observers"};
   }
   const auto count = [&](auto counts) {
     return static_cast<std::size_t>(std::count_if(guests.begin(), guests.end(), [&](const Guest& guest) {
@@ -135,7 +136,7 @@ std::optional<Refusal> Admission::reason_to_refuse(const Address& from, const Cl
   // A controller that is waiting for a lease requires as many states as an observer.
   const std::size_t all = count([](const Guest&) { return true; });
   if (all >= config_.max_observers + channels) {
-    return Refusal{Code::kBusy, "there are " + std::to_string(all) + " guests already"};
+    return Refusal{Code::kBusy, "there are " + std::to_string(all) + " clients already"};
   }
   return std::nullopt;
 }

@@ -27,7 +27,7 @@ std::string axes(std::uint32_t bits) {
 }
 
 std::string differ(const std::string& key, const std::string& yours, const std::string& mine) {
-  return key + ": yours " + yours + ", mine " + mine;
+  return key + ": " + yours + " in your scene, " + mine + " in the scene of the other server";
 }
 
 std::string difference_of_rates(const std::optional<RateControl>& theirs, const std::optional<RateControl>& mine) {
@@ -81,7 +81,7 @@ Couple couple_of(const Coupling::Config& config) {
 }
 
 std::string first_difference(const Couple& theirs, const Couple& mine) {
-  if (theirs.role == mine.role) return "role: yours and mine " + name(mine.role) + ", expected one of each";
+  if (theirs.role == mine.role) return "role: " + name(mine.role) + " in both scenes, expected a leader and a follower";
   if (theirs.method != mine.method) return differ("method", name(theirs.method), name(mine.method));
   struct Row {
     const char* key;

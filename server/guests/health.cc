@@ -50,10 +50,10 @@ DeviceReport report(const Health& before, const Health& now) {
   };
   // These texts are short because of limits::kMaxDetail.
   say(now.not_realtime, "no real time");
-  say(now.steps_lost > before.steps_lost, "the log thread does not follow");
+  say(now.steps_lost > before.steps_lost, "the log thread is too slow");
   say(now.recording_ended, "recording has stopped");
   say(now.unsent > before.unsent, "unsent datagrams");
-  say(now.broken_assumptions > before.broken_assumptions, "accelerates too hard");
+  say(now.broken_assumptions > before.broken_assumptions, "acceleration above the limiter's bound");
   const auto worst = std::ranges::find_if(kDeviceCounters, [&](const DeviceCounter& row) {
     return !row.degraded.empty() && now.device[row.count] > before.device[row.count];
   });

@@ -24,13 +24,13 @@ std::string milliseconds_text(Duration d) {
 const char* refusal(Lateness::Cause cause) {
   switch (cause) {
     case Lateness::Cause::kNotFinite:
-      return "its forces are not finite: NaN or infinity";
+      return "its forces are not finite";
     case Lateness::Cause::kOutOfBounds:
-      return "its forces are out of the bounds of WIRE.md";
+      return "its forces exceed the bounds in WIRE.md";
     case Lateness::Cause::kUnknownTick:
-      return "its forces answer unknown or forgotten ticks";
+      return "its forces answer unknown or old ticks";
     case Lateness::Cause::kOldSequence:
-      return "its sequence numbers do not grow";
+      return "its sequence numbers do not increase";
     default:
       return nullptr;
   }
@@ -53,21 +53,21 @@ std::string describe(const Lateness::Report& report) {
     case Lateness::Cause::kStateWaited:
       return text + "the server's threads (a state waited " + part(report.ours, report.usual_ours);
     case Lateness::Cause::kServerStood:
-      return text + "the server (its threads stood still for " + milliseconds_text(report.stood_still) + ")";
+      return text + "the server (its threads were stopped for " + milliseconds_text(report.stood_still) + ")";
     case Lateness::Cause::kRoundTrip:
       return text + "the network (round trip " + part(report.network, report.usual_network);
     case Lateness::Cause::kLost:
       return text + "the network (datagrams were lost)";
     case Lateness::Cause::kUnheard:
-      return text + "the engine stands still, or the network is down (nothing is heard)";
+      return text + "the engine has stopped, or the network is down (no datagrams arrive)";
     case Lateness::Cause::kEngineTook:
       return text + "the engine (it took " + part(report.engine, report.usual_engine);
     case Lateness::Cause::kEngineMissing:
-      return text + "the engine (it is heard, but sends no usable force)";
+      return text + "the engine (its datagrams arrive, but without a usable force)";
     case Lateness::Cause::kEngineStood:
-      return text + "the engine (its program stood still for " + milliseconds_text(report.stood_still) + ")";
+      return text + "the engine (its program was stopped for " + milliseconds_text(report.stood_still) + ")";
     case Lateness::Cause::kEngineSilent:
-      return text + "the engine (nothing is heard of its program on this machine)";
+      return text + "the engine (no datagrams arrive from its program on this machine)";
     case Lateness::Cause::kNotFinite:
     case Lateness::Cause::kOutOfBounds:
     case Lateness::Cause::kUnknownTick:
@@ -76,13 +76,13 @@ std::string describe(const Lateness::Report& report) {
     case Lateness::Cause::kNone:
       break;
   }
-  return text + "not known why";
+  return text + "the cause is unknown";
 }
 
 std::string advise(const Lateness::Report& report) {
   if (report.cut == 0) return report.text;
   const std::string forces = report.cut == 1 ? "1 force was" : std::to_string(report.cut) + " forces were";
-  return report.text + (report.text.empty() ? "" : "; ") + forces + " above the device's bound, and cut to it";
+  return report.text + (report.text.empty() ? "" : "; ") + forces + " above the device's bound and reduced to it";
 }
 
 }  // namespace

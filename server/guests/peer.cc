@@ -97,7 +97,7 @@ void Peer::open(const Welcome& welcome) {
   couple_at_ = line_.now;
   const auto& features = welcome.features;
   if (std::find(features.begin(), features.end(), kFeatureTeleoperation) == features.end()) {
-    say(true, "that server does not know how to couple two devices");
+    say(true, "the other server does not support teleoperation");
     connection_.drop(line_.now);
   }
 }
@@ -140,7 +140,7 @@ void Peer::take(LocalTime now, const Session::Event& event) {
   } else if (const auto* asked = std::get_if<Session::RequestArrived>(&event)) {
     const auto* lost = std::get_if<LeaseLost>(&asked->request);
     Session& session = *connection_.session();
-    if (lost == nullptr) return session.answer(asked->id, Code::kUnsupported, "that is a guest's to ask");
+    if (lost == nullptr) return session.answer(asked->id, Code::kUnsupported, "only a client can send this request");
     session.answer(asked->id, Code::kOk, {});
     if (!lease_.take(*lost, session, now)) return;
     coupled_ = false;
@@ -164,7 +164,7 @@ std::optional<PortState> Peer::take() { return std::exchange(newest_, std::nullo
 
 void Peer::close(LocalTime now) {
   line_.now = now;
-  connection_.close(now, "the server is going down");
+  connection_.close(now, "the server is shutting down");
   coupled_ = false;
 }
 

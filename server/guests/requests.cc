@@ -18,9 +18,9 @@ namespace tendon {
 namespace {
 
 Outcome set_state_rate(LocalTime /*now*/, const Asker& asker, const SetStateRate& rate) {
-  if (rate.hz == 0) return {.code = Code::kInvalid, .detail = "a state rate must be above zero"};
+  if (rate.hz == 0) return {.code = Code::kInvalid, .detail = "expected a state rate above 0 Hz"};
   View* const view = view_of(asker.guest, rate.device);
-  if (view == nullptr) return {.code = Code::kInvalid, .detail = "that device is not claimed"};
+  if (view == nullptr) return {.code = Code::kInvalid, .detail = "the session has not claimed this device"};
   const auto loop_hz = static_cast<double>(asker.devices[rate.device].about.loop_hz);
   view->state_every = static_cast<std::uint64_t>(std::max(1.0, std::round(loop_hz / rate.hz)));
   return {};
@@ -43,7 +43,7 @@ Outcome order(const Asker& asker, std::uint32_t device, const HapticOrder& wante
 
 Outcome rearm(LocalTime /*now*/, const Asker& asker, const Rearm& wanted) {
   if (asker.guest.coupled && asker.guest.coupled->device == wanted.device) {
-    return {.code = Code::kDenied, .detail = "each end of a coupling is armed at its own place"};
+    return {.code = Code::kDenied, .detail = "each device of a coupling must be armed at its own server"};
   }
   return order(asker, wanted.device, {.kind = HapticOrder::Kind::kRearm}, "rearmed");
 }
@@ -88,23 +88,23 @@ Outcome give_lease(LocalTime /*now*/, const Asker& asker, const GiveLease& given
 }
 
 Outcome lease_lost(LocalTime /*now*/, const Asker& /*asker*/, const LeaseLost& /*news*/) {
-  return {.code = Code::kUnsupported, .detail = "that is the server's to say"};
+  return {.code = Code::kUnsupported, .detail = "only the server can send this request"};
 }
 
 /// A coupling can only have one peer. This is the first client that requests it, as long as it holds the channel.
 Outcome couple(LocalTime /*now*/, const Asker& asker, const Couple& theirs) {
   if (!asker.guest.may_couple()) {
-    return {.code = Code::kUnsupported, .detail = "the Hello did not name the feature teleoperation"};
+    return {.code = Code::kUnsupported, .detail = "the Hello did not list the feature teleoperation"};
   }
   ServedDevice& device = asker.devices[theirs.device];
   if (!device.coupling) return {.code = Code::kUnsupported, .detail = "this device has no [teleoperation]"};
   const auto wanted = coupling_by(device, theirs.channel);
-  if (!wanted) return {.code = Code::kUnsupported, .detail = "no leader comes by this channel"};
+  if (!wanted) return {.code = Code::kUnsupported, .detail = "this channel is not used by a leader"};
   for (const Guest& guest : asker.guests) {
     if (guest.gone || guest.id() == asker.guest.id()) continue;
     if (guest.coupled && guest.coupled->device == theirs.device &&
         coupling_by(device, guest.coupled->channel) == wanted) {
-      return {.code = Code::kBusy, .detail = "it is coupled with \"" + guest.name + "\""};
+      return {.code = Code::kBusy, .detail = "the device is coupled with \"" + guest.name + "\""};
     }
   }
   std::string difference = first_difference(theirs, *device.coupling);
@@ -118,13 +118,13 @@ Outcome couple(LocalTime /*now*/, const Asker& asker, const Couple& theirs) {
 std::string no_leader(const ServedDevice& device, const char* does) {
   if (!device.coupling) return "this device has no [teleoperation]";
   if (device.coupling->role == PortRole::kLeader) return {};
-  return std::string("this device is the follower: the leader ") + does;
+  return std::string("this device is the follower: only the leader ") + does;
 }
 
 Outcome engage(LocalTime /*now*/, const Asker& asker, const Engage& wanted) {
   std::string objection = no_leader(asker.devices[wanted.device], "engages");
   if (!objection.empty()) return {.code = Code::kUnsupported, .detail = std::move(objection)};
-  return order(asker, wanted.device, {.kind = HapticOrder::Kind::kEngage}, "told to engage");
+  return order(asker, wanted.device, {.kind = HapticOrder::Kind::kEngage}, "engage requested");
 }
 
 /// If the guest is the peer of a coupling, only this coupling is disengaged. Otherwise, all couplings of the device are
@@ -140,7 +140,7 @@ Outcome disengage(LocalTime /*now*/, const Asker& asker, const Disengage& wanted
     const bool taken = device.mail->orders.try_push({.kind = HapticOrder::Kind::kDisengage, .coupling = coupling});
     if (!taken) return {.code = Code::kBusy};
   }
-  return {.warning = "told to disengage by \"" + asker.guest.name + "\""};
+  return {.warning = "disengage requested by \"" + asker.guest.name + "\""};
 }
 
 /// This is refused while the coupling is engaged because the follower would move.
@@ -149,19 +149,19 @@ Outcome set_scale(LocalTime /*now*/, const Asker& asker, const SetScale& wanted)
   std::string objection = no_leader(device, "sets the scales");
   if (!objection.empty()) return {.code = Code::kUnsupported, .detail = std::move(objection)};
   if (device.coupling->grip_stiffness > 0) {
-    return {.code = Code::kUnsupported, .detail = "a coupling of grippers keeps the scales of its scene"};
+    return {.code = Code::kUnsupported, .detail = "the scales of a coupling of grippers can only be set in the scene"};
   }
   if (keeps_scales(device.coupling->method)) {
     return {.code = Code::kUnsupported,
-            .detail =
-                "a coupling by " + std::string(to_string(device.coupling->method)) + " keeps the scales of its scene"};
+            .detail = "a coupling by " + std::string(to_string(device.coupling->method)) +
+                      " can only be scaled in the scene"};
   }
   if (device.phase == PortPhase::kEngaged || device.phase == PortPhase::kAligning) {
-    return {.code = Code::kBusy, .detail = "it is engaged: hold the clutch, or disengage it"};
+    return {.code = Code::kBusy, .detail = "the coupling is engaged: use the clutch or disengage it first"};
   }
   return order(asker, wanted.device,
                {.kind = HapticOrder::Kind::kSetScale, .scales = {wanted.position_scale, wanted.force_scale}},
-               "told to change its scales");
+               "change of the scales requested");
 }
 
 Outcome set_share(LocalTime /*now*/, const Asker& asker, const SetShare& wanted) {
@@ -169,24 +169,24 @@ Outcome set_share(LocalTime /*now*/, const Asker& asker, const SetShare& wanted)
   const auto refused = [](std::string why) { return Outcome{.code = Code::kUnsupported, .detail = std::move(why)}; };
   if (!device.coupling) return refused("this device has no [teleoperation]");
   if (device.coupling->role == PortRole::kLeader) {
-    return refused("this device is a leader: its follower has the shares");
+    return refused("this device is a leader: the shares are set at the follower");
   }
-  if (device.leaders.empty()) return refused("this device has one leader only");
+  if (device.leaders.empty()) return refused("this device has only one leader");
   const auto coupling = coupling_by(device, wanted.channel);
-  if (!coupling) return refused("no leader comes by this channel");
+  if (!coupling) return refused("this channel is not used by a leader");
   if (!(wanted.share >= 0 && wanted.share <= 1)) {
-    return {.code = Code::kInvalid, .detail = "expected a share of 0 to 1"};
+    return {.code = Code::kInvalid, .detail = "expected a share from 0 to 1"};
   }
   const HapticOrder order{.kind = HapticOrder::Kind::kShare, .coupling = *coupling, .share = wanted.share};
   if (!device.mail->orders.try_push(order)) return {.code = Code::kBusy};
-  return {.warning = "\"" + device.about.channels[wanted.channel].name + "\" is to count " + rounded(wanted.share, 3) +
-                     ", said by \"" + asker.guest.name + "\""};
+  return {.warning = "\"" + device.about.channels[wanted.channel].name + "\" has the share " +
+                     rounded(wanted.share, 3) + ", set by \"" + asker.guest.name + "\""};
 }
 
 /// Only the holder of a channel can set the outputs of the device.
 Outcome set_output(LocalTime /*now*/, const Asker& asker, const SetOutput& wanted) {
   if (!asker.guest.has<kFeatureOutputs>()) {
-    return {.code = Code::kUnsupported, .detail = "the Hello did not name the feature outputs"};
+    return {.code = Code::kUnsupported, .detail = "the Hello did not list the feature outputs"};
   }
   ServedDevice& device = asker.devices[wanted.device];
   const auto is_held = [&](const ServedChannel& channel) { return channel.holder == asker.guest.id(); };
@@ -201,7 +201,7 @@ Outcome set_output(LocalTime /*now*/, const Asker& asker, const SetOutput& wante
     const bool lamp = outputs[wanted.output].kind == OutputKind::kLamp;
     return {.code = Code::kInvalid,
             .detail = "output " + std::to_string(wanted.output) +
-                      (lamp ? " is a lamp: expected rgb" : " vibrates: expected vibration")};
+                      (lamp ? " is a lamp: expected rgb" : " is a vibration output: expected vibration")};
   }
   device.outputs.set(asker.guest.id(), wanted.output, wanted.setting);
   device.mail->outputs.put(device.outputs.settings());

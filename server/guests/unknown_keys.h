@@ -35,7 +35,7 @@ class UnknownKeys {
     next_ = now + kPeriod;
     return std::to_string(count) + (count == 1 ? " Hello" : " Hellos") +
            " with a key that is not in the folder `keys` of [network], the newest from " + std::exchange(newest_, {}) +
-           ": that client gets no answer";
+           ": this client gets no reply";
   }
 
  private:

@@ -127,10 +127,10 @@ class Announcer::Avahi {
       : port_(listen.port), interface_(interface_of(listen)), protocol_(protocol_of(listen)), say_(std::move(say)) {
     for (Device& device : devices) entries_.push_back({.avahi = this, .device = std::move(device)});
     sd_event* loop = nullptr;
-    if (sd().event_new(&loop) < 0) throw std::runtime_error("[discovery] announce: the system gives no event loop");
+    if (sd().event_new(&loop) < 0) throw std::runtime_error("[discovery] announce: cannot create an event loop");
     loop_.reset(loop);
     if (sd().event_add_io(loop, nullptr, end_.fd(), EPOLLIN, on_end, nullptr) < 0) {
-      throw std::runtime_error("[discovery] announce: the system gives no event loop");
+      throw std::runtime_error("[discovery] announce: cannot create an event loop");
     }
   }
 
@@ -159,7 +159,7 @@ class Announcer::Avahi {
     return 0;
   }
   static int on_bus_lost(sd_bus_message*, void* self, sd_bus_error*) noexcept {
-    static_cast<Avahi*>(self)->no_bus("it has ended the connection");
+    static_cast<Avahi*>(self)->no_bus("the connection was closed");
     return 0;
   }
   static int on_owner(sd_bus_message* signal, void* self, sd_bus_error*) noexcept {
@@ -194,8 +194,8 @@ class Announcer::Avahi {
   }
 
   void lost(const std::string& why) {
-    say(true, "not announced by [discovery]: " + why +
-                  ". Expected a running avahi-daemon; clients find this server by " + "its address all the same");
+    say(true, "not announced ([discovery]): " + why +
+                  ". Expected a running avahi-daemon; clients can still use the address of this server");
   }
 
   /// Schedules another attempt because this may be called from a callback of the bus.
@@ -226,7 +226,7 @@ class Announcer::Avahi {
                                 "NameOwnerChanged", on_owner, nullptr, this);
     sd().bus_match_signal_async(bus, nullptr, kAvahi, "/", kServer, "StateChanged", on_server, nullptr, this);
     sd().bus_match_signal_async(bus, nullptr, kAvahi, nullptr, kEntryGroup, "StateChanged", on_group, nullptr, this);
-    if (sd().bus_attach_event(bus, loop_.get(), 0) < 0) return no_bus("it is gone");
+    if (sd().bus_attach_event(bus, loop_.get(), 0) < 0) return no_bus("the connection was lost");
     announce();
   }
 
@@ -261,7 +261,7 @@ class Announcer::Avahi {
     sd_bus_message* made = nullptr;
     if (sd().bus_message_new_method_call(bus_.get(), &made, kAvahi, entry.group.c_str(), kEntryGroup, "AddService") <
         0) {
-      return no_bus("it is gone");
+      return no_bus("the connection was lost");
     }
     const std::unique_ptr<sd_bus_message, Release> message(made);
     // If the domain and host are empty, Avahi uses its defaults.
@@ -284,7 +284,8 @@ class Announcer::Avahi {
   }
 
   void rename(Entry& entry) {
-    if (++entry.attempt > kMostNames) return lost(std::to_string(kMostNames) + " names are taken on this network");
+    if (++entry.attempt > kMostNames)
+      return lost(std::to_string(kMostNames) + " names are already used on this network");
     entry.name = dns_sd::another_name(entry.device.name, entry.attempt);
     add(entry);
   }
@@ -292,7 +293,7 @@ class Announcer::Avahi {
   void refused(sd_bus_message* answer) {
     const sd_bus_error* error = sd().bus_message_get_error(answer);
     const char* why = error == nullptr ? "no answer" : error->message != nullptr ? error->message : error->name;
-    lost(std::string("avahi-daemon does not take it (") + why + ")");
+    lost(std::string("avahi-daemon refused the announcement (") + why + ")");
   }
 
   void owner_changed(sd_bus_message* signal) {
@@ -301,7 +302,7 @@ class Announcer::Avahi {
     if (std::string_view(names[0]) != kAvahi) return;
     if (*names[2] == '\0') {
       for (Entry& entry : entries_) entry.group.clear();
-      return lost("avahi-daemon has ended");
+      return lost("avahi-daemon has stopped");
     }
     announce();
   }
@@ -320,7 +321,7 @@ class Announcer::Avahi {
       tell(*entry, "Reset");
       rename(*entry);
     } else if (state == kFailure) {
-      lost(std::string("avahi-daemon gives it up (") + error + ")");
+      lost(std::string("avahi-daemon failed (") + error + ")");
     }
   }
 
@@ -338,10 +339,9 @@ class Announcer::Avahi {
 
 Announcer::Announcer(std::vector<Device> devices, const Address& listen, Say say) {
   if (is_loopback(listen)) {
-    throw std::runtime_error(
-        "[discovery] announce: the server listens on " + to_string(listen) +
-        ", which no other machine reaches; expected [network] with listen = \"0.0.0.0:47100\", or " +
-        "another address of this machine, and keys");
+    throw std::runtime_error("[discovery] announce: the server listens on " + to_string(listen) +
+                             ", which other machines cannot reach; expected [network] listen = \"0.0.0.0:47100\" or "
+                             "another address of this machine, and keys");
   }
   avahi_ = std::make_unique<Avahi>(std::move(devices), listen, std::move(say));
 }

@@ -11,7 +11,7 @@
 namespace tendon {
 
 Doorbell::Doorbell() : fd_(::eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)) {
-  if (fd_ < 0) throw std::system_error(errno, std::generic_category(), "cannot make an eventfd");
+  if (fd_ < 0) throw std::system_error(errno, std::generic_category(), "cannot create an eventfd");
 }
 
 Doorbell::~Doorbell() { ::close(fd_); }

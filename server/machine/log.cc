@@ -59,7 +59,7 @@ void write(const Level& level, std::string_view text) {
   const auto refused = admit(text, now);
   if (!refused) return;
   std::string lines;
-  if (*refused > 0) lines = line(level, now, std::to_string(*refused) + " lines like the next one are left out");
+  if (*refused > 0) lines = line(level, now, std::to_string(*refused) + " similar lines were omitted");
   std::cerr << lines + line(level, now, text);
 }
 

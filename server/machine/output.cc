@@ -120,8 +120,8 @@ class Queue {
     if (lines == 0) return;
     const std::string number = std::to_string(lines);
     push(stream, s.json       ? R"({"event":"dropped","lines":)" + number + "}\n"
-                 : lines == 1 ? "1 line was dropped: nobody read it\n"
-                              : number + " lines were dropped: nobody read them\n");
+                 : lines == 1 ? "1 line was dropped because it was not read\n"
+                              : number + " lines were dropped because they were not read\n");
   }
 
   void push(std::size_t stream, std::string_view text) {

@@ -10,7 +10,7 @@ namespace tendon {
 
 void fill_random(std::span<std::byte> bytes) {
   if (getrandom(bytes.data(), bytes.size(), 0) != static_cast<ssize_t>(bytes.size())) {
-    throw std::system_error(errno, std::system_category(), "the system gives no random numbers");
+    throw std::system_error(errno, std::system_category(), "cannot read random numbers from the system");
   }
 }
 

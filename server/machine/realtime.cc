@@ -118,14 +118,13 @@ std::vector<std::string> enter_realtime(int priority) {
   if (const int error = pthread_setschedparam(pthread_self(), SCHED_FIFO, &param); error != 0) {
     refused.push_back("the haptic thread runs without real-time priority (SCHED_FIFO " + std::to_string(priority) +
                       ": " + std::system_category().message(error) +
-                      "); expect late steps under load. Grant it with LimitRTPRIO= in the unit, or rtprio in "
+                      "); steps can be late under load. Allow it with LimitRTPRIO= in the systemd unit, or rtprio in "
                       "/etc/security/limits.d");
   }
   if (const int error = lock_memory(); error != 0) {
-    refused.push_back(
-        "memory is not locked (mlockall: " + std::system_category().message(error) +
-        "); a page fault may delay a step. Grant it with LimitMEMLOCK=infinity in the unit, or memlock in "
-        "/etc/security/limits.d");
+    refused.push_back("memory is not locked (mlockall: " + std::system_category().message(error) +
+                      "); a page fault can delay a step. Allow it with LimitMEMLOCK=infinity in the systemd unit, or "
+                      "memlock in /etc/security/limits.d");
   }
   touch_stack();
   return refused;
@@ -140,9 +139,10 @@ std::optional<std::string> stay_on(std::uint32_t cpu) {
     error = pthread_setaffinity_np(pthread_self(), sizeof only, &only);
   }
   if (error == 0) return std::nullopt;
-  return "the haptic thread does not stay on processor " + std::to_string(cpu) +
+  return "the haptic thread cannot run on processor " + std::to_string(cpu) +
          " (sched_setaffinity: " + std::system_category().message(error) +
-         "); name one of `nproc --all`, from 0, that the unit's AllowedCPUs= and CPUAffinity= leave";
+         "); use a number from 0 to below `nproc --all` that is allowed by AllowedCPUs= and CPUAffinity= of the "
+         "systemd unit";
 }
 
 WakefulProcessors::WakefulProcessors(const std::filesystem::path& file)
@@ -151,8 +151,8 @@ WakefulProcessors::WakefulProcessors(const std::filesystem::path& file)
   const std::int32_t none = 0;  // µs
   held_ = file_ >= 0 && write(file_, &none, sizeof none) == static_cast<ssize_t>(sizeof none);
   if (held_) return;
-  refused_ = "processors may sleep deep (" + file.string() + ": " + std::system_category().message(errno) +
-             "); waking may take a step 0.1 ms and more. Grant it with a udev rule: KERNEL==\"cpu_dma_latency\", "
+  refused_ = "deep sleep states are not disabled (" + file.string() + ": " + std::system_category().message(errno) +
+             "); a wake-up can take 0.1 ms and more. Allow it with a udev rule: KERNEL==\"cpu_dma_latency\", "
              "GROUP=\"plugdev\", MODE=\"0660\"";
 }
 

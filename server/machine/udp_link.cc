@@ -131,17 +131,17 @@ int socket_on(const udp::endpoint& endpoint, bool shares_address) {
 std::runtime_error cannot_listen(const Address& listen, const std::system_error& error) {
   const bool taken = error.code().value() == EADDRINUSE;
   return std::runtime_error("cannot listen on " + to_string(listen) + ": " + error.code().message() +
-                            (taken ? "; `ss -lunp` says by which program" : ""));
+                            (taken ? "; use `ss -lunp` to find the program that uses it" : ""));
 }
 
 }  // namespace
 
 UdpLink::UdpLink(const Address& listen, Reach reach, const std::optional<std::filesystem::path>& file) {
   if (reach == Reach::kThisMachine && !is_loopback(listen)) {
-    throw std::invalid_argument("refusing to listen on " + to_string(listen) +
-                                ": there are no keys, so anyone on the network could command forces; use a loopback "
-                                "address (127.0.0.1 or [::1]), or give each client a key (`tendond keygen NAME`, and "
-                                "`keys` in the scene's [network])");
+    throw std::invalid_argument(
+        "cannot listen on " + to_string(listen) +
+        ": without keys, anyone on the network could command forces; use a loopback address (127.0.0.1 or [::1]), or "
+        "create a key for each client (`tendond keygen NAME`, and `keys` in [network] of the scene)");
   }
   if (file) unix_.emplace(*file);
   if (to_endpoint(listen).address().is_unspecified()) own_asked_at_ = std::make_unique<AskedAt>();

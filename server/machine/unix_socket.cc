@@ -101,8 +101,8 @@ void UnixSocket::bind_to_file() {
   const sockaddr_un name = file_name(path_);
   struct stat found {};
   if (::lstat(path_.c_str(), &found) == 0) {
-    if (!S_ISSOCK(found.st_mode)) refuse(path_, "there is a file that is no socket; it stays as it is");
-    if (::connect(fd_, as_address(name), sizeof name) == 0) refuse(path_, "another server listens there");
+    if (!S_ISSOCK(found.st_mode)) refuse(path_, "the file exists and is not a socket; it was not changed");
+    if (::connect(fd_, as_address(name), sizeof name) == 0) refuse(path_, "another server is already listening there");
     // No process is listening, so the file was left behind by a server that was killed.
     if (errno != ECONNREFUSED || ::unlink(path_.c_str()) != 0) refuse(path_, reason());
   }

@@ -60,7 +60,7 @@ FileSink::FileSink(const std::filesystem::path& path, const Opened& opened)
 
 FileSink::FileSink(const std::filesystem::path& path) : FileSink(path, open(path)) {
   if (descriptor_ < 0) {
-    throw std::runtime_error("cannot write recording " + path_.string() + ": there is a file of that name already");
+    throw std::runtime_error("cannot write recording " + path_.string() + ": the file already exists");
   }
 }
 
@@ -85,7 +85,7 @@ bool FileSink::append(std::span<const std::byte> bytes) {
     if (n < 0 && errno == EINTR) continue;
     error_ = "cannot write recording " + path_.string() + ": " + reason(n < 0 ? errno : ENOSPC);
     if (done > 0 && ::ftruncate(descriptor_, static_cast<off_t>(size_)) != 0)
-      error_ += "; its last piece is torn and cannot be cut off: " + reason(errno);
+      error_ += "; its last part is incomplete and cannot be removed: " + reason(errno);
     return false;
   }
   size_ += done;
@@ -98,7 +98,8 @@ bool FileSink::is_there() {
   const bool cut = static_cast<std::uint64_t>(status.st_size) < size_;
   if (status.st_nlink > 0 && !cut) return true;
   gone_ = true;
-  error_ = "cannot write recording " + path_.string() + ": it was " + (cut ? "cut off" : "deleted") + " meanwhile";
+  error_ =
+      "cannot write recording " + path_.string() + ": it was " + (cut ? "truncated" : "deleted") + " in the meantime";
   return false;
 }
 

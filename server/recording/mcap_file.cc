@@ -88,9 +88,9 @@ bool is_checked(Opcode opcode) {
 
 std::string why_damaged(Opcode opcode, std::span<const std::byte> content) {
   Fields fields(content);
-  constexpr const char* kWrongLength = "a record does not have the length of its fields";
+  constexpr const char* kWrongLength = "the length of a record does not match its fields";
   const auto whole = [&] { return std::string(fields.done() ? "" : kWrongLength); };
-  if (opcode == Opcode{}) return "there is no record with opcode 0";
+  if (opcode == Opcode{}) return "a record has the invalid opcode 0";
   switch (opcode) {
     case Opcode::kHeader:
       fields.string();
@@ -105,7 +105,7 @@ std::string why_damaged(Opcode opcode, std::span<const std::byte> content) {
       for (int i = 0; i < 3; ++i) fields.string();
       return whole();
     case Opcode::kMessage:
-      return "a message is outside of the chunks";
+      return "a message is outside of a chunk";
     case Opcode::kMessageIndex: {
       fields.u16();
       const auto entries = fields.string();
@@ -122,9 +122,9 @@ std::string why_damaged(Opcode opcode, std::span<const std::byte> content) {
       return whole();
     case Opcode::kChunk: {
       const auto head = chunk_head(content);
-      if (!head) return "a chunk does not have the size it names";
+      if (!head) return "a chunk does not have the size in its header";
       if (!head->compression.empty()) return {};
-      if (head->size != head->records.size()) return "a chunk does not have the size it names";
+      if (head->size != head->records.size()) return "a chunk does not have the size in its header";
       if (head->crc != 0 && head->crc != extend_crc(0, head->records)) return "the CRC of a chunk does not match";
       return {};
     }
@@ -136,7 +136,7 @@ std::string why_damaged(Opcode opcode, std::span<const std::byte> content) {
 File::File(std::unique_ptr<std::istream> input, std::string name) : input_(std::move(input)), name_(std::move(name)) {
   input_->seekg(0, std::ios::end);
   const auto end = static_cast<std::streamoff>(input_->tellg());
-  if (!*input_ || end < 0) throw std::runtime_error(name_ + ": cannot be read");
+  if (!*input_ || end < 0) throw std::runtime_error(name_ + ": cannot read the file");
   size_ = zeros_from_ = static_cast<std::uint64_t>(end);
   while (zeros_from_ > 0) {
     // The first read is only one byte because most files do not end with zeros.
@@ -152,7 +152,7 @@ void File::read(std::uint64_t at, std::span<std::byte> bytes) {
   // Seeking would discard the buffer of the stream.
   if (cursor_ != at) input_->seekg(static_cast<std::streamoff>(at));
   input_->read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
-  if (!*input_) throw std::runtime_error(name_ + ": byte " + std::to_string(at) + ": cannot be read");
+  if (!*input_) throw std::runtime_error(name_ + ": byte " + std::to_string(at) + ": cannot read the file");
   cursor_ = at + bytes.size();
 }
 

@@ -42,8 +42,8 @@ McapReader::McapReader(std::unique_ptr<std::istream> input, std::string name)
     const bool more = file_.zeros_from() > kMagic.size();
     const bool mcap = more && (ends_with_magic_ || file_.goes_on_at(kMagic.size()) ||
                                (zeros && file_.find_record(kMagic.size(), file_.size())));
-    if (!mcap) throw std::runtime_error(file_.name() + ": is not an MCAP file");
-    note(0, 0, "the file does not begin as an MCAP file does");
+    if (!mcap) throw std::runtime_error(file_.name() + ": not an MCAP file");
+    note(0, 0, "the file does not start with the MCAP magic");
   }
   if (file_.zeros_from() < kMagic.size()) {
     finish(true);
@@ -61,7 +61,7 @@ std::optional<McapReader::Message> McapReader::next() {
       const auto content = records.bytes(records.u64());
       chunk_ = records.rest();
       if (!records.ok()) {
-        note(record_.at, record_.at, "the records of a chunk do not have the lengths they name");
+        note(record_.at, record_.at, "the records of a chunk do not have the lengths in their headers");
         chunk_ = {};
       } else if (auto message = take(static_cast<Opcode>(opcode.front()), content)) {
         return message;
@@ -82,7 +82,7 @@ bool McapReader::next_record() {
     if (position_ >= file_.zeros_from()) return finish(!ends_with_magic_);
     const auto record = file_.record_at(position_);
     if (!record) {
-      if (skip_damage("a record reaches past the end of the file, or is too large to read")) return true;
+      if (skip_damage("a record extends beyond the end of the file, or is too large")) return true;
       continue;
     }
     record_ = *record;
@@ -91,7 +91,7 @@ bool McapReader::next_record() {
     std::string what = mcap::why_damaged(record_.opcode, content_);
     if (what.empty() && !in_summary_ && !mcap::is_checked(record_.opcode)) {
       const auto chunk = file_.chunk_at(position_);
-      if (chunk && chunk->end == record_.end) what = "a chunk has another opcode";
+      if (chunk && chunk->end == record_.end) what = "a chunk has a wrong opcode";
     }
     if (what.empty()) {
       accept_record();
@@ -115,7 +115,7 @@ void McapReader::accept_record() {
     const auto expected = Fields(content_).u32();
     // If the file is damaged, the CRC cannot match.
     if (expected != 0 && expected != crc_ && damage_.empty() && record_.end <= file_.zeros_from())
-      note(record_.at, record_.at, "the CRC of the data before it does not match");
+      note(record_.at, record_.at, "the CRC of the preceding data does not match");
   }
   crc_ = extend_crc(extend_crc(crc_, head), content_);
 }
@@ -159,12 +159,12 @@ void McapReader::check_end() {
   const auto start_fields = footer.bytes(2 * sizeof(std::uint64_t));
   const auto expected = footer.u32();
   if (!in_summary_ && damage_.empty()) {
-    note(record_.at, record_.at, "the data before the summary have no end");
+    note(record_.at, record_.at, "the record that ends the data before the summary is missing");
   } else if (in_summary_ && expected != 0 && expected != extend_crc(summary_crc_, start_fields)) {
     note(record_.at, record_.at, "the CRC of the summary does not match");
   }
   if (file_.zeros_from() > end || !file_.magic_at(position_)) {
-    note(position_, position_, "the file does not end after its footer");
+    note(position_, position_, "there are data after the footer");
   }
 }
 
@@ -228,18 +228,18 @@ std::optional<McapReader::Message> McapReader::take_message(Fields fields) {
   const auto log_time = fields.u64();
   fields.u64();  // publish time
   if (!fields.ok()) {
-    note(record_.at, record_.at, "a message ends before its fields do");
+    note(record_.at, record_.at, "a message is shorter than its fields");
     return std::nullopt;
   }
   const auto is_known = [&] { return channels_.contains(id) && !doubtful_.contains(id); };
   if (!is_known() && !(use_summary() && is_known())) {
-    note(record_.at, record_.at, "a message belongs to no channel");
+    note(record_.at, record_.at, "a message has an unknown channel");
     return std::nullopt;
   }
   Count& count = taken_[id];
   const std::uint64_t missing = sequence > count.next ? sequence - count.next : 0;
   if (missing > 0 && count.damage == damage_.size()) {
-    note(record_.at, record_.at, "messages before it are missing: a part of the file is gone");
+    note(record_.at, record_.at, "preceding messages are missing: a part of the file was lost");
   }
   for (auto damage = damage_.rbegin(); damage != damage_.rend() && !damage->before; ++damage) damage->before = log_time;
   count = {.next = std::uint64_t{sequence} + 1, .damage = damage_.size()};
@@ -307,7 +307,7 @@ std::vector<std::string> McapReader::damage() const {
   std::vector<std::string> sentences;
   for (const Damage& damage : damage_) {
     std::string text = file_.name() + ": byte " + std::to_string(damage.from) + ": " + damage.what;
-    if (damage.to > damage.from) text += "; " + std::to_string(damage.to - damage.from) + " bytes are left out";
+    if (damage.to > damage.from) text += "; " + std::to_string(damage.to - damage.from) + " bytes are skipped";
     if (damage.after) text += ", after " + seconds_of(*damage.after, *first_time_);
     if (damage.before)
       text += std::string(damage.after ? " and" : ",") + " before " + seconds_of(*damage.before, *first_time_);

@@ -125,7 +125,7 @@ std::unique_ptr<FileSink> open_next_part(const fs::path& path) {
   }
   if (fs::exists(path) && !looks_like_a_recording(path)) {
     throw std::runtime_error("cannot write recording " + path.string() +
-                             ": there is a file of that name, which is no recording; it is left as it is");
+                             ": the file exists and is not a recording; it was not changed");
   }
   for (;;) {
     if (auto sink = FileSink::open_new(numbered(path, ++highest))) return sink;

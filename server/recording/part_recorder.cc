@@ -107,7 +107,7 @@ std::vector<PartRecorder::Notice> PartRecorder::take_notices() { return std::exc
 bool PartRecorder::open_part(LocalTime now) {
   if (config_.budget_bytes > 0) {
     for (const auto& gone : delete_oldest_parts(config_.path, config_.budget_bytes - config_.budget_bytes / 4)) {
-      notices_.push_back({false, "deleted " + gone.string() + ", the oldest recording, to keep the budget of " +
+      notices_.push_back({false, "deleted " + gone.string() + ", the oldest recording, because of the budget of " +
                                      std::to_string(config_.budget_bytes / 1'000'000) + " MB"});
     }
   }
@@ -137,7 +137,7 @@ void PartRecorder::look_after(LocalTime now) {
   if (recorder_->failed()) return stop(now, recorder_->status().error);
   finish_part(now);
   try {
-    if (open_part(now)) notices_.push_back({false, "recording goes on in " + closed_.path.string()});
+    if (open_part(now)) notices_.push_back({false, "recording continues in " + closed_.path.string()});
   } catch (const std::runtime_error& refused) {
     stop(now, refused.what());
   }
@@ -192,8 +192,8 @@ void PartRecorder::stop(LocalTime now, std::string why) {
   if (recorder_) finish_part(now);
   try_again_ = now + config_.retry_after;
   if (closed_.error.empty()) {
-    notices_.push_back({true, "recording has stopped, the device runs on: " + why +
-                                  "; it goes on as soon as it can be written again"});
+    notices_.push_back({true, "recording has stopped, but the device continues: " + why +
+                                  "; recording continues as soon as a file can be written"});
   }
   closed_.error = std::move(why);
 }
@@ -209,7 +209,7 @@ void PartRecorder::go_on(LocalTime now) {
   }
   closed_.error.clear();
   const Counts missing = std::exchange(missing_, {});
-  notices_.push_back({true, "recording goes on in " + closed_.path.string() + "; " +
+  notices_.push_back({true, "recording continues in " + closed_.path.string() + "; " +
                                 count_of(missing.steps, missing.datagrams) + " are missing"});
   lost({.at = now, .steps = missing.steps, .datagrams = missing.datagrams, .cause = LossRecord::Cause::kDisk});
 }

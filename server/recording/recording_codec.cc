@@ -193,7 +193,7 @@ template <class Message>
 Message parse(std::string_view bytes) {
   Message message;
   if (!message.ParseFromArray(bytes.data(), static_cast<int>(bytes.size())))
-    throw std::invalid_argument("the bytes are not a " + message.GetTypeName());
+    throw std::invalid_argument("the data are not a " + message.GetTypeName());
   return message;
 }
 

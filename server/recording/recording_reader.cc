@@ -52,7 +52,7 @@ std::optional<RecordingReader::Record> RecordingReader::next() {
     try {
       record = decode(*message);
     } catch (const std::invalid_argument& error) {
-      mcap_.note(message->offset, std::string(error.what()) + "; it is left out");
+      mcap_.note(message->offset, std::string(error.what()) + "; the record is skipped");
     }
     const bool step = belongs(message->channel, recording::kStep);
     const bool datagram = is(message->channel, recording::kDatagram);
@@ -82,7 +82,7 @@ std::optional<RecordingReader::Record> RecordingReader::decode(const McapReader:
     return scene;
   }
   if (!unix_offset_) {
-    mcap_.note(message.offset, "a record comes before the scene, which is missing");
+    mcap_.note(message.offset, "a record precedes the scene, which is missing");
     unix_offset_ = Duration::zero();
   }
   newest_ = recording::local_time(message.log_time, *unix_offset_);
@@ -93,8 +93,8 @@ std::optional<RecordingReader::Record> RecordingReader::decode(const McapReader:
 }
 
 std::string RecordingReader::without_steps() const {
-  if (mcap_.size() == 0) return name_ + ": is empty";
-  return name_ + (mcap_.truncated() ? ": is cut off before its first haptic step" : ": holds no haptic step");
+  if (mcap_.size() == 0) return name_ + ": the file is empty";
+  return name_ + (mcap_.truncated() ? ": truncated before the first haptic step" : ": contains no haptic step");
 }
 
 /// Returns a LossRecord if records are missing at the end. Throws std::runtime_error if this is not a Tendon recording.
@@ -105,7 +105,7 @@ std::optional<RecordingReader::Record> RecordingReader::end() {
     return std::ranges::any_of(kKinds, [&](const auto* kind) { return is(entry.second, *kind); });
   });
   if (!ours && !(channels.empty() && mcap_.truncated()))
-    throw std::runtime_error(name_ + ": is an MCAP file, but not a Tendon recording: it has no channel /scene");
+    throw std::runtime_error(name_ + ": an MCAP file, but not a Tendon recording: it has no channel /scene");
   const LossRecord lost{.at = newest_,
                         .steps = mcap_.missing_at_end(recording::kStep.topic),
                         .datagrams = mcap_.missing_at_end(recording::kDatagram.topic),

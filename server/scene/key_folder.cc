@@ -56,9 +56,9 @@ ClientKey read_key(const std::filesystem::path& path) {
   struct stat status {};
   std::string text(kMaxKeyFile, '\0');
   const ssize_t size = file.fd < 0 || ::fstat(file.fd, &status) != 0 ? -1 : ::read(file.fd, text.data(), text.size());
-  if (size < 0) throw std::runtime_error(path.string() + ": cannot read it: " + system_message());
+  if (size < 0) throw std::runtime_error("cannot read key file " + path.string() + ": " + system_message());
   if (const auto reason = why_not_regular(status.st_mode)) {
-    throw std::runtime_error(path.string() + ": cannot read it: " + *reason);
+    throw std::runtime_error("cannot read key file " + path.string() + ": " + *reason);
   }
   text.resize(static_cast<std::size_t>(size));
   try {
@@ -75,11 +75,10 @@ std::vector<ClientKey> read_key_folder(const std::filesystem::path& folder) {
        entry.increment(problem)) {
     if (entry->path().extension() == ".key") files.push_back(entry->path());
   }
-  if (problem) throw std::runtime_error(folder.string() + ": cannot read this folder of keys: " + problem.message());
+  if (problem) throw std::runtime_error("cannot read key folder " + folder.string() + ": " + problem.message());
   if (files.empty()) {
-    throw std::runtime_error(folder.string() +
-                             ": there is no key in this folder; make one for each client with "
-                             "`tendond keygen NAME`");
+    throw std::runtime_error(
+        folder.string() + ": expected a key file for each client, found none; create one with `tendond keygen NAME`");
   }
   std::sort(files.begin(), files.end());
   std::vector<ClientKey> keys;
@@ -95,7 +94,7 @@ void write_key_file(const std::filesystem::path& path, const ClientKey& key) {
   if (made) return;
   const std::string reason = system_message();
   if (file.fd >= 0) ::unlink(unfinished.c_str());
-  throw std::runtime_error(path.string() + ": cannot write this key: " + reason);
+  throw std::runtime_error("cannot write key file " + path.string() + ": " + reason);
 }
 
 }  // namespace tendon

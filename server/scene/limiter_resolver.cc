@@ -77,13 +77,14 @@ class LimiterResolver : SceneErrors {
     const Law law = draft_.scene.loop.control.limiter.law;
     if (has_motor && law != Law::kAolPlus && law != Law::kAol && law != Law::kNone) {
       blame("limiter.kind", {},
-            "expected \"aol+\", \"aol\" or \"none\": the other laws know the force on a point only, and this device "
+            "expected \"aol+\", \"aol\" or \"none\": the other laws only limit the force on a point, and this device "
             "has " +
                 motor);
     }
     const auto bound = [&](const std::optional<double>& value, const std::string& key, double true_size, double of_it) {
       const double most = of_it * true_size;
-      if (!has_motor && value) blame(key, {}, "expected a device with " + motor + ", because this bound is about it");
+      if (!has_motor && value)
+        blame(key, {}, "expected a device with " + motor + ", because this is a bound on its friction");
       if (has_motor && !value && law != Law::kNone) {
         blame(key, {}, "missing, expected " + kZeroOrMore.expected(unit_of(key)) + ", because the device has " + motor);
       }
@@ -105,7 +106,8 @@ class LimiterResolver : SceneErrors {
     const std::string table = "limiter.adaptive_friction";
     const std::size_t count = draft_.places.size();
     if (draft_.place_coulomb.size() != count || draft_.place_viscous.size() != count) {
-      blame(table + ".places_mm", {}, "expected as many places as friction bounds of each kind");
+      blame(table + ".places_mm", {},
+            "expected one place for each value of coulomb_friction_n and of viscous_friction_n_s_per_m");
     }
     const SimulatedDevice::Config& device = draft_.simulated;
     const auto check = [&](const char* key, const std::vector<double>& bounds, double Friction::*kind) {
@@ -149,21 +151,21 @@ class LimiterResolver : SceneErrors {
     LimiterConfig& limiter = control.limiter;
     if (limiter.law != Law::kAolPlus) {
       blame("limiter.preset", {"limiter.preset", "limiter.kind"},
-            "expected kind \"aol+\", whose parts a preset lists, found " + in_quotes(info(limiter.law).name));
+            "expected kind \"aol+\" with a preset, found " + in_quotes(info(limiter.law).name));
     }
     const std::optional<double> step = draft_.encoder_step();
     if (!step && draft_.scene.driver().moves_a_hand) {
       blame("limiter.robust_ledger.encoder_step_um", {"limiter.preset"},
             "missing, expected " + kZeroOrMore.expected(unit_of("_um")) +
-                ", because the preset has to know the device's counts");
+                ", because the preset requires the encoder step of the device");
     }
     const PresetParts chosen = preset_parts(
         *draft_.preset,
         {.friction = limiter.friction, .longest_hold = limiter.longest_hold, .encoder_step = step.value_or(0)});
     if (limiter.parts.latency_reserve && chosen.parts.bounded_acceleration) {
       blame("limiter.latency_reserve", {"limiter.latency_reserve", "limiter.preset"},
-            "expected none with a preset that lists bounded_acceleration, which is not proved for forces that are held "
-            "late: take \"" +
+            "expected no latency_reserve with a preset that includes bounded_acceleration, which is not proved for "
+            "forces that are held late: use \"" +
                 std::string(info(Preset::kFeelUnconditional).name) + "\"");
     }
     for_each_aol_part([&](const auto& part) {
@@ -179,11 +181,11 @@ class LimiterResolver : SceneErrors {
   void resolve_parts(LimiterConfig& limiter) const {
     if (limiter.parts.bounded_acceleration && !limiter.parts.shaping && !draft_.preset) {
       blame("limiter.shaping", {"limiter.bounded_acceleration"},
-            "missing, expected this table with bounded_acceleration: nothing else limits how hard a wall may be");
+            "missing, expected this table with bounded_acceleration, because nothing else limits the stiffness");
     }
     if (limiter.parts.fading_contact && !limiter.parts.energy_cap && !draft_.preset) {
       blame("limiter.energy_cap", {"limiter.fading_contact"},
-            "missing, expected this table with fading_contact: without it no contact has a credit of its own");
+            "missing, expected this table with fading_contact, because only energy_cap has a credit for each contact");
     }
     if (limiter.parts.robust_ledger) {
       const std::optional<double> step = draft_.encoder_step();
@@ -205,7 +207,7 @@ class LimiterResolver : SceneErrors {
       if (draft_.scene.loop.control.limiter.law == Law::kNone || !draft_.scene.driver().exerts_force) return 0;
       blame(full, {},
             "missing, expected " + kZeroOrMore.expected(unit) +
-                (draft_.scene.driver().moves_a_hand ? ": what tendon-identify finds of this very device, or 0"
+                (draft_.scene.driver().moves_a_hand ? ": use the value from tendon-identify for this device, or 0"
                                                     : ", because there is no profile"));
     }
     const double bound = given ? *given : profiles->value * axis_share;
@@ -213,9 +215,9 @@ class LimiterResolver : SceneErrors {
     if (bound > most && !draft_.scene.driver().moves_a_hand && draft_.scene.driver().exerts_force) {
       blame(full, {full, "device.effects." + key},
             "expected at most " + with_symbol(digits(most), unit) + ", the true friction of the simulated device" +
-                (axis_share < 1 ? " (an axis by itself has 1/√3 of it)" : "") +
+                (axis_share < 1 ? " (each axis has 1/√3 of it)" : "") +
                 ", because a higher bound voids the limiter's proof, found " + digits(bound) +
-                (given ? "" : " (the profile's)"));
+                (given ? "" : " (from the profile)"));
     }
     refuse_impossible(full, bound,
                       key.starts_with("coulomb") ? kMovementBounds.friction.coulomb : kMovementBounds.friction.viscous);

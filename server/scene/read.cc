@@ -113,7 +113,9 @@ Scene parse_scene(std::string_view text, const std::string& name, const std::fil
   for (const std::string& setting : settings) apply_setting(file, setting);
   scene_file::Draft draft;
   draft.scene.text = settings.empty() ? std::string(text) : text_of(file);
-  if (draft.scene.text.size() > kMaxSceneBytes) throw SceneError(name + ": the settings make the scene too long");
+  if (draft.scene.text.size() > kMaxSceneBytes)
+    throw SceneError(name + ": with the settings, the scene has more than " + std::to_string(kMaxSceneBytes) +
+                     " bytes");
   draft.scene.has_network = file.contains("network");
   draft.scene.name = scene_file::label_of(std::filesystem::path(name).stem().string());
   scene_file::SceneProblems problems;
@@ -172,20 +174,20 @@ std::vector<Scene> read_scenes(const std::vector<std::filesystem::path>& files, 
                        " devices of all scenes, found " + std::to_string(place));
     }
     if (!scene.shares_thread() && scene.loop.device >= limits::kMaxDevices) {
-      throw SceneError(file.string() + ": device.kind: expected devices with a plug among the first " +
+      throw SceneError(file.string() + ": device.kind: expected USB devices among the first " +
                        std::to_string(limits::kMaxDevices) + ", found " + std::to_string(scene.loop.device) +
-                       " before it: name its scene before theirs");
+                       " before it: list its scene first");
     }
     for (std::uint32_t index = 0; index < scene.count; ++index) {
       const auto [first, is_new] = names.emplace(scene.name_of(index), file);
       if (is_new) continue;
-      throw SceneError(file.string() + ": device.name: expected a name of its own, found " +
+      throw SceneError(file.string() + ": device.name: expected a unique name, found " +
                        scene_file::in_quotes(first->first) + " again, which is in " + first->second.string());
     }
     for (const auto& [name, there] :
          {std::pair("network", scene.has_network), std::pair("recording", scene.recording.has_value())}) {
       if (!there || scenes.empty()) continue;
-      throw SceneError(file.string() + ": " + name + ": expected in the first scene only, " + files.front().string());
+      throw SceneError(file.string() + ": " + name + ": expected only in the first scene, " + files.front().string());
     }
     scenes.push_back(std::move(scene));
   }

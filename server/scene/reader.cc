@@ -21,7 +21,7 @@ std::string advice(std::string_view unknown, const std::vector<std::string_view>
   }
   std::string text = did_you_mean(unknown, known);
   if (!text.empty()) return text;
-  for (const std::string_view key : known) text.append(text.empty() ? "; known here: " : ", ").append(key);
+  for (const std::string_view key : known) text.append(text.empty() ? "; expected one of " : ", ").append(key);
   return text;
 }
 

@@ -24,7 +24,7 @@ std::vector<ReplayDevice::Sample> read_recorded_hand(const std::filesystem::path
     samples.push_back({step->hand.at.time_since_epoch(), step->hand.position});
   }
   if (samples.size() < 2) {
-    fail("expected 2 steps in which the device gave a position, or more, found " + std::to_string(samples.size()));
+    fail("expected 2 or more steps with a position of the device, found " + std::to_string(samples.size()));
   }
   return samples;
 }

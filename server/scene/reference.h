@@ -27,7 +27,9 @@ class Reference {
   bool key(const Name& named, const T& target, const Rule& rule, std::string_view meaning, const Absent& absent = {}) {
     const Unit& unit = unit_of(named.name);
     std::string without = "Default: ";
-    if (!absent.text.empty()) {
+    if (absent.text.starts_with("required")) {
+      without = capitalized(absent.text);
+    } else if (!absent.text.empty()) {
       without += absent.text;
     } else if (absent.required) {
       without = "Required";
@@ -35,8 +37,9 @@ class Reference {
       without += rule.shown(unit, target);
     }
     text_.append(indent_).append(named.name).append("\n");
-    text_.append(indent_).append("    ").append(meaning).append(".\n");
-    text_.append(indent_).append("    ").append(rule.expected(unit)).append(". ").append(without).append(".\n");
+    text_.append(indent_).append("    ").append(capitalized(meaning)).append(".\n");
+    text_.append(indent_).append("    ").append(capitalized(rule.expected(unit))).append(". ");
+    text_.append(without).append(".\n");
     return false;
   }
 
@@ -86,6 +89,12 @@ class Reference {
   }
 
  private:
+  static std::string capitalized(std::string_view text) {
+    std::string sentence(text);
+    if (!sentence.empty() && sentence.front() >= 'a' && sentence.front() <= 'z') sentence.front() += 'A' - 'a';
+    return sentence;
+  }
+
   std::string& text_;
   std::string path_;
   std::string indent_ = "  ";

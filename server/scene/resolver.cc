@@ -204,7 +204,7 @@ class SceneResolver : SceneErrors {
     const SimulatedDevice::Config& device = draft_.simulated;
     if (!device.structural_mode || device.structural_mode->handle_mass < device.mass) return;
     blame("device.effects.structural_mode.handle_mass_kg", {},
-          "expected less than mass_kg, of which it is a part and which is " + digits(device.mass) + " kg, found " +
+          "expected less than mass_kg, which is " + digits(device.mass) + " kg, found " +
               digits(device.structural_mode->handle_mass));
   }
 
@@ -215,21 +215,23 @@ class SceneResolver : SceneErrors {
       blame("device.count", {}, "expected " + expected + ", found " + std::to_string(scene.count));
     };
     if (!std::holds_alternative<SimulatedDevice::Config>(scene.device)) {
-      refuse("1, because kind is \"" + std::string(scene.driver().kind) + "\" and only simulated devices are counted");
+      refuse("1, because kind is \"" + std::string(scene.driver().kind) +
+             "\" and only simulated devices can have a count");
     }
-    if (scene.teleoperation) refuse("1 beside [teleoperation], which couples one device");
-    if (scene.discovery && scene.discovery->announce) refuse("1 beside [discovery], which announces one device");
+    if (scene.teleoperation) refuse("1 with [teleoperation], which couples one device");
+    if (scene.discovery && scene.discovery->announce) refuse("1 with [discovery], which announces one device");
     const std::string longest = scene.name_of(scene.count - 1);
     if (longest.size() <= limits::kMaxLabel) return;
     blame("device.name", {"device.count"},
-          "expected a name that leaves \"" + longest + "\" at most " + std::to_string(limits::kMaxLabel) +
+          "expected a name with which \"" + longest + "\" has at most " + std::to_string(limits::kMaxLabel) +
               " letters, found " + std::to_string(longest.size()));
   }
 
   void resolve_recording() const {
     const auto& recording = draft_.scene.recording;
     if (!recording || !recording->one_in || recording->keep == Keep::kFaults) return;
-    blame("recording.one_in", {}, "expected keep = \"faults\" beside it, found keep = \"all\": every file stays");
+    blame("recording.one_in", {},
+          "expected keep = \"faults\" with one_in, found keep = \"all\", which keeps every file");
   }
 
   /// The profiles only contain the friction of the handle.
@@ -241,8 +243,8 @@ class SceneResolver : SceneErrors {
     if (draft_.joint_coulomb) {
       if (const auto node = file_.at_path(handles); node && node.is_number()) {
         blame(handles, {},
-              "expected false beside coulomb_n_m of [" + table + "], found " + found_in(*node.node()) +
-                  ": this friction is in the joints or at the handle");
+              "expected false with coulomb_n_m of [" + table + "], found " + found_in(*node.node()) +
+                  ": the friction is either in the joints or at the handle");
       }
       device.joint_friction->coulomb = *draft_.joint_coulomb;
     } else if (device.coulomb_friction) {
@@ -261,7 +263,7 @@ class SceneResolver : SceneErrors {
       for (std::size_t before = 0; before < i; ++before) {
         if (scene.channels[before].name != scene.channels[i].name) continue;
         blame("channel[" + std::to_string(i) + "].name", {},
-              "expected a name of its own, found " + in_quotes(scene.channels[i].name) + " again");
+              "expected a unique name, found " + in_quotes(scene.channels[i].name) + " again");
       }
     }
   }
@@ -279,10 +281,9 @@ class SceneResolver : SceneErrors {
               "expected " + std::string(driver.buttons_in_words) + ", found " + std::to_string(button));
       }
       if (!driver.moves_a_hand && !is_pressed(button)) {
-        blame(
-            "safety.dead_man.button", {},
-            "expected button 0 of a hand with button_after_ms, or one of its [[device.hand.press]]: a simulated device "
-            "has no others");
+        blame("safety.dead_man.button", {},
+              "expected 0 with button_after_ms of [device.hand], or a button of [[device.hand.press]]: a simulated "
+              "device has no other buttons");
       }
     }
     build("safety", [&scene, this] {
@@ -301,10 +302,10 @@ class SceneResolver : SceneErrors {
     Scene::Network& network = draft_.scene.network;
     if (network.keys) network.keys = directory / *network.keys;
     if (network.suites.empty()) {
-      blame("network.suites", {}, "expected some of " + names_of(all_suites()) + ", found none to seal by");
+      blame("network.suites", {}, "expected some of " + names_of(all_suites()) + ", found an empty list");
     }
     if (!network.keys && file_.at_path("network.suites")) {
-      blame("network.suites", {}, "expected none without keys: nothing is sealed then");
+      blame("network.suites", {}, "expected no suites without keys, because the sessions are not encrypted");
     }
     // This is also checked by UdpLink, but the line is only known here.
     if (network.unix_path && network.unix_path->native().size() > UnixSocket::kMostPath) {
@@ -314,8 +315,8 @@ class SceneResolver : SceneErrors {
     }
     if (!network.keys && !is_loopback(network.listen)) {
       blame("network.listen", {},
-            "expected a loopback address like \"127.0.0.1:47100\" or \"[::1]:47100\", or a folder of keys besides: "
-            "without keys anyone on the network could command forces");
+            "expected a loopback address like \"127.0.0.1:47100\" or \"[::1]:47100\", or a folder of keys: without "
+            "keys, anyone on the network could command forces");
     }
   }
 
@@ -339,7 +340,8 @@ class SceneResolver : SceneErrors {
     control.watchdog = device.watchdog.value_or(Duration::zero());
     if (control.admittance && !device.force_sensor) {
       blame("admittance", {},
-            "expected a device with force_sensor among its effects: the tool is driven by the hand's force");
+            "expected a device with force_sensor in [device.effects], because the force of the hand moves the virtual "
+            "tool");
     }
 
     const std::optional<double> most = draft_.scene.driver().exerts_force ? device.max_force : kUnfelt;
@@ -360,12 +362,13 @@ class SceneResolver : SceneErrors {
     const bool leads = coupling.role == PortRole::kLeader;
     if (peer->key) peer->key = directory / *peer->key;
     if (peer->key && !peer->dial) {
-      blame("teleoperation.key", {}, "expected none without dial: who is dialled lets in by [network] keys");
+      blame("teleoperation.key", {},
+            "expected no key without dial, because a server that is dialled uses the keys of [network]");
     }
     if (peer->dial && !is_loopback(*peer->dial)) {
       if (!peer->key) {
         blame("teleoperation.dial", {},
-              "expected an address of this machine, or a key besides: nothing crosses a network in the clear");
+              "expected a loopback address, or a key: connections over a network must be encrypted");
       }
       if (is_loopback(draft_.scene.network.listen)) {
         blame("network.listen", {"network.listen", "teleoperation.dial"},
@@ -378,7 +381,7 @@ class SceneResolver : SceneErrors {
     if (draft_.engages_by_button != draft_.engage_button.has_value() || (!leads && draft_.engages_by_button)) {
       blame("teleoperation.engage.by", {"teleoperation.engage.button"},
             leads ? "expected \"button\" together with button, or \"request\" without"
-                  : "expected \"request\": the leader engages");
+                  : "expected \"request\" for a follower: only a leader can engage by a button");
     }
     coupling.engage_by = draft_.engage_button;
     resolve_absolute(coupling, leads);
@@ -392,18 +395,20 @@ class SceneResolver : SceneErrors {
     blame_rules(coupling);
     if (needs_purse(coupling.method) && law != Law::kNone && !coupling.purse) {
       blame("teleoperation.purse", {"teleoperation"},
-            "missing, expected this table: behind a limiter of its own a follower cannot move unless the leader pays");
+            "missing, expected this table: with its own limiter, a follower can only move with energy from the leader");
     }
     const bool waves = coupling.method == CouplingMethod::kWaves;
     const bool shares = coupling.purse || (waves && law != Law::kNone);
     const std::string what = coupling.purse ? "teleoperation.purse" : "teleoperation.method";
     if (shares && law != Law::kAolPlus && law != Law::kAol && law != Law::kAolBox) {
       blame(what, {"limiter.kind"},
-            "expected the limiter \"aol+\", \"aol\" or \"aol-box\": the others have no account that ports can share");
+            "expected the limiter \"aol+\", \"aol\" or \"aol-box\": other limiters have no energy account that ports "
+            "can share");
     }
     if (shares && control.limiter.parts.latency_reserve) {
-      blame("limiter.latency_reserve", {},
-            "expected none with " + what + ": the reserve is not proved for an account that ports share");
+      blame(
+          "limiter.latency_reserve", {},
+          "expected none with " + what + ": the reserve is not proved for an account that is shared by several ports");
     }
     control.limiter.shared_account = shares;
     build("teleoperation", [&coupling] { Coupling{coupling}; });
@@ -418,11 +423,11 @@ class SceneResolver : SceneErrors {
     const bool aligns = leads && draft_.absolute_map;
     if (draft_.align_within && !aligns) {
       blame("teleoperation.engage.within_mm", {},
-            "expected none but of a leader with map.absolute: only that one aligns");
+            "expected no within_mm, except for a leader with map.absolute: only this leader is aligned");
     }
     if (draft_.align_energy > 0 && !(aligns && coupling.purse)) {
       blame("teleoperation.engage.align_energy_mj", {},
-            "expected 0 but of a leader with map.absolute and a purse, whose account it is paid into");
+            "expected 0, except for a leader with map.absolute and a purse: the energy is paid into its account");
     }
   }
 
@@ -432,19 +437,20 @@ class SceneResolver : SceneErrors {
     if (peer.leaders.empty()) return;
     const std::string table = "teleoperation.leader";
     if (coupling.role == PortRole::kLeader) {
-      blame(table, {}, "expected none: a leader knows nothing of the others, the follower lists them");
+      blame(table, {}, "expected no such table for a leader, because the follower lists all leaders");
     }
     if (peer.dial) {
       blame("teleoperation.dial", {},
-            "expected none with [[teleoperation.leader]]: several leaders dial their follower");
+            "expected no dial with [[teleoperation.leader]]: several leaders dial their follower");
     }
-    if (peer.leaders.size() < 2) blame(table, {}, "expected 2 to 4 tables, or none for one leader by any channel");
+    if (peer.leaders.size() < 2)
+      blame(table, {}, "expected 2 to 4 tables, or no table for a single leader on any channel");
     Coupling::Config one = coupling;
     one.share = peer.leaders.front().share;
     blame_rules(one);
     if (coupling.turn || coupling.grip) {
       blame(coupling.turn ? "teleoperation.turn" : "teleoperation.grip", {},
-            "expected none with several leaders, who share positions only");
+            "expected no such table with several leaders, because they only share positions");
     }
     double sum = 0;
     auto& leaders = draft_.scene.loop.control.leaders;
@@ -457,13 +463,13 @@ class SceneResolver : SceneErrors {
       }
       const auto number = static_cast<std::uint32_t>(named - channels.begin());
       if (std::ranges::count(leaders, number, &CoupledLeader::channel) > 0) {
-        blame(key, {}, "expected a channel of its own, found " + in_quotes(channel) + " again");
+        blame(key, {}, "expected a different channel for each leader, found " + in_quotes(channel) + " again");
       }
       leaders.push_back({.channel = number, .share = share});
       sum += share;
     }
     if (!(std::abs(sum - 1) <= Shares::kRounding)) {
-      blame(table, {}, "expected shares that are 1 together, found " + digits(sum));
+      blame(table, {}, "expected shares with the sum 1, found " + digits(sum));
     }
   }
 
@@ -477,7 +483,7 @@ class SceneResolver : SceneErrors {
     coupling.drift_rate = draft_.drift_rate.value_or(coupling.drift_rate);
     if (coupling.method == CouplingMethod::kSetPosition && coupling.spring.damping > 0) {
       blame("teleoperation.coupling.mutual_damping_n_s_per_m", {},
-            "expected none or 0 with method " + named + ": it uses no velocity of the other end");
+            "expected 0 or no value with method " + named + ": it does not use the velocity of the other end");
     }
   }
 
@@ -510,18 +516,19 @@ class SceneResolver : SceneErrors {
     const bool leads = coupling.role == PortRole::kLeader;
     if (!draft_.simulated.rotation) {
       blame("teleoperation.turn", {},
-            "expected a device with [device.rotation]: this one does not measure how its handle is turned");
+            "expected a device with [device.rotation]: this device does not measure the orientation of its handle");
     }
     if (!leads && !control.rotation) {
-      blame("teleoperation.turn", {},
-            "expected a device with max_torque_nm in [device.rotation]: without motors that turn its handle a follower "
-            "cannot turn as the leader does");
+      blame(
+          "teleoperation.turn", {},
+          "expected a device with max_torque_nm in [device.rotation]: a follower requires motors that turn its handle");
     }
     if (control.rotation) coupling.turn->max_torque = control.rotation->max_torque;
     const bool waves = coupling.method == CouplingMethod::kWaves;
     if (waves && control.limiter.law != Law::kNone && !coupling.purse) {
       blame("teleoperation.purse", {"teleoperation.turn"},
-            "missing, expected this table: waves carry no turns, so what turns the follower has to be paid");
+            "missing, expected this table: waves do not transmit rotations, so the energy that turns the follower must "
+            "come from the leader");
     }
   }
 
@@ -531,18 +538,18 @@ class SceneResolver : SceneErrors {
     if (!coupling.grip) return;
     if (!draft_.simulated.gripper) {
       blame("teleoperation.grip", {},
-            "expected a device with [device.gripper]: this one does not measure how far a gripper is open");
+            "expected a device with [device.gripper]: this device does not measure the opening of a gripper");
     }
     if (!control.grip) {
       blame("teleoperation.grip", {},
-            "expected a device with max_force_n in [device.gripper]: a gripper without a motor neither follows nor is "
-            "felt");
+            "expected a device with max_force_n in [device.gripper]: a gripper without a motor cannot follow and "
+            "cannot be felt");
     }
     coupling.grip->arm = control.grip->arm;
     coupling.grip->max_force = control.grip->max_force;
     if (control.limiter.law != Law::kNone && !coupling.purse) {
       blame("teleoperation.purse", {"teleoperation.grip"},
-            "missing, expected this table: behind a limiter of its own a gripper cannot move unless the leader pays");
+            "missing, expected this table: with its own limiter, a gripper can only move with energy from the leader");
     }
   }
 

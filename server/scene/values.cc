@@ -44,6 +44,7 @@ constexpr std::array kUnits = {
     Unit{"_us", "µs", 1e6},
     Unit{"_m", "m", 1},
     Unit{"_n", "N", 1},
+    Unit{"_w", "W", 1},
 };
 
 }  // namespace

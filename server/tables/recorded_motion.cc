@@ -25,8 +25,8 @@ ScriptedMotion::Recorded load_recorded_motion(std::istream& csv, const RecordedM
     const ScriptedMotion::Recorded::Sample sample{table.needed_number(time),
                                                   table.needed_number(position) * file.scale};
     if (!motion.samples.empty() && !(sample.t > motion.samples.back().t)) {
-      table.fail("expected a time after that of the sample before, found '" + std::string(table.text(time.index)) +
-                 "'");
+      table.fail("expected a time later than that of the previous sample, found '" +
+                 std::string(table.text(time.index)) + "'");
     }
     if (motion.samples.size() == kMaxRecordedSamples) {
       table.fail("expected at most " + std::to_string(kMaxRecordedSamples) + " samples, found more");

@@ -187,7 +187,7 @@ std::optional<std::string_view> TableReader::next_line() {
     ++line_number_;
     fail("expected lines of at most " + std::to_string(kMaxLine) + " bytes, found a longer one");
   }
-  if (from_.bad()) fail("expected more lines, the file cannot be read on");
+  if (from_.bad()) fail("cannot read the rest of the file");
   return std::nullopt;
 }
 
@@ -218,7 +218,7 @@ void TableReader::split(std::string_view line) {
       const auto begin = unquoted_.size();
       auto at = start + 1;
       for (;; ++at) {
-        if (at >= line.size()) fail("expected a cell whose quotes are closed in its line, found " + shown(line));
+        if (at >= line.size()) fail("expected a closing quote in the same line, found " + shown(line));
         if (line[at] == '"' && (at + 1 == line.size() || line[at + 1] != '"')) break;
         if (line[at] == '"') ++at;
         unquoted_.push_back(line[at]);
@@ -298,7 +298,7 @@ bool TableReader::next_row() {
     const bool commas = separator_ == ',' && cells_.size() > width_;
     fail("expected " + std::to_string(width_) + (width_ == 1 ? " cell" : " cells") + " as in the first row, found " +
          std::to_string(cells_.size()) +
-         (commas ? "; are these decimal commas? Write points, or separate cells by semicolons" : ""));
+         (commas ? "; are these decimal commas? Use decimal points, or separate the cells by semicolons" : ""));
   }
   return false;
 }
@@ -364,7 +364,7 @@ double TableReader::value_of(std::size_t column) {
   if (!value) {
     const bool thousands = text.find(',') != std::string_view::npos &&
                            std::ranges::all_of(text, [](char c) { return is_digit(c) || c == ',' || c == '.'; });
-    if (thousands) fail("expected a number without separators of thousands, found " + shown(text));
+    if (thousands) fail("expected a number without thousands separators, found " + shown(text));
     refuse_number(column);
   }
   if (decimal_point_line_ != 0) {

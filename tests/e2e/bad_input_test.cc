@@ -178,14 +178,14 @@ TEST(BadInput, AnAddressThatOthersCanReachIsRefusedWithTheReason) {
   expect_refusals(
       folder.path(),
       {
-          {"all IPv4", "tendond", {demo, "--listen", "0.0.0.0:0"}, {"refusing to listen on 0.0.0.0:0", reason}},
-          {"all IPv6", "tendond", {demo, "--listen", "[::]:0"}, {"refusing to listen on [::]:0", reason}},
-          {"another's", "tendond", {demo, "--listen", "192.0.2.1:0"}, {"refusing to listen on 192.0.2.1:0", reason}},
+          {"all IPv4", "tendond", {demo, "--listen", "0.0.0.0:0"}, {"cannot listen on 0.0.0.0:0", reason}},
+          {"all IPv6", "tendond", {demo, "--listen", "[::]:0"}, {"cannot listen on [::]:0", reason}},
+          {"another's", "tendond", {demo, "--listen", "192.0.2.1:0"}, {"cannot listen on 192.0.2.1:0", reason}},
           {"in the scene", "tendond", {scene}, {scene + ":5: network.listen: expected", "loopback"}},
           {"the injector's",
            "tendon-inject",
            {"--listen", "0.0.0.0:0", "--to", "127.0.0.1:9"},
-           {"refusing to listen on 0.0.0.0:0", "anyone on the network", "--open-to-network"}},
+           {"cannot listen on 0.0.0.0:0", "anyone on the network", "--open-to-network"}},
       });
   EXPECT_FALSE(std::filesystem::exists(folder.path() / "demo.mcap"));
 }

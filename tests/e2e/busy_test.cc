@@ -42,7 +42,7 @@ TEST(Busy, IsRefusedWhereThereIsOneProcessor) {
   Process server("/usr/bin/taskset", {"-c", "0", program("tendond").string(), scene.string(), "--duration-s", "1"},
                  folder.path());
   EXPECT_EQ(server.wait(), 1);
-  EXPECT_NE(server.err().find("takes a whole processor"), std::string::npos) << server.err();
+  EXPECT_NE(server.err().find("requires a whole processor"), std::string::npos) << server.err();
 }
 
 }  // namespace

@@ -136,7 +136,7 @@ TEST(Engines, EachSessionIsToldByOneNameFromItsBeginningToItsEnd) {
   EXPECT_EQ(lines[0]["role"], "observer");
   EXPECT_EQ(lines[1]["client"], "virtual_wall");
   EXPECT_EQ(lines[1]["role"], "controller");
-  EXPECT_EQ(lines[3]["why"], "the server is going down");
+  EXPECT_EQ(lines[3]["why"], "the server is shutting down");
   // Session names consist of the server's run and the connection.
   const std::string first = lines[0]["session"];
   const std::string second = lines[1]["session"];

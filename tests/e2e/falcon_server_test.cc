@@ -60,7 +60,7 @@ bool no_torque(const std::vector<std::uint8_t>& packet) {
 TEST(FalconServer, FromThePlugToAWallThatIsFeltAndPassive) {
   constexpr FakeFalcon::Options kJustPluggedIn = {.has_firmware = false, .firmware_bytes = 4096};
   on_a_stage({.falcon = kJustPluggedIn, .record = true}, [](FalconStage& stage) {
-    stage.server().process().wait_for_line("the device has to be homed");
+    stage.server().process().wait_for_line("the device must be homed");
     EXPECT_EQ(stage.falcon().seen().pushes_begun, 0U);
     stage.home();
     stage.wait_until([](const FakeFalcon& falcon) { return falcon.lamps() == falcon::kGreen; }, "green lamps");
@@ -121,7 +121,7 @@ TEST(FalconServer, StoppedInMidForceItLetsGoAndPushesAgainOnlyAfterArming) {
           << "while it is stopped";
       const auto pushes_begun = stage.falcon().seen().pushes_begun;
       stage.server().process().signal(SIGCONT);
-      stage.server().process().wait_for_line("no force any more: ");
+      stage.server().process().wait_for_line("fault of the safety layer: ");
       stage.wait_for_commands(300);
       EXPECT_EQ(stage.falcon().seen().pushes_begun, pushes_begun) << "before it was armed\n"
                                                                   << stage.server().process().err();
@@ -157,7 +157,7 @@ TEST(FalconServer, WithoutItsGuardianItLetsGoAndIsNotArmed) {
       const double ms = stage.released_after(signal, guardian);
       std::cout << (signal == SIGSTOP ? "SIGSTOP" : "SIGKILL") << " of the guardian to no torque at the Falcon: " << ms
                 << " ms\n";
-      stage.server().process().wait_for_line("no force any more: the guardian process was killed or stopped");
+      stage.server().process().wait_for_line("fault of the safety layer: the guardian process was killed or stopped");
       const auto pushes_begun = stage.falcon().seen().pushes_begun;
       stage.go_to(-0.015);
       stage.go_to(0.004);
@@ -200,11 +200,12 @@ TEST(FalconServer, UnpluggedInMidForceItPushesAgainOnlyAfterHomingAndArming) {
     stage.arm_and_press();
     stage.falcon().unplug();
     server.wait_for_line("the device is not plugged in");
-    const std::string flight = server.wait_for_line("the steps before the fault are in ");
-    EXPECT_NE(server.err().find("no force any more: the device was unplugged"), std::string::npos) << server.err();
+    const std::string flight = server.wait_for_line("the steps before the fault are saved in ");
+    EXPECT_NE(server.err().find("fault of the safety layer: the device was unplugged"), std::string::npos)
+        << server.err();
     const auto pushes_begun = stage.falcon().seen().pushes_begun;
     stage.falcon().plug();  // loses its firmware and origin; the hand is in the wall and the button is pressed
-    server.wait_for_line("the device has to be homed");
+    server.wait_for_line("the device must be homed");
     stage.wait_for_commands(100);
     EXPECT_EQ(stage.falcon().seen().pushes_begun, pushes_begun) << "before it was homed";
     stage.home();

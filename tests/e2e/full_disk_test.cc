@@ -23,7 +23,7 @@ void expect_the_device_to_run_on(Server& server, Process& echo, std::uint64_t af
   while (count_in(echo.wait_for_line(R"("tick")"), "tick") < after_tick + 500) {
   }
   const std::string end = server.stop(SIGTERM, 1);
-  EXPECT_NE(server.process().err().find("the recording is not whole: "), std::string::npos) << server.process().err();
+  EXPECT_NE(server.process().err().find("the recording is incomplete: "), std::string::npos) << server.process().err();
   EXPECT_NE(end.find(R"("recording_ended_early":true)"), std::string::npos) << end;
   EXPECT_EQ(count_in(end, "recorded_steps") + count_in(end, "lost_steps"), count_in(end, "steps"));
   EXPECT_EQ(count_in(end, "fault"), 0U);
@@ -37,7 +37,7 @@ TEST(FullDisk, StopsTheRecordingAndNotTheRunAndTheFileStillReads) {
   Server server(folder.path(), demo_scene(), {"--record", file.string()});
   Client wall("virtual_wall", server.address(), folder.path());
   Client echo("echo_motion", server.address(), folder.path(), {"--json"});
-  const std::string told = server.process().wait_for_line("recording has stopped, the device runs on");
+  const std::string told = server.process().wait_for_line("recording has stopped, but the device continues");
   EXPECT_NE(told.find("cannot write recording " + file.string() + ": No space left on device"), std::string::npos)
       << told;
 
@@ -57,9 +57,9 @@ TEST(FullDisk, ThatHasRoomAgainIsRecordedToAgainAndSaysWhatIsMissing) {
   std::ofstream(ballast) << std::string(std::size_t{47} << 19, 'x');
   Server server(folder.path(), demo_scene(), {"--record", (disk.path() / "run.mcap").string()});
   Client wall("virtual_wall", server.address(), folder.path());
-  server.process().wait_for_line("recording has stopped, the device runs on");
+  server.process().wait_for_line("recording has stopped, but the device continues");
   std::filesystem::remove(ballast);
-  server.process().wait_for_line("recording goes on in " + (disk.path() / "run-2.mcap").string() + "; ");
+  server.process().wait_for_line("recording continues in " + (disk.path() / "run-2.mcap").string() + "; ");
   Client echo("echo_motion", server.address(), folder.path(), {"--json"});
   const std::uint64_t tick = count_in(echo.wait_for_line(R"("tick")"), "tick");
   while (count_in(echo.wait_for_line(R"("tick")"), "tick") < tick + 500) {
@@ -79,7 +79,7 @@ TEST(FullDisk, FromTheFirstByteIsToldAtOnce) {
   const ScratchFolder folder;
   Server server(folder.path(), demo_scene(), {"--record", "/dev/full"});
   server.process().wait_for_line(
-      "recording has stopped, the device runs on: cannot write recording /dev/full: No space");
+      "recording has stopped, but the device continues: cannot write recording /dev/full: No space");
   Client echo("echo_motion", server.address(), folder.path(), {"--json"});
   expect_the_device_to_run_on(server, echo, count_in(echo.wait_for_line(R"("tick")"), "tick"));
 }

@@ -105,11 +105,11 @@ TEST(JobControl, InATerminalWithTostopTheServerServesAndStopsOnlyAtCtrlZ) {
     shell.wait_for("tendond ");
     std::this_thread::sleep_for(std::chrono::milliseconds(300));
     shell.type("\x1a");
-    shell.wait_for("stopped by SIGTSTP: no force");
+    shell.wait_for("stopped by SIGTSTP: the force is zero");
     shell.wait_for("Stopped");
     EXPECT_EQ(state_of(server), 'T');
     shell.type("bg\n");
-    shell.wait_for("it goes on");
+    shell.wait_for("continued after SIGCONT");
   }
   ::kill(server, SIGTERM);
   shell.wait_for("stopped: signal 15");

@@ -158,7 +158,7 @@ TEST(MainJob, ASignalEndsTheServerCleanlyAndItsGuestsAreTold) {
     EXPECT_EQ(text_in(end, "event"), "stopped");
     EXPECT_NE(server.process().err().find("signal " + std::to_string(signal)), std::string::npos);
     for (Process* guest : {static_cast<Process*>(&wall), static_cast<Process*>(&echo)}) {
-      guest->wait_for_line("lost " + server.address() + ": the server is going down");
+      guest->wait_for_line("lost " + server.address() + ": the server is shutting down");
       guest->signal(SIGTERM);
       EXPECT_EQ(guest->wait(), 0);
     }

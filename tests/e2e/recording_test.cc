@@ -59,7 +59,7 @@ TEST(Recordings, ACrashedServersRecordingIsLeftAloneByTheNextStart) {
   Client echo("echo_motion", again.address(), folder.path(), {"--json", "--rate-hz", "100"});
   wait_for_tick(echo, 500);
   const std::string end = again.stop();
-  EXPECT_NE(again.process().err().find("recording to demo-2.mcap: there is a demo.mcap already"), std::string::npos)
+  EXPECT_NE(again.process().err().find("recording to demo-2.mcap, because demo.mcap exists"), std::string::npos)
       << again.process().err();
   EXPECT_EQ(text_in(again.process().out(), "recording"), "demo-2.mcap");
 
@@ -82,7 +82,7 @@ TEST(Recordings, WhatIsNoRecordingIsRefusedBeforeAnythingRuns) {
     EXPECT_NE(server.err().find("cannot write recording " + file.string() + ": " + why), std::string::npos)
         << server.err();
   };
-  refused(scene, "there is a file of that name, which is no recording");
+  refused(scene, "the file exists and is not a recording");
   refused(pipe, "it is a named pipe");
   refused(folder.path(), "Is a directory");
   EXPECT_EQ(content_of(scene), content_of(demo_scene()));

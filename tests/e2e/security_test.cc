@@ -77,7 +77,8 @@ TEST(Security, ThePermissionToWriteToTheSocketsFileIsAKey) {
   screen.wait_for_line("position");
   Client plain("virtual_wall", on_this_machine(server.address()), lab.folder());
   EXPECT_EQ(plain.wait(), 1);
-  EXPECT_NE(plain.err().find("this server lets in those who have a key: --key FILE"), std::string::npos) << plain.err();
+  EXPECT_NE(plain.err().find("this server only accepts clients with a key: use --key FILE"), std::string::npos)
+      << plain.err();
   wall.signal(SIGTERM);
   EXPECT_EQ(wall.wait(), 0);
   EXPECT_EQ(count_in(server.stop(), "welcomed"), 2U);
@@ -105,14 +106,15 @@ TEST(Security, WithoutAKeyOrWithTheWrongOneNobodyGetsIn) {
   const std::string address = on_this_machine(server.address());
   Client plain("virtual_wall", address, lab.folder());
   EXPECT_EQ(plain.wait(), 1);
-  EXPECT_NE(plain.err().find("this server lets in those who have a key: --key FILE"), std::string::npos) << plain.err();
+  EXPECT_NE(plain.err().find("this server only accepts clients with a key: use --key FILE"), std::string::npos)
+      << plain.err();
   Client stranger("virtual_wall", address, lab.folder(), {"--key", (lab.folder() / "stranger.key").string()});
   stranger.wait_for_line("does it have this key");
   stranger.signal(SIGTERM);
   EXPECT_EQ(stranger.wait(), 1);
   Client screen("virtual_wall", address, lab.folder(), {"--key", lab.key("screen")});
   EXPECT_EQ(screen.wait(), 1);
-  EXPECT_NE(screen.err().find("is an observer's"), std::string::npos) << screen.err();
+  EXPECT_NE(screen.err().find("only permits observers"), std::string::npos) << screen.err();
   const std::string end = server.stop();
   EXPECT_EQ(count_in(end, "welcomed"), 0U);
   EXPECT_GT(count_in(end, "hellos_unknown_key"), 0U);
@@ -127,7 +129,8 @@ TEST(Security, AKilledControllerComesBackWithItsKeyWithoutWaiting) {
   Client second("virtual_wall", address, lab.folder(), {"--key", lab.key("wall")});
   second.wait_for_line("connected to falcon");
   EXPECT_EQ(first.wait(), 1);
-  EXPECT_NE(first.err().find("a program with the same key has taken this place"), std::string::npos) << first.err();
+  EXPECT_NE(first.err().find("a program with the same key has replaced this session"), std::string::npos)
+      << first.err();
   second.signal(SIGTERM);
   EXPECT_EQ(second.wait(), 0);
   EXPECT_EQ(count_in(server.stop(), "replaced"), 1U);

@@ -72,7 +72,7 @@ TEST(LogLoop, TellsOnceHowManyStepsAreMissingAndTheObserversToo) {
   place.mail->steps_lost = 3;
   place.mail->datagrams_lost = 2;
   log.turn(kStart, 7);
-  EXPECT_EQ(texts(log), Texts{"the log thread could not follow: 3 steps and 2 datagrams are missing"});
+  EXPECT_EQ(texts(log), Texts{"the log thread is too slow: 3 steps and 2 datagrams are missing"});
   const Health* const health = place.mail->health.take();
   ASSERT_NE(health, nullptr);
   EXPECT_EQ(health->steps_lost, 3U);
@@ -90,9 +90,8 @@ TEST(LogLoop, DevicesOfOneThreadAreLateInOneLine) {
     right.haptic.step(kStart + milliseconds(ms));
   }
   log.turn(kStart + LogLoop::kTroublePeriod, 0);
-  EXPECT_EQ(texts(log),
-            Texts{"left: 2 overruns in the last second, as of 1 more on its thread; longest interval so far "
-                  "30000 µs"});
+  EXPECT_EQ(texts(log), Texts{"left: 2 overruns in the last second, also of 1 other devices on this thread; longest "
+                              "interval so far 30000 µs"});
 }
 
 TEST(LogLoop, CloseReportsTroubleThatIsNotDueYet) {
@@ -132,7 +131,7 @@ TEST(LogLoop, TheStepsBeforeAFaultAreSavedOnceAndTheFaultIsNamed) {
   log.turn(kStart + LogLoop::kTroublePeriod, 0);
   const Texts said = texts(log);
   ASSERT_EQ(said.size(), 1U);
-  EXPECT_TRUE(said[0].starts_with("the steps before the fault are in " + folder.path().string())) << said[0];
+  EXPECT_TRUE(said[0].starts_with("the steps before the fault are saved in " + folder.path().string())) << said[0];
   EXPECT_FALSE(place.mail->flight.frozen());
   log.turn(kStart + 2 * LogLoop::kTroublePeriod, 0);
   EXPECT_EQ(texts(log), Texts{});

@@ -36,7 +36,7 @@ int run_tool(CLI::App& app, int argc, char** argv, const Body& body) {
   } catch (const SceneError& error) {
     return complain(error, kWrongUsage);
   } catch (const std::bad_alloc&) {
-    return complain(std::runtime_error("there is too little memory; does `ulimit -v` limit it?"), kFailed);
+    return complain(std::runtime_error("out of memory; check the limit in `ulimit -v`"), kFailed);
   } catch (const std::exception& error) {
     return complain(error, kFailed);
   }

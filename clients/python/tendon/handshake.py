@@ -119,7 +119,8 @@ class ClientHandshake:
             suite = Suite.AES_GCM if Suite.AES_GCM in self._suites and _AES_GCM in said.features else Suite.NOISE
             if suite not in self._suites:
                 theirs, ours = names_of([suite]), names_of(self._suites)
-                return Refused(Code.UNSUPPORTED, f"the server seals by {theirs}, this client by {ours} only", 0, 0)
+                why = f"no common cipher suite: the server uses {theirs}, this client only accepts {ours}"
+                return Refused(Code.UNSUPPORTED, why, 0, 0)
             keys = split.of_suite_2() if suite is Suite.AES_GCM else split
             cipher = Sealed(keys.initiator_to_responder, keys.responder_to_initiator, now, suite)
         return Accepted(answer.connection_id, said, cipher)

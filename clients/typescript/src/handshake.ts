@@ -113,7 +113,8 @@ export class ClientHandshake {
     const aes = this.suites.includes(CipherSuite.AesGcm) && message.features.includes(kFeatureAesGcm);
     const suite = aes ? CipherSuite.AesGcm : CipherSuite.Noise;
     if (!this.suites.includes(suite)) {
-      const detail = `the server seals by ${namesOf([suite])}, this client by ${namesOf(this.suites)} only`;
+      const [theirs, ours] = [namesOf([suite]), namesOf(this.suites)];
+      const detail = `no common cipher suite: the server uses ${theirs}, this client only accepts ${ours}`;
       return { kind: "refused", refused: { code: Code.UNSUPPORTED, detail, versionMin: 0, versionMax: 0 } };
     }
     return { ...accepted, seal: new NoiseSeal(aes ? keysOfSuite2(finished) : finished, now, NoiseSeal.kRenewAfter, suite) };

@@ -89,7 +89,7 @@ def test_a_server_that_has_none_of_our_suites_is_one_that_refuses():
     stage.run(200 * MS)
     assert stage.client.phase is Phase.REFUSED
     assert stage.client.stats.code is Code.UNSUPPORTED
-    assert stage.client.stats.reason == "the server seals by chacha20-poly1305, this client by aes-256-gcm only"
+    assert stage.client.stats.reason == "no common cipher suite: the server uses chacha20-poly1305, this client only accepts aes-256-gcm"
 
 
 def test_a_suite_that_was_not_offered_is_not_taken():

@@ -174,7 +174,7 @@ describe("the handshake", () => {
       if (agreed === undefined) {
         assert.equal(world.client.phase, "refused");
         assert.equal(world.client.stats().code, Code.UNSUPPORTED);
-        const reason = "the server seals by chacha20-poly1305, this client by aes-256-gcm only";
+        const reason = "no common cipher suite: the server uses chacha20-poly1305, this client only accepts aes-256-gcm";
         assert.equal(world.client.stats().reason, reason);
         return;
       }

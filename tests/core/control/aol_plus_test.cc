@@ -565,7 +565,7 @@ TEST(AolPlus, SaysWhichFieldOfWhichPartCannotBe) {
   EXPECT_EQ(complaint({.knee = {{.start = 1}}}), "knee.start = 1: expected a number between 0 and 1");
   EXPECT_EQ(complaint({.latency_reserve = {{.holds = 17}}}), "latency_reserve.holds = 17: expected 1 to 16");
   EXPECT_EQ(complaint({.bounded_acceleration = {{.most = {300}}}}),
-            "bounded_acceleration needs shaping: nothing else would limit how hard a wall may be");
+            "bounded_acceleration requires shaping, because nothing else limits the stiffness");
   EXPECT_EQ(complaint({.shaping = {{.stiffness = {0}}}}), "shaping.stiffness = 0: expected a finite number above 0");
   EXPECT_EQ(
       complaint(

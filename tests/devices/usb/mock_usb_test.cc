@@ -87,11 +87,11 @@ TEST_F(MockUsbTest, AForbiddenAnUnpluggedAndAMissingNodeAreToldApart) {
   port.plug();
   const std::string node = port.node();
   ASSERT_EQ(chmod(usb.really(node).c_str(), 0), 0);
-  EXPECT_EQ(look(), "this user may not open " + node);
+  EXPECT_EQ(look(), "this user has no permission to open " + node);
   ASSERT_EQ(chmod(usb.really(node).c_str(), 0666), 0);
   EXPECT_EQ(look(), "no lack");
   ASSERT_EQ(unlink(usb.really(node).c_str()), 0);
-  EXPECT_EQ(look(), "there is no " + node + " here, although the kernel has the device");
+  EXPECT_EQ(look(), "there is no " + node + ", although the kernel has found the device");
 }
 
 TEST_F(MockUsbTest, ThePipeSaysOnceWhyItOpensNothing) {

@@ -332,7 +332,8 @@ TEST_F(TwoSuites, AClientThatForbidsSuite1LeavesWithASentence) {
   EXPECT_FALSE(met.here);
   ASSERT_TRUE(met.refused);
   EXPECT_EQ(met.refused->code, Code::kUnsupported);
-  EXPECT_EQ(met.refused->detail, "the server seals by chacha20-poly1305, this client by aes-256-gcm only");
+  EXPECT_EQ(met.refused->detail,
+            "no common cipher suite: the server uses chacha20-poly1305, this client only accepts aes-256-gcm");
 }
 
 TEST_F(TwoSuites, NobodyOnTheWayCanTakeTheOfferOutOrSayItIsAnOlderOne) {

@@ -60,7 +60,7 @@ TEST(Doctor, HasAdviceForEverythingThatAnOrdinaryMachineLacks) {
   machine.say("sys/devices/system/cpu/online", "0");
   const auto findings = machine.look();
   EXPECT_EQ(findings.at("kernel").found, "6.1.0-22-amd64, without PREEMPT_RT");
-  EXPECT_EQ(findings.at("tick").found, "250 Hz, and timers that wait for it");
+  EXPECT_EQ(findings.at("tick").found, "250 Hz, without high-resolution timers");
   EXPECT_EQ(findings.at("governor").found, "performance, powersave");
   EXPECT_EQ(findings.at("usb_autosuspend").found, "after 2 s");
   EXPECT_EQ(findings.at("rtprio_limit").found, "0");
@@ -69,7 +69,7 @@ TEST(Doctor, HasAdviceForEverythingThatAnOrdinaryMachineLacks) {
   EXPECT_EQ(findings.at("cpu_sleep").found, "up to 133 µs to wake");
   EXPECT_EQ(findings.at("rt_throttling").found, "100000 of each 1000000 µs for real-time threads");
   EXPECT_EQ(findings.at("machine").found, "virtual");
-  EXPECT_EQ(findings.at("aes").found, "none: sessions are sealed by chacha20-poly1305");
+  EXPECT_EQ(findings.at("aes").found, "none: sessions are encrypted with chacha20-poly1305");
   EXPECT_EQ(findings.at("processors").found, "1");
   for (const auto& [key, finding] : findings) {
     EXPECT_EQ(finding.advice.empty(), key == "timer_slack") << key;
@@ -94,10 +94,10 @@ TEST(Doctor, HasNoneForAMachineThatIsReady) {
   machine.say("sys/devices/system/cpu/online", "0-2,5");
   const auto findings = machine.look();
   EXPECT_EQ(findings.at("kernel").found, "6.1.0-22-rt-amd64, PREEMPT_RT");
-  EXPECT_EQ(findings.at("isolated_cpus").found, "3, without tick 3");
-  EXPECT_EQ(findings.at("aes").found, "in hardware: sessions are sealed by aes-256-gcm, chacha20-poly1305");
-  EXPECT_EQ(findings.at("processors").found, "4 (`[network] busy = true` would take one of them all the time)");
-  EXPECT_EQ(findings.at("cpu_sleep").found, "up to 133 µs to wake (the server forbids it while it runs)");
+  EXPECT_EQ(findings.at("isolated_cpus").found, "3, without a tick: 3");
+  EXPECT_EQ(findings.at("aes").found, "in hardware: sessions are encrypted with aes-256-gcm, chacha20-poly1305");
+  EXPECT_EQ(findings.at("processors").found, "4 (`[network] busy = true` uses a whole one)");
+  EXPECT_EQ(findings.at("cpu_sleep").found, "up to 133 µs to wake (disabled while the server is running)");
   for (const auto& [key, finding] : findings) EXPECT_EQ(finding.advice, "") << key;
 }
 

@@ -49,7 +49,7 @@ TEST_F(SealedServer, TellsAPlainClientOnThisMachineThatItWantsAKey) {
   run(milliseconds(50), {&a});
   EXPECT_EQ(phase(a), Phase::kRefused);
   EXPECT_EQ(a.client->stats().code, Code::kDenied);
-  EXPECT_EQ(a.client->stats().reason, "this server lets in those who have a key: --key FILE");
+  EXPECT_EQ(a.client->stats().reason, "this server only accepts clients with a key: use --key FILE");
 }
 
 TEST_F(SealedServer, SealsByAesWhereBothCanAndServesWhoCannot) {
@@ -71,8 +71,8 @@ TEST_F(SealedServer, SealsByAesWhereBothCanAndServesWhoCannot) {
   EXPECT_EQ(old.client->stats().code, Code::kBusy);
   std::string said;
   for (const auto& [warning, text, session] : loop_->take_notices()) said += text + "\n";
-  EXPECT_NE(said.find("with the key \"wall\", sealed by aes-256-gcm\n"), std::string::npos) << said;
-  EXPECT_NE(said.find("with the key \"screen\", sealed by chacha20-poly1305\n"), std::string::npos) << said;
+  EXPECT_NE(said.find("with the key \"wall\", encrypted by aes-256-gcm\n"), std::string::npos) << said;
+  EXPECT_NE(said.find("with the key \"screen\", encrypted by chacha20-poly1305\n"), std::string::npos) << said;
 }
 
 TEST_F(SealedServer, ASuiteThatItForbidsIsRefusedWithASentence) {
@@ -85,7 +85,7 @@ TEST_F(SealedServer, ASuiteThatItForbidsIsRefusedWithASentence) {
   run(milliseconds(300), {&old});
   EXPECT_EQ(phase(old), Phase::kRefused);
   EXPECT_EQ(old.client->stats().code, Code::kUnsupported);
-  EXPECT_EQ(old.client->stats().reason, "this server seals by aes-256-gcm only, and you do not offer it");
+  EXPECT_EQ(old.client->stats().reason, "no common cipher suite: this server only accepts aes-256-gcm");
   EXPECT_EQ(loop_->stats().welcomed, 0U);
   Client other = controller(other_, "192.0.2.2:4000");
   run(milliseconds(300), {&old, &other});
@@ -96,7 +96,8 @@ TEST_F(SealedServer, ASuiteThatItForbidsIsRefusedWithASentence) {
   Client only = of_suites(wall_, "192.0.2.4:4000", {Suite::kAesGcm}, true);
   run(milliseconds(300), {&only});
   EXPECT_EQ(phase(only), Phase::kRefused);
-  EXPECT_EQ(only.client->stats().reason, "the server seals by chacha20-poly1305, this client by aes-256-gcm only");
+  EXPECT_EQ(only.client->stats().reason,
+            "no common cipher suite: the server uses chacha20-poly1305, this client only accepts aes-256-gcm");
 }
 
 TEST_F(SealedServer, AnObserversKeyDoesNotControl) {

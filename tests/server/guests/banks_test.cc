@@ -169,10 +169,12 @@ TEST_F(TwoBanks, WhatIsInTwoBanksIsRefusedWithASentence) {
   const Outcome told = run({15, 16});
   ASSERT_TRUE(told.refused.has_value());
   EXPECT_EQ(told.refused->code, Code::kInvalid);
-  EXPECT_EQ(told.refused->detail, "a session has devices of one bank: \"d-0\" to \"d-15\", and not \"d-16\"");
+  EXPECT_EQ(told.refused->detail,
+            "all devices of a session must be in the same bank: expected \"d-0\" to \"d-15\", and not \"d-16\"");
   const Outcome other = run({19, 3});
   ASSERT_TRUE(other.refused.has_value());
-  EXPECT_EQ(other.refused->detail, "a session has devices of one bank: \"d-16\" to \"d-19\", and not \"d-3\"");
+  EXPECT_EQ(other.refused->detail,
+            "all devices of a session must be in the same bank: expected \"d-16\" to \"d-19\", and not \"d-3\"");
 }
 
 TEST_F(TwoBanks, OfManyDevicesTheFirstAndTheLastAreNamed) {

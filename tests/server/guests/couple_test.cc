@@ -350,9 +350,9 @@ TEST_F(Coupled, ScenesThatDoNotFitAreNamedByTheirFirstKey) {
   place({"teleoperation.coupling.stiffness_n_per_m=300"});
   run(seconds(2));
   EXPECT_EQ(leader_->phase(), PortPhase::kAlone);
-  EXPECT_TRUE(leader_->said("coupling.stiffness_n_per_m: yours 300, mine 1000"));
+  EXPECT_TRUE(leader_->said("coupling.stiffness_n_per_m: 300 in your scene, 1000 in the scene of the other server"));
   EXPECT_EQ(std::count_if(leader_->notices.begin(), leader_->notices.end(),
-                          [](const auto& said) { return said.find("yours") != std::string::npos; }),
+                          [](const auto& said) { return said.find("in your scene") != std::string::npos; }),
             1)
       << "once";
 }
@@ -444,29 +444,40 @@ TEST_F(Coupled, OtherObserversAndDevicesAreToldOfNoEnds) {
 TEST(FirstDifference, NamesEachKeyThatTwoEndsMustHaveAlike) {
   const Couple mine = couple_of(*scene_of("leader.toml").loop.control.coupling);
   Couple theirs = mine;
-  EXPECT_EQ(first_difference(theirs, mine), "role: yours and mine leader, expected one of each");
+  EXPECT_EQ(first_difference(theirs, mine), "role: leader in both scenes, expected a leader and a follower");
   theirs.role = PortRole::kFollower;
   EXPECT_EQ(first_difference(theirs, mine), "");
   const std::pair<const char*, void (*)(Couple&)> cases[] = {
-      {"method: yours position-force, mine position-position",
+      {"method: position-force in your scene, position-position in the scene of the other server",
        [](Couple& c) { c.method = CouplingMethod::kPositionForce; }},
-      {"map.position_scale: yours 0.5, mine 1", [](Couple& c) { c.position_scale = 0.5; }},
-      {"map.force_scale: yours 2, mine 1", [](Couple& c) { c.force_scale = 2; }},
-      {"coupling.stiffness_n_per_m: yours 1001, mine 1000", [](Couple& c) { c.stiffness = 1001; }},
-      {"coupling.damping_n_s_per_m: yours 5, mine 4", [](Couple& c) { c.damping = 5; }},
-      {"coupling.mutual_damping_n_s_per_m: yours 1, mine 0", [](Couple& c) { c.mutual_damping = 1; }},
-      {"turn.stiffness_nm_per_rad: yours 1, mine 0", [](Couple& c) { c.turn_stiffness = 1; }},
-      {"turn.damping_nm_s_per_rad: yours 2, mine 0", [](Couple& c) { c.turn_damping = 2; }},
-      {"grip.stiffness_n_per_m: yours 300, mine 0", [](Couple& c) { c.grip_stiffness = 300; }},
-      {"grip.damping_n_s_per_m: yours 3, mine 0", [](Couple& c) { c.grip_damping = 3; }},
-      {"map.rotation_deg: yours [0, 0, 180], mine [0, 0, 0]",
+      {"map.position_scale: 0.5 in your scene, 1 in the scene of the other server",
+       [](Couple& c) { c.position_scale = 0.5; }},
+      {"map.force_scale: 2 in your scene, 1 in the scene of the other server", [](Couple& c) { c.force_scale = 2; }},
+      {"coupling.stiffness_n_per_m: 1001 in your scene, 1000 in the scene of the other server",
+       [](Couple& c) { c.stiffness = 1001; }},
+      {"coupling.damping_n_s_per_m: 5 in your scene, 4 in the scene of the other server",
+       [](Couple& c) { c.damping = 5; }},
+      {"coupling.mutual_damping_n_s_per_m: 1 in your scene, 0 in the scene of the other server",
+       [](Couple& c) { c.mutual_damping = 1; }},
+      {"turn.stiffness_nm_per_rad: 1 in your scene, 0 in the scene of the other server",
+       [](Couple& c) { c.turn_stiffness = 1; }},
+      {"turn.damping_nm_s_per_rad: 2 in your scene, 0 in the scene of the other server",
+       [](Couple& c) { c.turn_damping = 2; }},
+      {"grip.stiffness_n_per_m: 300 in your scene, 0 in the scene of the other server",
+       [](Couple& c) { c.grip_stiffness = 300; }},
+      {"grip.damping_n_s_per_m: 3 in your scene, 0 in the scene of the other server",
+       [](Couple& c) { c.grip_damping = 3; }},
+      {"map.rotation_deg: [0, 0, 180] in your scene, [0, 0, 0] in the scene of the other server",
        [](Couple& c) { c.rotation = {.w = 0, .x = 0, .y = 0, .z = 1}; }},
-      {"map.axes: yours xz, mine xyz", [](Couple& c) { c.axes = 5; }},
-      {"coupling.adapt_to_delay: yours false, mine true", [](Couple& c) { c.adapt_to_delay = false; }},
-      {"map.absolute: yours true, mine false", [](Couple& c) { c.absolute = true; }},
-      {"purse: yours false, mine true", [](Couple& c) { c.purse = false; }},
-      {"coupling.drift_rate_per_s: yours 5, mine 0", [](Couple& c) { c.drift_rate = 5; }},
-      {"rate: yours true, mine false", [](Couple& c) { c.rate = RateControl{}; }}};
+      {"map.axes: xz in your scene, xyz in the scene of the other server", [](Couple& c) { c.axes = 5; }},
+      {"coupling.adapt_to_delay: false in your scene, true in the scene of the other server",
+       [](Couple& c) { c.adapt_to_delay = false; }},
+      {"map.absolute: true in your scene, false in the scene of the other server",
+       [](Couple& c) { c.absolute = true; }},
+      {"purse: false in your scene, true in the scene of the other server", [](Couple& c) { c.purse = false; }},
+      {"coupling.drift_rate_per_s: 5 in your scene, 0 in the scene of the other server",
+       [](Couple& c) { c.drift_rate = 5; }},
+      {"rate: true in your scene, false in the scene of the other server", [](Couple& c) { c.rate = RateControl{}; }}};
   for (const auto& [words, change] : cases) {
     Couple other = theirs;
     change(other);
@@ -475,9 +486,9 @@ TEST(FirstDifference, NamesEachKeyThatTwoEndsMustHaveAlike) {
   Couple by_rate = mine;
   by_rate.rate = RateControl{.dead_zone = 3e-3, .gain = 4, .max_speed = 0.05};
   const std::pair<const char*, double RateControl::*> rates[] = {
-      {"rate.dead_zone_mm: yours 6, mine 3", &RateControl::dead_zone},
-      {"rate.gain_per_s: yours 8, mine 4", &RateControl::gain},
-      {"rate.max_speed_mm_per_s: yours 100, mine 50", &RateControl::max_speed}};
+      {"rate.dead_zone_mm: 6 in your scene, 3 in the scene of the other server", &RateControl::dead_zone},
+      {"rate.gain_per_s: 8 in your scene, 4 in the scene of the other server", &RateControl::gain},
+      {"rate.max_speed_mm_per_s: 100 in your scene, 50 in the scene of the other server", &RateControl::max_speed}};
   for (const auto& [words, value] : rates) {
     Couple other = by_rate;
     other.role = PortRole::kFollower;

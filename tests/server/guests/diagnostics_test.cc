@@ -268,7 +268,7 @@ TEST_F(SealedServer, WhereTheLogThreadSaysNothingThereIsNoReportOnADevice) {
   EXPECT_EQ(report.number, 3U);
   EXPECT_GT(report.span, seconds(3));
   EXPECT_EQ(report.steps, sum(report.lateness));
-  EXPECT_EQ(report.degraded, "the log thread does not follow");
+  EXPECT_EQ(report.degraded, "the log thread is too slow");
 }
 
 TEST_F(SealedServer, SaysThatAnEnginesWayIsFullAndThatItsForcesAreNotTaken) {

@@ -117,7 +117,7 @@ TEST_F(TwoLeaders, AGuestSetsTheScalesOfALeaderThatIsNotEngaged) {
   const SetScale wanted{.position_scale = 0.5, .force_scale = 2};
   const auto refused = asked(wanted);
   EXPECT_EQ(refused.code, Code::kUnsupported);
-  EXPECT_EQ(refused.detail, "this device is the follower: the leader sets the scales");
+  EXPECT_EQ(refused.detail, "this device is the follower: only the leader sets the scales");
   desk_ = std::make_unique<Desk>(wire_, "127.0.0.1:50002", trainer_->end.self, "main", now_);
   run(milliseconds(100));
   EXPECT_EQ(asked(wanted).code, Code::kOk);
@@ -128,7 +128,7 @@ TEST_F(TwoLeaders, AGuestSetsTheScalesOfALeaderThatIsNotEngaged) {
   ASSERT_EQ(trainer_->phase(), PortPhase::kEngaged);
   const auto busy = asked(wanted);
   EXPECT_EQ(busy.code, Code::kBusy);
-  EXPECT_EQ(busy.detail, "it is engaged: hold the clutch, or disengage it");
+  EXPECT_EQ(busy.detail, "the coupling is engaged: use the clutch or disengage it first");
   expect_sound();
 }
 
@@ -187,7 +187,7 @@ TEST_F(TwoLeaders, AGuestMovesTheSharesWithinHalfASecond) {
   run(milliseconds(500));
   EXPECT_EQ(follower_->newest(kTrainee).sent.share, 0.9);
   EXPECT_NEAR(follower_->newest(kTrainer).sent.share.value_or(-1), 0.1, 1e-12);
-  EXPECT_TRUE(follower_->said("\"trainee\" is to count 0.9, said by \"desk\""));
+  EXPECT_TRUE(follower_->said("\"trainee\" has the share 0.9, set by \"desk\""));
   EXPECT_EQ(trainee_->phase(), PortPhase::kEngaged);
   expect_sound();
 }
@@ -200,15 +200,16 @@ TEST_F(TwoLeaders, ASentenceSaysWhyAShareIsNotMoved) {
     EXPECT_EQ(answer.code, Code::kUnsupported);
     return answer.detail;
   };
-  EXPECT_EQ(detail({.device = 0, .channel = 0, .share = 0.5}), "no leader comes by this channel");
+  EXPECT_EQ(detail({.device = 0, .channel = 0, .share = 0.5}), "this channel is not used by a leader");
   follower_.reset();
   follower_ = std::make_unique<Place>(wire_, scene_of("shared_follower.toml", {"teleoperation.leader="}), 9, now_);
   desk_ = std::make_unique<Desk>(wire_, "127.0.0.1:50002", follower_->end.self, "desk", now_);
   run(milliseconds(300));
-  EXPECT_EQ(detail({.device = 0, .channel = kTrainer, .share = 0.5}), "this device has one leader only");
+  EXPECT_EQ(detail({.device = 0, .channel = kTrainer, .share = 0.5}), "this device has only one leader");
   desk_ = std::make_unique<Desk>(wire_, "127.0.0.1:50003", trainer_->end.self, "main", now_);
   run(milliseconds(300));
-  EXPECT_EQ(detail({.device = 0, .channel = 0, .share = 0.5}), "this device is a leader: its follower has the shares");
+  EXPECT_EQ(detail({.device = 0, .channel = 0, .share = 0.5}),
+            "this device is a leader: the shares are set at the follower");
 }
 
 TEST_F(TwoLeaders, AChannelHasOneOtherEndAndAnotherChannelAnother) {
@@ -218,13 +219,13 @@ TEST_F(TwoLeaders, AChannelHasOneOtherEndAndAnotherChannelAnother) {
   EXPECT_EQ(follower_->phase(kTrainee), PortPhase::kCoupled);
   Couple couple = couple_of(*trainer_->scene.loop.control.coupling);
   couple.channel = 0;
-  EXPECT_EQ(asked(couple).detail, "no leader comes by this channel");
+  EXPECT_EQ(asked(couple).detail, "this channel is not used by a leader");
   desk_ = std::make_unique<Desk>(wire_, "127.0.0.1:50002", follower_->end.self, "trainer", now_);
   couple.channel = kTrainer;
   run(milliseconds(300));
   const auto answer = asked(couple);
   EXPECT_EQ(answer.code, Code::kBusy);
-  EXPECT_EQ(answer.detail, "it is coupled with \"" + trainer_->scene.name + "\"");
+  EXPECT_EQ(answer.detail, "the device is coupled with \"" + trainer_->scene.name + "\"");
 }
 
 TEST_F(TwoLeaders, WhoeverTakesTheChannelOfASilentLeaderMayCouple) {

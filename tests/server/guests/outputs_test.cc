@@ -84,7 +84,7 @@ TEST_F(OutputsOfADevice, AreRefusedInWordsWhenTheyAreNotThereOrOfAnotherKind) {
   const std::vector<std::pair<std::pair<std::uint32_t, OutputSetting>, std::string>> cases = {
       {{3, LampColour{1}}, "the device has 3 outputs"},
       {{0, kPulse}, "output 0 is a lamp: expected rgb"},
-      {{1, LampColour{1}}, "output 1 vibrates: expected vibration"},
+      {{1, LampColour{1}}, "output 1 is a vibration output: expected vibration"},
   };
   for (const auto& [wanted, words] : cases) {
     const auto answer = asked(a, wanted.first, wanted.second);

@@ -104,7 +104,7 @@ TEST_F(SealedServer, APauseOfItsOwnIsBlamedOnNobodyElse) {
   const LinkReport& report = *a.client->report();
   EXPECT_EQ(report.late_server, 1U);
   EXPECT_EQ(report.late_network + report.late_engine + report.late_unknown, 0U) << report.words;
-  EXPECT_NE(report.words.find("the server (its threads stood still for 20"), std::string::npos) << report.words;
+  EXPECT_NE(report.words.find("the server (its threads were stopped for 20"), std::string::npos) << report.words;
 }
 
 struct BadForces {
@@ -142,20 +142,18 @@ TEST_P(BadForcesTest, ThatFollowGoodOnesAreNamedAsTheCauseOfLateness) {
 INSTANTIATE_TEST_SUITE_P(
     Of, BadForcesTest,
     ::testing::Values(BadForces{"NotFinite", [](ForceCommand& f) { f.force.y() = NAN; }, &RefusedForces::not_finite,
-                                "the engine (its forces are not finite: NaN or infinity)"},
+                                "the engine (its forces are not finite)"},
                       BadForces{"NotFiniteModel",
                                 [](ForceCommand& f) { f.model = LocalModel{.stiffness = Mat3::Constant(-INFINITY)}; },
-                                &RefusedForces::not_finite, "the engine (its forces are not finite: NaN or infinity)"},
+                                &RefusedForces::not_finite, "the engine (its forces are not finite)"},
                       BadForces{"OutOfBounds", [](ForceCommand& f) { f.force.x() = 2e12; },
-                                &RefusedForces::out_of_bounds,
-                                "the engine (its forces are out of the bounds of WIRE.md)"},
+                                &RefusedForces::out_of_bounds, "the engine (its forces exceed the bounds in WIRE.md)"},
                       BadForces{"NeverValid", [](ForceCommand& f) { f.valid_for = {}; }, &RefusedForces::out_of_bounds,
-                                "the engine (its forces are out of the bounds of WIRE.md)"},
+                                "the engine (its forces exceed the bounds in WIRE.md)"},
                       BadForces{"UnknownTick", [](ForceCommand& f) { f.based_on_tick += 100'000; },
-                                &RefusedForces::unknown_tick,
-                                "the engine (its forces answer unknown or forgotten ticks)"},
+                                &RefusedForces::unknown_tick, "the engine (its forces answer unknown or old ticks)"},
                       BadForces{"OldSequence", [](ForceCommand& f) { f.sequence = 1; }, &RefusedForces::old_sequence,
-                                "the engine (its sequence numbers do not grow)"}),
+                                "the engine (its sequence numbers do not increase)"}),
     [](const auto& test) { return std::string(test.param.name); });
 
 // The haptic loop flushes denormal numbers to zero.
@@ -182,7 +180,7 @@ TEST_F(SealedServer, AnEngineThatSleptIsBlamedThoughItsRoundTripLooksLong) {
   for (std::size_t i = asleep; i < asleep + 300; ++i) a.end->inbox.push_back(wire_[i]);
   run(milliseconds(900), {&a});
   ASSERT_TRUE(a.client->report().has_value());
-  EXPECT_NE(a.client->report()->words.find("the engine (its program stood still for 7"), std::string::npos)
+  EXPECT_NE(a.client->report()->words.find("the engine (its program was stopped for 7"), std::string::npos)
       << a.client->report()->words;
   EXPECT_EQ(loop_->stats().late_network, 0U);
 }

@@ -16,8 +16,8 @@ TEST(UnknownKeys, AreToldAtOnceAndThenAtMostOnceAMinute) {
   ASSERT_TRUE(keys.take(UnknownKeys::notice(parse_address("192.0.2.1:4000"))));
   ASSERT_TRUE(keys.due(now));
   EXPECT_EQ(keys.line(now, 1),
-            "1 Hello with a key that is not in the folder `keys` of [network], the newest from 192.0.2.1:4000: that "
-            "client gets no answer");
+            "1 Hello with a key that is not in the folder `keys` of [network], the newest from 192.0.2.1:4000: this "
+            "client gets no reply");
   EXPECT_FALSE(keys.due(now + 1h)) << "there is nothing new";
   for (int i = 0; i < 45; ++i) keys.take(UnknownKeys::notice(parse_address("[2001:db8::7]:" + std::to_string(i + 1))));
   EXPECT_FALSE(keys.due(now + UnknownKeys::kPeriod - Duration{1}));

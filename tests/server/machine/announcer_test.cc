@@ -111,8 +111,8 @@ TEST_F(Announcing, WithoutAvahiItSaysSoOnceAndAnnouncesWhenItComes) {
   avahi.come_back();
   ASSERT_TRUE(soon([&] { return names() == Names{"left", "right"}; }));
   EXPECT_EQ(running.warnings(),
-            Names{"not announced by [discovery]: avahi-daemon does not take it (org.freedesktop.Avahi is not there). "
-                  "Expected a running avahi-daemon; clients find this server by its address all the same"});
+            Names{"not announced ([discovery]): avahi-daemon refused the announcement (org.freedesktop.Avahi is not "
+                  "there). Expected a running avahi-daemon; clients can still use the address of this server"});
 }
 
 TEST_F(Announcing, AnAvahiThatWasStartedAgainIsToldAgainOnce) {
@@ -152,8 +152,8 @@ TEST_F(Announcing, AServerOfThisMachineAloneIsNotAnnounced) {
                 Running running({{"falcon", kFalcon}}, listen);
               }),
               "[discovery] announce: the server listens on " + listen +
-                  ", which no other machine reaches; expected [network] with listen = "
-                  "\"0.0.0.0:47100\", or another address of this machine, and keys");
+                  ", which other machines cannot reach; expected [network] listen = \"0.0.0.0:47100\" or another "
+                  "address of this machine, and keys");
   }
 }
 

@@ -112,7 +112,7 @@ TEST(WakefulProcessors, SayWhatItWouldTakeWhenRefused) {
   const WakefulProcessors wakeful(folder.path());
   EXPECT_FALSE(wakeful.held());
   ASSERT_TRUE(wakeful.refused());
-  EXPECT_NE(wakeful.refused()->find("Grant it with a udev rule"), std::string::npos) << *wakeful.refused();
+  EXPECT_NE(wakeful.refused()->find("Allow it with a udev rule"), std::string::npos) << *wakeful.refused();
 }
 
 }  // namespace

@@ -121,7 +121,8 @@ TEST_P(UdpLinkTest, APortInUseIsRefusedByNameAndReason) {
   const UdpLink first(GetParam());
   const Address taken = first.local_address();
   EXPECT_EQ(complaint_about<std::runtime_error>(taken),
-            "cannot listen on " + to_string(taken) + ": Address already in use; `ss -lunp` says by which program");
+            "cannot listen on " + to_string(taken) +
+                ": Address already in use; use `ss -lunp` to find the program that uses it");
 }
 
 /// Sends a datagram from `client` to `asked_at` and returns the source address of the answer.
@@ -234,8 +235,8 @@ TEST_P(UdpLinkTest, OfSeveralTheFirstGetsAllElse) {
 TEST_P(UdpLinkTest, SeveralRefuseAnAddressOfOthersAndKeepOthersOutOfTheirs) {
   const auto links = UdpLink::several(GetParam(), Reach::kThisMachine, 2);
   const Address taken = links[0]->local_address();
-  const std::string refusal =
-      "cannot listen on " + to_string(taken) + ": Address already in use; `ss -lunp` says by which program";
+  const std::string refusal = "cannot listen on " + to_string(taken) +
+                              ": Address already in use; use `ss -lunp` to find the program that uses it";
   EXPECT_EQ(complaint_about<std::runtime_error>(taken), refusal);
   EXPECT_EQ(thrown_by<std::runtime_error>([&] { UdpLink::several(taken, Reach::kThisMachine, 2); }), refusal);
 }
@@ -256,11 +257,11 @@ INSTANTIATE_TEST_SUITE_P(Ipv4AndIpv6, UdpLinkTest, ::testing::Values(kAnyPort4, 
 
 TEST(UdpLink, RefusesAnAddressThatOthersCanReachAndSaysWhy) {
   for (const char* const text : {"0.0.0.0:47100", "[::]:47100", "192.168.1.20:47100"}) {
-    EXPECT_EQ(complaint_about<std::invalid_argument>(parse_address(text)),
-              "refusing to listen on " + std::string(text) +
-                  ": there are no keys, so anyone on the network could command forces; use a loopback address "
-                  "(127.0.0.1 or [::1]), or give each client a key (`tendond keygen NAME`, and `keys` in the scene's "
-                  "[network])");
+    EXPECT_EQ(
+        complaint_about<std::invalid_argument>(parse_address(text)),
+        "cannot listen on " + std::string(text) +
+            ": without keys, anyone on the network could command forces; use a loopback address (127.0.0.1 or [::1]), "
+            "or create a key for each client (`tendond keygen NAME`, and `keys` in [network] of the scene)");
   }
 }
 

@@ -153,7 +153,8 @@ TEST(UnixSocket, RefusesAFileBehindWhichAServerListens) {
   const ScratchFolder folder;
   const auto file = folder.path() / "s";
   const UnixSocket first(file);
-  EXPECT_EQ(complaint_about(file), "cannot listen on unix:" + file.string() + ": another server listens there");
+  EXPECT_EQ(complaint_about(file),
+            "cannot listen on unix:" + file.string() + ": another server is already listening there");
   EXPECT_EQ(Peer(file).refused(), 0) << "the first one still does";
 }
 
@@ -162,13 +163,13 @@ TEST(UnixSocket, LeavesAFileThatIsNoSocketAsItIs) {
   const auto file = folder.path() / "notes";
   std::ofstream(file) << "mine";
   EXPECT_EQ(complaint_about(file),
-            "cannot listen on unix:" + file.string() + ": there is a file that is no socket; it stays as it is");
+            "cannot listen on unix:" + file.string() + ": the file exists and is not a socket; it was not changed");
   std::string text;
   std::ifstream(file) >> text;
   EXPECT_EQ(text, "mine");
   const auto link = folder.path() / "link";
   std::filesystem::create_symlink(folder.path() / "nowhere", link);
-  EXPECT_NE(complaint_about(link).find("no socket"), std::string::npos);
+  EXPECT_NE(complaint_about(link).find("not a socket"), std::string::npos);
 }
 
 TEST(UnixSocket, SaysWhatIsWrongWithAPath) {

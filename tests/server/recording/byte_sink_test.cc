@@ -67,7 +67,7 @@ TEST(FileSink, NeverTouchesWhatWasThere) {
   { ASSERT_TRUE(FileSink(path).append(bytes("old and long"))); }
   EXPECT_EQ(FileSink::open_new(path), nullptr);
   EXPECT_EQ(thrown_by<std::runtime_error>([&] { FileSink sink(path); }),
-            "cannot write recording " + path.string() + ": there is a file of that name already");
+            "cannot write recording " + path.string() + ": the file already exists");
   EXPECT_EQ(std::filesystem::file_size(path), 12U);
 }
 
@@ -114,8 +114,8 @@ TEST(FileSink, NoticesThatItsFileWasDeletedOrCutOff) {
     return sink.error();
   };
   const std::string begin = "cannot write recording " + path.string() + ": it was ";
-  EXPECT_EQ(outcome([&] { std::filesystem::remove(path); }), begin + "deleted meanwhile");
-  EXPECT_EQ(outcome([&] { std::filesystem::resize_file(path, 0); }), begin + "cut off meanwhile");
+  EXPECT_EQ(outcome([&] { std::filesystem::remove(path); }), begin + "deleted in the meantime");
+  EXPECT_EQ(outcome([&] { std::filesystem::resize_file(path, 0); }), begin + "truncated in the meantime");
 }
 
 TEST(FileSink, WritesOnInAFileThatWasMovedAway) {

@@ -186,7 +186,7 @@ TEST(McapReader, SaysThatAWholeChunkIsGone) {
   EXPECT_EQ(outcome.missing, 3U);
   ASSERT_EQ(outcome.damage.size(), 1U);
   EXPECT_EQ(outcome.damage[0], "a.mcap: byte " + std::to_string(kFirstChunk) +
-                                   ": messages before it are missing: a part of the file is gone, before 0.000 s");
+                                   ": preceding messages are missing: a part of the file was lost, before 0.000 s");
 }
 
 TEST(McapReader, NamesFileBytesAndTimesOfDamage) {
@@ -197,7 +197,7 @@ TEST(McapReader, NamesFileBytesAndTimesOfDamage) {
   EXPECT_EQ(outcome.messages, "012");
   ASSERT_EQ(outcome.damage.size(), 1U);
   EXPECT_EQ(outcome.damage[0], "a.mcap: byte " + std::to_string(kSecondChunk) +
-                                   ": the CRC of a chunk does not match; 145 bytes are left out, after 0.000 s");
+                                   ": the CRC of a chunk does not match; 145 bytes are skipped, after 0.000 s");
 }
 
 // A recorded datagram of a client may contain a chunk. The reader must not use it if the length of the outer chunk is
@@ -227,8 +227,8 @@ TEST(McapReader, ReadsNoChunkWithinAChunkWhoseLengthIsDamaged) {
 }
 
 TEST(McapReader, RefusesWhatIsNotMcap) {
-  EXPECT_EQ(read("time,position\n0,0\n").error, "a.mcap: is not an MCAP file");
-  EXPECT_EQ(read("x").error, "a.mcap: is not an MCAP file");
+  EXPECT_EQ(read("time,position\n0,0\n").error, "a.mcap: not an MCAP file");
+  EXPECT_EQ(read("x").error, "a.mcap: not an MCAP file");
 }
 
 TEST(McapReader, CallsAnEmptyFileTruncated) {
@@ -243,7 +243,7 @@ TEST(McapReader, SaysThatBytesFollowTheEnd) {
     const Outcome outcome = read(file + more);
     EXPECT_EQ(outcome.messages, "012345");
     ASSERT_EQ(outcome.damage.size(), 1U);
-    EXPECT_NE(outcome.damage[0].find("the file does not end after its footer"), std::string::npos);
+    EXPECT_NE(outcome.damage[0].find("there are data after the footer"), std::string::npos);
   }
 }
 

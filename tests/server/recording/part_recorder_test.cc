@@ -86,8 +86,7 @@ TEST(PartFiles, AFileThatIsNoRecordingIsRefusedAndLeftAsItIs) {
   std::ofstream(path) << "[device]\nkind = \"simulated\"\n";
   const auto size = fs::file_size(path);
   EXPECT_EQ(thrown_by<std::runtime_error>([&] { PartRecorder recorder(config_at(path)); }),
-            "cannot write recording " + path.string() +
-                ": there is a file of that name, which is no recording; it is left as it is");
+            "cannot write recording " + path.string() + ": the file exists and is not a recording; it was not changed");
   EXPECT_EQ(fs::file_size(path), size);
   EXPECT_EQ(names_in(folder.path()).size(), 1U);
 }
@@ -140,7 +139,7 @@ TEST(PartRecorder, CountsTheStepsOfADeletedFileAsMissingAndGoesOnInItsFolder) {
   const auto notices = recorder.take_notices();
   ASSERT_EQ(notices.size(), 1U) << "not one each second";
   EXPECT_TRUE(notices[0].warning);
-  EXPECT_NE(notices[0].text.find(path.string() + ": it was deleted meanwhile"), std::string::npos) << notices[0].text;
+  EXPECT_NE(notices[0].text.find(path.string() + ": it was deleted in the meantime"), std::string::npos) << notices[0].text;
 
   fs::create_directory(path.parent_path());
   record_run(recorder, 2000, 2000);
@@ -352,8 +351,9 @@ TEST(PartRecorder, GoesOnWhenThereIsRoomAgainAndSaysWhatIsMissing) {
   std::string said;
   for (const auto& notice : recorder.take_notices()) said += notice.text + "\n";
   EXPECT_EQ(std::count(said.begin(), said.end(), '\n'), 2) << said;
-  EXPECT_NE(said.find("recording has stopped, the device runs on: cannot write recording "), std::string::npos) << said;
-  EXPECT_NE(said.find("recording goes on in " + (folder.path() / "run-2.mcap").string() + "; " +
+  EXPECT_NE(said.find("recording has stopped, but the device continues: cannot write recording "), std::string::npos)
+      << said;
+  EXPECT_NE(said.find("recording continues in " + (folder.path() / "run-2.mcap").string() + "; " +
                       std::to_string(status.lost_steps) + " steps and 1 datagrams are missing"),
             std::string::npos)
       << said;

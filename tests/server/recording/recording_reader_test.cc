@@ -193,9 +193,9 @@ TEST(RecordingReader, SaysWhyItHasNoStep) {
     return reader.without_steps();
   };
   const std::span<const std::byte> file = sink.bytes();
-  EXPECT_EQ(said(file.first(0)), "a.mcap: is empty");
-  EXPECT_EQ(said(file.first(20)), "a.mcap: is cut off before its first haptic step");
-  EXPECT_EQ(said(file), "a.mcap: holds no haptic step");
+  EXPECT_EQ(said(file.first(0)), "a.mcap: the file is empty");
+  EXPECT_EQ(said(file.first(20)), "a.mcap: truncated before the first haptic step");
+  EXPECT_EQ(said(file), "a.mcap: contains no haptic step");
 }
 
 TEST(RecordingReader, ReadsAFile) {
@@ -239,7 +239,7 @@ TEST(RecordingReader, NamesThePathThatCannotBeRead) {
   EXPECT_EQ(what(folder.path()), "cannot read recording " + folder.path().string() + ": Is a directory");
   const auto text = folder.path() / "text.mcap";
   std::ofstream(text) << "not a recording";
-  EXPECT_EQ(what(text), text.string() + ": is not an MCAP file");
+  EXPECT_EQ(what(text), text.string() + ": not an MCAP file");
 }
 
 TEST(RecordingReader, RefusesAnMcapFileOfSomebodyElse) {
@@ -248,8 +248,7 @@ TEST(RecordingReader, RefusesAnMcapFileOfSomebodyElse) {
   const auto channel = writer.add_channel(writer.add_schema("sensor_msgs/Imu", "ros1msg", ""), "/imu", "ros1");
   writer.write(channel, 1, "abc");
   writer.close();
-  EXPECT_EQ(read_all(sink.bytes()).error,
-            "a.mcap: is an MCAP file, but not a Tendon recording: it has no channel /scene");
+  EXPECT_EQ(read_all(sink.bytes()).error, "a.mcap: an MCAP file, but not a Tendon recording: it has no channel /scene");
 }
 
 TEST(RecordingReader, SaysWhatIsWrongWithAMessageAndWhere) {
@@ -271,12 +270,12 @@ TEST(RecordingReader, SaysWhatIsWrongWithAMessageAndWhere) {
     EXPECT_EQ(contents.records(), 1U) << "the scene";
     const std::string damage = contents.damage.empty() ? "" : contents.damage.front();
     const std::string where = "a.mcap: byte " + offset + ": ";
-    const std::string end = "; it is left out, after 0.000 s";
+    const std::string end = "; the record is skipped, after 0.000 s";
     EXPECT_TRUE(damage.starts_with(where) && damage.ends_with(end)) << damage;
     if (damage.size() < where.size() + end.size()) return damage;
     return damage.substr(where.size(), damage.size() - where.size() - end.size());
   };
-  EXPECT_EQ(error_of(recording::kStep, "\xff\xff"), "the bytes are not a tendon.recording.v1.Step");
+  EXPECT_EQ(error_of(recording::kStep, "\xff\xff"), "the data are not a tendon.recording.v1.Step");
   EXPECT_EQ(error_of(recording::kStep, ""), "step 0 has the unknown mode 0");
   StepRecord strange = sample_step(7);
   strange.mode = static_cast<Mode>(77);
@@ -294,7 +293,7 @@ TEST(RecordingReader, ReadsARecordingWithoutItsSceneAndSaysSo) {
   EXPECT_EQ(contents.error, "");
   EXPECT_EQ(contents.steps.size(), 1U);
   ASSERT_EQ(contents.damage.size(), 1U);
-  EXPECT_NE(contents.damage[0].find("a record comes before the scene, which is missing"), std::string::npos);
+  EXPECT_NE(contents.damage[0].find("a record precedes the scene, which is missing"), std::string::npos);
 }
 
 struct Chunked {

@@ -84,7 +84,7 @@ TEST(KeyFolder, AFullDiskLeavesNothingBehindAndTheRetryWorks) {
       refusal = error.what();
     }
   }
-  EXPECT_EQ(refusal, file.string() + ": cannot write this key: File too large");
+  EXPECT_EQ(refusal, "cannot write key file " + file.string() + ": File too large");
   EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
   write_key_file(file, some_key("wall", 1));
   EXPECT_EQ(read_key_folder(folder.path())[0].key.bytes(), some_key("wall", 1).key.bytes());
@@ -94,17 +94,18 @@ TEST(KeyFolder, ANamedPipeIsRefusedAndNotWaitedFor) {
   const ScratchFolder folder;
   const std::string pipe = (folder.path() / "wall.key").string();
   ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
-  EXPECT_EQ(complaint_about(folder.path()), pipe + ": cannot read it: it is a named pipe, expected a regular file");
+  EXPECT_EQ(complaint_about(folder.path()),
+            "cannot read key file " + pipe + ": it is a named pipe, expected a regular file");
 }
 
 TEST(KeyFolder, SaysWhichFileIsWrongAndWhy) {
   const ScratchFolder folder;
   const std::string file = (folder.path() / "wall.key").string();
   EXPECT_EQ(complaint_about(folder.path() / "none"),
-            (folder.path() / "none").string() + ": cannot read this folder of keys: No such file or directory");
-  EXPECT_EQ(
-      complaint_about(folder.path()),
-      folder.path().string() + ": there is no key in this folder; make one for each client with `tendond keygen NAME`");
+            "cannot read key folder " + (folder.path() / "none").string() + ": No such file or directory");
+  EXPECT_EQ(complaint_about(folder.path()),
+            folder.path().string() +
+                ": expected a key file for each client, found none; create one with `tendond keygen NAME`");
   write_key_file(file, some_key("wall", 1));
   std::filesystem::permissions(file, std::filesystem::perms(0640));
   EXPECT_TRUE(complaint_about(folder.path()).starts_with(file + ": others than its owner may read"));

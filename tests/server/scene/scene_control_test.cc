@@ -76,8 +76,8 @@ TEST(Scene, AToolNeedsADeviceThatMeasuresTheHand) {
   EXPECT_EQ(scene.loop.control.admittance->mass, Vec3(3, 3, 3));
   EXPECT_EQ(scene.simulated().force_sensor->resolution, 0.1);
   EXPECT_EQ(error_of_minimal_and(tool),
-            "s.toml:4: admittance: expected a device with force_sensor among its effects: the tool is driven by the "
-            "hand's force");
+            "s.toml:4: admittance: expected a device with force_sensor in [device.effects], because the force of the "
+            "hand moves the virtual tool");
   EXPECT_EQ(error_of_minimal_and("[device.effects]\nforce_sensor = true\n"),
             "s.toml:5: device.effects.force_sensor: expected the size of one count in N, 0 for an exact one, or false "
             "for none, found true");
@@ -95,7 +95,8 @@ TEST(Scene, FrictionCanDifferByPlace) {
   EXPECT_EQ(control.friction_map->reach, 0.03);
   EXPECT_EQ(error_of_minimal_and("[limiter.adaptive_friction]\nplaces_mm = [[0, 0, 0]]\ncoulomb_friction_n = [0.3, 0.2]"
                                  "\nviscous_friction_n_s_per_m = [0.5]\n"),
-            "s.toml:5: limiter.adaptive_friction.places_mm: expected as many places as friction bounds of each kind");
+            "s.toml:5: limiter.adaptive_friction.places_mm: expected one place for each value of coulomb_friction_n "
+            "and of viscous_friction_n_s_per_m");
   EXPECT_EQ(error_of_minimal_and("[limiter.adaptive_friction]\nplaces_mm = [[0, 0, 0]]\ncoulomb_friction_n = [0.5]"
                                  "\nviscous_friction_n_s_per_m = [0.5]\n"),
             "s.toml:6: limiter.adaptive_friction.coulomb_friction_n: expected at most 0.4 N, the true friction of the "
@@ -181,10 +182,10 @@ TEST(Scene, SeveralMakeOneServerWhoseNetworkIsTheFirstOnes) {
   const auto error_of_both = [&](const std::filesystem::path& second) {
     return thrown_by<SceneError>([&] { read_scenes({shipped / "left.toml", second}); });
   };
-  EXPECT_TRUE(error_of_both(shipped / "left.toml")
-                  .ends_with("expected a name of its own, found \"left\" again, which is in " +
-                             (shipped / "left.toml").string()));
-  EXPECT_NE(error_of_both(shipped / "demo.toml").find("recording: expected in the first scene only"),
+  EXPECT_TRUE(
+      error_of_both(shipped / "left.toml")
+          .ends_with("expected a unique name, found \"left\" again, which is in " + (shipped / "left.toml").string()));
+  EXPECT_NE(error_of_both(shipped / "demo.toml").find("recording: expected only in the first scene"),
             std::string::npos);
 }
 
@@ -220,9 +221,9 @@ TEST(Scene, TheDevicesOfAllCountsHaveNamesOfTheirOwnAndAreNotTooMany) {
     }
     return "none";
   };
-  EXPECT_EQ(error_of("count = 2\n", "name = \"a-1\"\n"),
-            ": device.name: expected a name of its own, found \"a-1\" again, which is in " +
-                (folder.path() / "a.toml").string());
+  EXPECT_EQ(
+      error_of("count = 2\n", "name = \"a-1\"\n"),
+      ": device.name: expected a unique name, found \"a-1\" again, which is in " + (folder.path() / "a.toml").string());
   EXPECT_EQ(error_of("count = 2\n", "name = \"a-2\"\n"), "none");
   EXPECT_EQ(error_of("count = 1000\n", "count = 24\n"), "none");
   EXPECT_EQ(error_of("count = 1000\n", "count = 25\n"),
@@ -263,8 +264,7 @@ TEST(Scene, ADeviceWithAPlugIsAmongTheFirst) {
               read_scenes({fingers, falcon});
             }),
             falcon.string() +
-                ": device.kind: expected devices with a plug among the first 16, found 16 before it: "
-                "name its scene before theirs");
+                ": device.kind: expected USB devices among the first 16, found 16 before it: list its scene first");
   write(fingers, std::string(kMinimal) + "count = 15\n");
   EXPECT_EQ(read_scenes({fingers, falcon}).back().loop.device, 15U);
 }

@@ -101,18 +101,16 @@ TEST(Scene, AFalconIsARealDeviceWhoseFrictionIsToldNotTaken) {
 
 TEST(Scene, AFalconHasNoKeysOfTheSimulatedDeviceAndIsNotWithoutALimiter) {
   const std::string falcon = "[device]\nkind = \"falcon\"\n";
-  EXPECT_EQ(
-      error_of(falcon + "profile = \"falcon\"\n"),
-      "s.toml:3: device.profile: unknown key; known here: kind, name, count, axes, group, held_by, port, firmware, "
-      "accept_unknown_firmware");
+  EXPECT_EQ(error_of(falcon + "profile = \"falcon\"\n"),
+            "s.toml:3: device.profile: unknown key; expected one of kind, name, count, axes, group, held_by, port, "
+            "firmware, accept_unknown_firmware");
   EXPECT_EQ(error_of(falcon + "port = \"left\"\n"),
-            "s.toml:3: device.port: expected a port as `tendond devices` names it, like \"1-2.3\", found \"left\"");
+            "s.toml:3: device.port: expected a port from `tendond devices`, like \"1-2.3\", found \"left\"");
   EXPECT_EQ(error_of(falcon + "[limiter]\nkind = \"none\"\n"),
             "s.toml:4: limiter.kind: expected a limiter, found \"none\", which is for simulated devices only");
-  EXPECT_EQ(
-      error_of(falcon + "[limiter]\nviscous_friction_n_s_per_m = 0\n"),
-      "s.toml:3: limiter.coulomb_friction_n: missing, expected a number of 0 N or more: what tendon-identify finds "
-      "of this very device, or 0");
+  EXPECT_EQ(error_of(falcon + "[limiter]\nviscous_friction_n_s_per_m = 0\n"),
+            "s.toml:3: limiter.coulomb_friction_n: missing, expected a number of 0 N or more: use the value from "
+            "tendon-identify for this device, or 0");
 }
 
 TEST(Scene, AFalconAlwaysHasToBeArmed) {
@@ -279,11 +277,10 @@ TEST(Scene, AWoodenHapticsSaysWhichModelsCanBeDrivenAndWhyTwoCannot) {
   EXPECT_EQ(error_of(kind), "s.toml:1: device.model: missing, " + models);
   EXPECT_EQ(error_of(kind + "model = \"hawk\"\n"), "s.toml:3: device.model: " + models + ", found \"hawk\"");
   for (const std::string name : {"polhem_v2", "polhem_v3"}) {
-    EXPECT_EQ(
-        error_of(kind + "model = \"" + name + "\"\n"),
-        "s.toml:3: device.model: " + models +
-            " (Polhem v2 and v3 have a closed linkage, whose kinematics their makers have not published), found \"" +
-            name + "\"");
+    EXPECT_EQ(error_of(kind + "model = \"" + name + "\"\n"),
+              "s.toml:3: device.model: " + models +
+                  " (Polhem v2 and v3 have a closed linkage, and their kinematics are not published), found \"" + name +
+                  "\"");
   }
   EXPECT_EQ(error_of(std::string(kArm) + "max_current_ma = 4000\n" + std::string(kArmsFriction)),
             "s.toml:4: device.max_current_ma: expected at most 3000 mA, the full scale of its amplifiers, found 4000");

@@ -117,8 +117,8 @@ TEST(SceneTeleoperation, NamesEachMethodAndWavesShareAccountsWithoutAPurse) {
   EXPECT_FALSE(minimal_and(by("surface")).loop.control.limiter.shared_account);
   EXPECT_FALSE(minimal_and("[limiter]\nkind = \"none\"\n" + by("waves")).loop.control.limiter.shared_account);
   EXPECT_EQ(error_of_minimal_and("[limiter]\nkind = \"tdpa\"\n" + by("waves")),
-            "s.toml:5: teleoperation.method: expected the limiter \"aol+\", \"aol\" or \"aol-box\": the others have no "
-            "account that ports can share");
+            "s.toml:5: teleoperation.method: expected the limiter \"aol+\", \"aol\" or \"aol-box\": other limiters "
+            "have no energy account that ports can share");
   EXPECT_EQ(error_of_minimal_and("[teleoperation]\nrole = \"leader\"\nmethod = \"waves\"\n[teleoperation.coupling]\n"
                                  "stiffness_n_per_m = 400\nadapt_to_delay = false\n"),
             "s.toml:6: teleoperation.coupling.damping_n_s_per_m: expected a number above 0: it is the impedance of the "
@@ -133,12 +133,11 @@ TEST(SceneTeleoperation, AnAbsoluteMapAlignsAndHasNoClutch) {
   EXPECT_EQ(scene.loop.control.coupling->absolute->energy, 0.015);
   EXPECT_FALSE(minimal_and(kLeader).loop.control.coupling->absolute);
   EXPECT_EQ(error_of_minimal_and(kLeader + "[teleoperation.engage]\nwithin_mm = 8\n"),
-            "s.toml:11: teleoperation.engage.within_mm: expected none but of a leader with map.absolute: only that one "
-            "aligns");
-  EXPECT_EQ(
-      error_of_minimal_and(kLeader + "[teleoperation.engage]\nalign_energy_mj = 8\n"),
-      "s.toml:11: teleoperation.engage.align_energy_mj: expected 0 but of a leader with map.absolute and a purse, "
-      "whose account it is paid into");
+            "s.toml:11: teleoperation.engage.within_mm: expected no within_mm, except for a leader with map.absolute: "
+            "only this leader is aligned");
+  EXPECT_EQ(error_of_minimal_and(kLeader + "[teleoperation.engage]\nalign_energy_mj = 8\n"),
+            "s.toml:11: teleoperation.engage.align_energy_mj: expected 0, except for a leader with map.absolute and a "
+            "purse: the energy is paid into its account");
   EXPECT_EQ(
       error_of_minimal_and(kLeader + "[teleoperation.map]\nabsolute = true\n[teleoperation.clutch]\nbutton = 1\n"),
       "s.toml:12: teleoperation.clutch: expected none with map.absolute: a clutch changes an offset, and there is "
@@ -175,10 +174,9 @@ TEST(SceneTeleoperation, SaysWhichMethodHasNoUseForAKey) {
   };
   const std::string purse = "damping_n_s_per_m = 4\n[teleoperation.purse]\n";
   for (const char* const method : {"passivity", "set-position"}) {
-    EXPECT_EQ(
-        refusal(method, "damping_n_s_per_m = 4\n"),
-        "s.toml:4: teleoperation.purse: missing, expected this table: behind a limiter of its own a follower cannot "
-        "move unless the leader pays");
+    EXPECT_EQ(refusal(method, "damping_n_s_per_m = 4\n"),
+              "s.toml:4: teleoperation.purse: missing, expected this table: with its own limiter, a follower can only "
+              "move with energy from the leader");
   }
   EXPECT_EQ(refusal("rate", purse),
             "s.toml:6: teleoperation.rate: missing, expected this table with method \"rate\": how fast the follower "
@@ -193,8 +191,8 @@ TEST(SceneTeleoperation, SaysWhichMethodHasNoUseForAKey) {
             "s.toml:9: teleoperation.coupling.drift_rate_per_s: expected none with method \"surface\": only "
             "\"passivity\" corrects drift");
   EXPECT_EQ(refusal("set-position", "mutual_damping_n_s_per_m = 1\n" + purse),
-            "s.toml:9: teleoperation.coupling.mutual_damping_n_s_per_m: expected none or 0 with method "
-            "\"set-position\": it uses no velocity of the other end");
+            "s.toml:9: teleoperation.coupling.mutual_damping_n_s_per_m: expected 0 or no value with method "
+            "\"set-position\": it does not use the velocity of the other end");
   EXPECT_EQ(refusal("passivity", "[teleoperation.purse]\n"),
             "s.toml:6: teleoperation.coupling.damping_n_s_per_m: expected a number above 0: nothing else takes energy "
             "up, so that nothing could begin to move");
@@ -202,18 +200,16 @@ TEST(SceneTeleoperation, SaysWhichMethodHasNoUseForAKey) {
 
 TEST(SceneTeleoperation, SaysWhatCannotBeTogether) {
   const auto refusal = [](const std::string& more) { return error_of_minimal_and(more); };
-  EXPECT_EQ(
-      refusal("[teleoperation]\nrole = \"leader\"\n[teleoperation.coupling]\nstiffness_n_per_m = 400\n"
-              "damping_n_s_per_m = 4\n"),
-      "s.toml:4: teleoperation.purse: missing, expected this table: behind a limiter of its own a follower cannot "
-      "move unless the leader pays");
+  EXPECT_EQ(refusal("[teleoperation]\nrole = \"leader\"\n[teleoperation.coupling]\nstiffness_n_per_m = 400\n"
+                    "damping_n_s_per_m = 4\n"),
+            "s.toml:4: teleoperation.purse: missing, expected this table: with its own limiter, a follower can only "
+            "move with energy from the leader");
   EXPECT_EQ(refusal("[limiter]\nkind = \"tdpa\"\n" + kLeader),
-            "s.toml:5: teleoperation.purse: expected the limiter \"aol+\", \"aol\" or \"aol-box\": the others have no "
-            "account that ports can share");
-  EXPECT_EQ(
-      refusal("[limiter]\nkind = \"aol+\"\n[limiter.latency_reserve]\nholds = 2\n" + kLeader),
-      "s.toml:6: limiter.latency_reserve: expected none with teleoperation.purse: the reserve is not proved for an "
-      "account that ports share");
+            "s.toml:5: teleoperation.purse: expected the limiter \"aol+\", \"aol\" or \"aol-box\": other limiters have "
+            "no energy account that ports can share");
+  EXPECT_EQ(refusal("[limiter]\nkind = \"aol+\"\n[limiter.latency_reserve]\nholds = 2\n" + kLeader),
+            "s.toml:6: limiter.latency_reserve: expected none with teleoperation.purse: the reserve is not proved for "
+            "an account that is shared by several ports");
   EXPECT_EQ(
       refusal(kLeader + "[teleoperation.map]\naxes = \"zx\"\n"),
       "s.toml:11: teleoperation.map.axes: expected one or more of the letters x, y, z, in this order, found \"zx\"");
@@ -221,11 +217,12 @@ TEST(SceneTeleoperation, SaysWhatCannotBeTogether) {
             "s.toml:11: teleoperation.engage.by: expected \"button\" together with button, or \"request\" without");
   EXPECT_EQ(refusal("[teleoperation]\nrole = \"leader\"\ndial = \"192.0.2.7:47100\"\n[teleoperation.coupling]\n"
                     "stiffness_n_per_m = 400\ndamping_n_s_per_m = 4\n[teleoperation.purse]\n"),
-            "s.toml:6: teleoperation.dial: expected an address of this machine, or a key besides: nothing crosses a "
-            "network in the clear");
+            "s.toml:6: teleoperation.dial: expected a loopback address, or a key: connections over a network must be "
+            "encrypted");
   EXPECT_EQ(refusal("[teleoperation]\nrole = \"leader\"\nkey = \"a.key\"\n[teleoperation.coupling]\n"
                     "stiffness_n_per_m = 400\ndamping_n_s_per_m = 4\n[teleoperation.purse]\n"),
-            "s.toml:6: teleoperation.key: expected none without dial: who is dialled lets in by [network] keys");
+            "s.toml:6: teleoperation.key: expected no key without dial, because a server that is dialled uses the keys "
+            "of [network]");
   EXPECT_EQ(refusal("[teleoperation]\nrole = \"leader\"\non_loss = \"hold\"\n[teleoperation.coupling]\n"
                     "stiffness_n_per_m = 400\ndamping_n_s_per_m = 4\n[teleoperation.purse]\n"),
             "s.toml:6: teleoperation.on_loss: expected \"release\": a hand holds the leader");
@@ -267,13 +264,14 @@ TEST(SceneTeleoperation, SaysWhyLeadersCannotBeSo) {
   const auto refusal = [](const std::string& more) { return error_of_minimal_and(more); };
   const std::string two = leader("trainer", "0.7") + leader("trainee", "0.3");
   EXPECT_EQ(refusal(kTwoLeaders + leader("trainer", "0.7") + leader("trainee", "0.25")),
-            "s.toml:14: teleoperation.leader: expected shares that are 1 together, found 0.95");
+            "s.toml:14: teleoperation.leader: expected shares with the sum 1, found 0.95");
   EXPECT_EQ(refusal(kTwoLeaders + leader("trainer", "1")),
-            "s.toml:14: teleoperation.leader: expected 2 to 4 tables, or none for one leader by any channel");
+            "s.toml:14: teleoperation.leader: expected 2 to 4 tables, or no table for a single leader on any channel");
   EXPECT_EQ(refusal(kTwoLeaders + leader("trainer", "0.7") + leader("robot", "0.3")),
             "s.toml:18: teleoperation.leader[1].channel: expected the name of a [[channel]], found \"robot\"");
   EXPECT_EQ(refusal(kTwoLeaders + leader("trainer", "0.7") + leader("trainer", "0.3")),
-            "s.toml:18: teleoperation.leader[1].channel: expected a channel of its own, found \"trainer\" again");
+            "s.toml:18: teleoperation.leader[1].channel: expected a different channel for each leader, found "
+            "\"trainer\" again");
   EXPECT_EQ(refusal(kTwoLeaders + leader("trainer", "1.2") + leader("trainee", "-0.2")),
             "s.toml:16: teleoperation.leader[0].share: expected a number from 0 to 1, found 1.2");
   EXPECT_EQ(refusal(kTwoLeaders + two + two + leader("trainer", "0")),
@@ -283,11 +281,11 @@ TEST(SceneTeleoperation, SaysWhyLeadersCannotBeSo) {
     text.replace(text.find(from), from.size(), to);
     return refusal(text);
   };
-  EXPECT_EQ(with("role = \"follower\"", "role = \"leader\""),
-            "s.toml:14: teleoperation.leader: expected none: a leader knows nothing of the others, the follower lists "
-            "them");
+  EXPECT_EQ(
+      with("role = \"follower\"", "role = \"leader\""),
+      "s.toml:14: teleoperation.leader: expected no such table for a leader, because the follower lists all leaders");
   EXPECT_EQ(with("role = \"follower\"\n", "role = \"follower\"\ndial = \"127.0.0.1:47999\"\n"),
-            "s.toml:10: teleoperation.dial: expected none with [[teleoperation.leader]]: several leaders dial their "
+            "s.toml:10: teleoperation.dial: expected no dial with [[teleoperation.leader]]: several leaders dial their "
             "follower");
   for (const std::string method : {"waves", "surface", "passivity", "set-position", "rate"}) {
     EXPECT_EQ(with("role = \"follower\"\n", "role = \"follower\"\nmethod = \"" + method + "\"\n"),
@@ -335,28 +333,25 @@ TEST(SceneTeleoperation, CouplesOrientationsAndGrippersThatItLists) {
 
 TEST(SceneTeleoperation, RefusesHandlesThatCannotBeCoupled) {
   EXPECT_EQ(error_of_minimal_and(coupled_handle("leader", kTurn + kPurse)),
-            "s.toml:9: teleoperation.turn: expected a device with [device.rotation]: this one does not measure how its "
-            "handle is turned");
+            "s.toml:9: teleoperation.turn: expected a device with [device.rotation]: this device does not measure the "
+            "orientation of its handle");
   EXPECT_EQ(error_of_minimal_and(kRotation + coupled_handle("follower", kTurn + kPurse)),
-            "s.toml:12: teleoperation.turn: expected a device with max_torque_nm in [device.rotation]: without motors "
-            "that turn its handle a follower cannot turn as the leader does");
-  EXPECT_EQ(
-      error_of_minimal_and(coupled_handle("follower", kGrip + kPurse)),
-      "s.toml:9: teleoperation.grip: expected a device with [device.gripper]: this one does not measure how far a "
-      "gripper is open");
-  EXPECT_EQ(
-      error_of_minimal_and(kGripper + coupled_handle("leader", kGrip + kPurse)),
-      "s.toml:14: teleoperation.grip: expected a device with max_force_n in [device.gripper]: a gripper without a "
-      "motor neither follows nor is felt");
-  EXPECT_EQ(
-      error_of_minimal_and(kGripper + kGripMotor + kGripBounds +
-                           coupled_handle("follower", kGrip, "method = \"surface\"\n")),
-      "s.toml:19: teleoperation.purse: missing, expected this table: behind a limiter of its own a gripper cannot "
-      "move unless the leader pays");
+            "s.toml:12: teleoperation.turn: expected a device with max_torque_nm in [device.rotation]: a follower "
+            "requires motors that turn its handle");
+  EXPECT_EQ(error_of_minimal_and(coupled_handle("follower", kGrip + kPurse)),
+            "s.toml:9: teleoperation.grip: expected a device with [device.gripper]: this device does not measure the "
+            "opening of a gripper");
+  EXPECT_EQ(error_of_minimal_and(kGripper + coupled_handle("leader", kGrip + kPurse)),
+            "s.toml:14: teleoperation.grip: expected a device with max_force_n in [device.gripper]: a gripper without "
+            "a motor cannot follow and cannot be felt");
+  EXPECT_EQ(error_of_minimal_and(kGripper + kGripMotor + kGripBounds +
+                                 coupled_handle("follower", kGrip, "method = \"surface\"\n")),
+            "s.toml:19: teleoperation.purse: missing, expected this table: with its own limiter, a gripper can only "
+            "move with energy from the leader");
   EXPECT_EQ(error_of_minimal_and(kRotation + kMotors + kTurnBounds +
                                  coupled_handle("follower", kTurn, "method = \"waves\"\n")),
-            "s.toml:17: teleoperation.purse: missing, expected this table: waves carry no turns, so what turns the "
-            "follower has to be paid");
+            "s.toml:17: teleoperation.purse: missing, expected this table: waves do not transmit rotations, so the "
+            "energy that turns the follower must come from the leader");
   EXPECT_EQ(error_of_minimal_and(kRotation + coupled_handle("leader",
                                                             "[teleoperation.turn]\n"
                                                             "stiffness_nm_per_rad = 0.5\n" +

@@ -110,8 +110,8 @@ TEST(SceneReference, ListsEveryKeyWithUnitMeaningAndDefault) {
   EXPECT_TRUE(
       has("[loop]\n"
           "  period_us\n"
-          "      from one haptic step to the next.\n"
-          "      a number from 100 to 4000 µs. Default: 1000.\n"))
+          "      Time from one haptic step to the next.\n"
+          "      A number from 100 to 4000 µs. Default: 1000.\n"))
       << text;
   for (const std::string_view key : {"[device]",
                                      "profile",
@@ -124,7 +124,7 @@ TEST(SceneReference, ListsEveryKeyWithUnitMeaningAndDefault) {
                                      "coulomb_n_m",
                                      "[device.effects.structural_mode]",
                                      "sample_delay_ms",
-                                     "one of \"fingertip\", \"stylus\", \"arm\"",
+                                     "One of \"fingertip\", \"stylus\", \"arm\"",
                                      "[device.hand.motion]",
                                      "kind = \"sine\"",
                                      "kind = \"ramp-hold\"",

@@ -72,24 +72,24 @@ TEST(TableReader, BlankLinesAndCommentsAreRowsOnlyWhereTheyMayBe) {
 TEST(TableReader, NamesFileLineAndWhatWasExpected) {
   for (const auto& [text, says] : std::vector<std::pair<std::string, std::string>>{
            {"a,b\n1,2\n3,4,5\n",
-            "3: expected 2 cells as in the first row, found 3; are these decimal commas? Write points, or separate "
-            "cells by semicolons"},
+            "3: expected 2 cells as in the first row, found 3; are these decimal commas? Use decimal points, or "
+            "separate the cells by semicolons"},
            {"a;b\n1;2\n3\n", "3: expected 2 cells as in the first row, found 1"},
            {"delay_ms\n20,1\n",
-            "2: expected 1 cell as in the first row, found 2; are these decimal commas? Write points, or separate "
-            "cells by semicolons"},
+            "2: expected 1 cell as in the first row, found 2; are these decimal commas? Use decimal points, or "
+            "separate the cells by semicolons"},
            {"a,b\n1,two\n", "2: expected a finite number as b, found 'two'"},
            {"1,2\n3,two\n", "2: expected a finite number in column 1 (from 0), found 'two'"},
            {"1,nan\n", "1: expected a finite number in column 1 (from 0), found 'nan'"},
            {"a,b\n1,inf\n", "2: expected a finite number as b, found 'inf'"},
            {"1e999\n", "1: expected a finite number, found '1e999'"},
            {"a\n1.5D3\n", "2: expected a finite number as a, found '1.5D3'"},
-           {"a,b\n\"1,2\n", "2: expected a cell whose quotes are closed in its line, found '\"1,2'"},
+           {"a,b\n\"1,2\n", "2: expected a closing quote in the same line, found '\"1,2'"},
            {"a,b\n\"1\"x,2\n", "2: expected a separator after a cell in quotes, found 'x,2'"},
            {"a;b\n1;2,5\n1.5;2\n", "3: expected a decimal comma as in line 2, found '1.5'"},
            {"a;b\n1.5;2\n1;2,5\n", "3: expected a decimal point as in line 2, found '2,5'"},
            {"a,b\n1,\x1b[2J\n", "2: expected a finite number as b, found '?[2J'"},
-           {"a;b\n1;1.012,5\n", "2: expected a number without separators of thousands, found '1.012,5'"},
+           {"a;b\n1;1.012,5\n", "2: expected a number without thousands separators, found '1.012,5'"},
            {"a\tb\n1\t1,012\n", "2: expected a decimal point, found '1,012': is it 1.012 or 1012?"},
            {"a,b\n1,\"1,012\"\n", "2: expected a decimal point, found '1,012': is it 1.012 or 1012?"},
            {"\xff\xfe" + std::string("a\0", 2), "1: expected text in UTF-8, found UTF-16: save it as \"CSV UTF-8\""}}) {

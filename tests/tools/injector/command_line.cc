@@ -279,7 +279,7 @@ LiveTask live_task(Said said) {
                                 "\": a proxy has no key, and only a key tells whose a name of DNS-SD is");
   }
   if (!is_loopback(run.listen) && !said.open_to_network) {
-    throw std::invalid_argument("refusing to listen on " + said.listen +
+    throw std::invalid_argument("cannot listen on " + said.listen +
                                 ": anyone on the network could send to the server through this proxy; use a loopback "
                                 "address (127.0.0.1 or [::1]), or say --open-to-network");
   }

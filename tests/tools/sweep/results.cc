@@ -89,7 +89,7 @@ std::string six_digits(std::uint64_t shard) {
 
 std::string contents_of(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
-  if (!in) throw std::runtime_error(file.string() + ": cannot be read");
+  if (!in) throw std::runtime_error(file.string() + ": cannot read the file");
   return {std::istreambuf_iterator<char>(in), {}};
 }
 

@@ -50,7 +50,7 @@ export const kModes: Readonly<Record<number, StateWords>> = {
 export const kSafety: Readonly<Record<string, StateWords>> = {
   absent: { name: "Not plugged in", meaning: "the server looks for the device", level: "bad" },
   opening: { name: "Being opened", meaning: "the device answers soon", level: "notice" },
-  firmware: { name: "Without firmware", meaning: "the device is being given its firmware", level: "notice" },
+  firmware: { name: "Without firmware", meaning: "the firmware is being loaded into the device", level: "notice" },
   unhomed: { name: "Not homed", meaning: "move the handle as the device asks, so that it knows where it is", level: "notice" },
   homed: { name: "Ready, not armed", meaning: "gives no force until it is armed", level: "notice" },
   armed: { name: "Armed", meaning: "gives forces", level: "good" },

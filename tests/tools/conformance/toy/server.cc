@@ -31,7 +31,7 @@ bool claims_good(const pb::Hello& hello) {
 
 /// Returns the first difference between a leader's options and this follower; empty if there is none.
 std::string difference(const pb::Couple& theirs) {
-  if (theirs.role() != pb::PORT_ROLE_LEADER) return "role: yours and mine follower";
+  if (theirs.role() != pb::PORT_ROLE_LEADER) return "role: follower in both scenes";
   if (theirs.method() != pb::COUPLING_METHOD_POSITION_POSITION) return "method: mine position-position";
   if (theirs.position_scale() != 1) return "map.position_scale: mine 1";
   if (theirs.axes() != 7) return "map.axes: mine xyz";

@@ -121,7 +121,7 @@ void each_line(std::istream& from, const std::string& name, const Take& take) {
     if (line.ends_with('\r')) line.pop_back();
     take(number == 1 ? without_byte_order_mark(line) : std::string_view(line), number);
   }
-  if (from.bad()) throw std::runtime_error(name + ": cannot be read");
+  if (from.bad()) throw std::runtime_error(name + ": cannot read the file");
 }
 
 /// Maximum number of losses from one number in a file, so that a small file cannot exhaust the memory.

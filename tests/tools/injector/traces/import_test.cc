@@ -250,7 +250,8 @@ TEST(ImportCsv, ReadsWhatSpreadsheetsWriteOrRefusesIt) {
   EXPECT_EQ(up(import(import_csv, "Time [s]\tDelay [us]\n0\t20100\n0,5\t35500\n", up_only)), "0:0:20.1 1:500:35.5 ");
   EXPECT_EQ(up(import(import_csv, "t_ms,note,delay_ms\n0,\"a, b\",5\n", up_only)), "0:0:5 ");
   const std::string ragged =
-      " as in the first row, found 2; are these decimal commas? Write points, or separate cells by semicolons";
+      " as in the first row, found 2; are these decimal commas? Use decimal points, or separate the cells by "
+      "semicolons";
   EXPECT_EQ(refusal(import_csv, "delay_ms\n20,1\n"), "file:2: expected 1 cell" + ragged);
   EXPECT_EQ(refusal(import_csv, "20\n20,1\n"), "file:2: expected 1 cell" + ragged);
 }

@@ -234,7 +234,7 @@ void recorded(Draft& draft) {
   const bool foam = draft.dice.chance(0.5);
   const std::filesystem::path file = folder / (foam ? "m2_question1d_foam.csv" : "m2_question1d_rigid.csv");
   std::ifstream csv(file);
-  if (!csv) throw std::runtime_error(file.string() + ": cannot be read");
+  if (!csv) throw std::runtime_error(file.string() + ": cannot read the file");
   constexpr double kArm = 0.075;    // m per rad
   constexpr std::size_t kThin = 8;  // 2 kHz to 250 Hz, above the bandwidth of a hand
   const auto all = load_recorded_motion(csv, {.path = file, .position = "master_pos_rad"}).samples;
