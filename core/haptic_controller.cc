@@ -21,7 +21,7 @@ HapticController::HapticController(const Config& config)
   if (config.admittance) admittance_.emplace(*config.admittance);
   if (config.rotation) {
     if (config.admittance) {
-      throw std::invalid_argument("rotation: expected no admittance, which knows the force on a point only");
+      throw std::invalid_argument("rotation: expected no admittance, which only supports the force on a point");
     }
     wrench_.emplace(wrench_config(config.limiter, *config.rotation));
   }
@@ -34,7 +34,7 @@ HapticController::HapticController(const Config& config)
   }
   if (config.friction_map) {
     if (!config.limiter.parts.adaptive_friction) {
-      throw std::invalid_argument("friction_map: expected a limiter with adaptive_friction, which is the only user");
+      throw std::invalid_argument("friction_map: expected a limiter with adaptive_friction, which uses it");
     }
     friction_map_.emplace(*config.friction_map);
   }

@@ -34,21 +34,22 @@ struct DeviceCounter {
 
 /// If several counters have increased, a report contains only the first reason, using at most 18 bytes.
 inline constexpr std::array kDeviceCounters = {
-    DeviceCounter{DeviceCount::kAnswers, "answers", "answers of the device that were believed", ""},
+    DeviceCounter{DeviceCount::kAnswers, "answers", "replies of the device that were accepted", ""},
     // A serial line can start in the middle of an answer, so a few bytes after opening are normal.
-    DeviceCounter{DeviceCount::kUnreadable, "unreadable", "packets, or bytes of a serial line, that are no answer", ""},
-    DeviceCounter{DeviceCount::kFailedSetups, "failed_setups", "firmware or calibrations that the device did not take",
-                  "set-up fails"},
+    DeviceCounter{DeviceCount::kUnreadable, "unreadable", "packets, or bytes on a serial line, that are not a reply",
+                  ""},
+    DeviceCounter{DeviceCount::kFailedSetups, "failed_setups",
+                  "failed transfers of the firmware, or failed calibrations", "set-up fails"},
     DeviceCounter{DeviceCount::kLostCounts, "lost_counts",
-                  "times when the encoders had lost count, and the device had to be homed again", "device lost count"},
+                  "losses of encoder counts, after which the device must be homed again", "device lost encoder counts"},
     DeviceCounter{DeviceCount::kSilences, "silences",
-                  "times when the device said nothing for 100 ms, and was opened again", "device fell silent"},
+                  "silences of the device for 100 ms, after which it is opened again", "device is silent"},
     DeviceCounter{DeviceCount::kImplausible, "implausible",
-                  "answers not believed, because no hand can have moved the encoders so far", "encoders jump"},
+                  "rejected replies, because no hand can move the encoders so far", "encoders jump"},
     DeviceCounter{DeviceCount::kUnreachable, "unreachable",
-                  "answers not used, because their encoders belong to no position", "impossible pose"},
-    DeviceCounter{DeviceCount::kUnanswered, "unanswered",
-                  "requests without an answer in time, after which the driver asked again", "answers are late"},
+                  "rejected replies, because their encoder values belong to no position", "impossible pose"},
+    DeviceCounter{DeviceCount::kUnanswered, "unanswered", "requests without a reply in time, which the driver repeated",
+                  "replies are late"},
 };
 static_assert([] {
   for (std::size_t i = 0; i < kDeviceCounters.size(); ++i) {

@@ -11,7 +11,7 @@ LateLibrary::LateLibrary(const std::string& file) {
   // RTLD_GLOBAL, as if it were linked. RTLD_NOW, because symbols must not be resolved by a realtime thread.
   if (dlopen(file.c_str(), RTLD_NOW | RTLD_GLOBAL) != nullptr) return;
   const char* const why = dlerror();  // NOLINT(concurrency-mt-unsafe): the C library has one for each thread
-  throw std::runtime_error(std::string(why) + "; expected it to be installed");
+  throw std::runtime_error(std::string(why) + "; is the package installed?");
 }
 
 LateLibrary::Function LateLibrary::operator[](const char* name) const {

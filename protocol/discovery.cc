@@ -32,7 +32,7 @@ std::string lower(std::string_view text) {
 /// Removes "\X" or "\DDD" from the front of `text`, and returns the character.
 char take_escaped(std::string_view& text) {
   text.remove_prefix(1);
-  if (text.empty()) throw std::invalid_argument("a backslash at the end escapes nothing");
+  if (text.empty()) throw std::invalid_argument("a backslash must not be the last character");
   if (std::isdigit(static_cast<unsigned char>(text.front())) == 0) {
     const char c = text.front();
     text.remove_prefix(1);
@@ -42,7 +42,7 @@ char take_escaped(std::string_view& text) {
   const char* const end = text.data() + std::min<std::size_t>(text.size(), 3);
   const auto [stop, error] = std::from_chars(text.data(), end, value);
   if (error != std::errc{} || stop != text.data() + 3 || value > 255) {
-    throw std::invalid_argument("a backslash wants three digits up to 255, or one other character");
+    throw std::invalid_argument("a backslash must be followed by three digits up to 255, or by one other character");
   }
   text.remove_prefix(3);
   return static_cast<char>(static_cast<unsigned char>(value));
@@ -59,13 +59,14 @@ Instance parse(std::string_view text) {
     }
   }
   if (!instance.name.empty() && !is_instance_name(instance.name)) {
-    throw std::invalid_argument("a name has at most 63 bytes of UTF-8 without control characters");
+    throw std::invalid_argument("a name must have at most 63 bytes of UTF-8 without control characters");
   }
   if (text.empty()) return instance;
   text.remove_prefix(1);
   if (text.ends_with('.')) text.remove_suffix(1);
   if (!is_domain(text)) {
-    throw std::invalid_argument("after the first dot comes a domain like example.org; a dot in a name is written \\.");
+    throw std::invalid_argument(
+        "the part after the first dot must be a domain like example.org; write a dot in a name as \\.");
   }
   instance.domain = lower(text);
   return instance;

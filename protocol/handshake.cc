@@ -62,7 +62,7 @@ ClientHandshake::ClientHandshake(const Config& config, LocalTime now)
   constexpr std::size_t kMost = kMaxHandshakeBody - sizeof(KeyId) - kNoiseOverhead;
   if (body_.size() > kMost) {
     throw std::invalid_argument("the Hello has " + std::to_string(body_.size()) + " bytes of " + std::to_string(kMost) +
-                                ": claim less, or by shorter names");
+                                ": use fewer claims or shorter names");
   }
   if (!config.secret) return;
   expect_speakable(suites_);
@@ -174,7 +174,7 @@ Doorman::Doorman(const Config& config)
     const auto [present, added] = keys_.emplace(key_id(key.key), key);
     if (!added) {
       throw std::invalid_argument("the clients \"" + present->second.name + "\" and \"" + key.name +
-                                  "\" have the same key: each needs one of its own");
+                                  "\" have the same key: expected a different key for each client");
     }
   }
 }

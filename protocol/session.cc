@@ -246,7 +246,7 @@ Session::Session(const Config& config, const SessionKeys* keys, LocalTime opened
   expect_above_zero(seconds(config.rekey.age), "rekey.age_s");
   expect_above_zero(seconds(config.rekey.overlap), "rekey.overlap_s");
   expect(config.rekey.datagrams <= limits::kMaxDatagramsOfKey, "rekey.datagrams",
-         static_cast<double>(config.rekey.datagrams), "at most 2^23, which AES-256-GCM bears");
+         static_cast<double>(config.rekey.datagrams), "at most 2^23, the limit of AES-256-GCM");
   state_ = std::make_unique<State>(config, keys, opened);
 }
 Session::~Session() = default;
@@ -398,9 +398,9 @@ void Session::tick(LocalTime now) {
     const auto ms = std::chrono::duration_cast<std::chrono::milliseconds>(my.config.timeout).count();
     my.open = false;
     my.untold = true;
-    my.closed = Closed{.code = Code::kTimedOut, .reason = "nothing heard for " + std::to_string(ms) + " ms"};
+    my.closed = Closed{.code = Code::kTimedOut, .reason = "nothing received for " + std::to_string(ms) + " ms"};
   } else if (my.too_old(now)) {
-    const std::string reason = "the session has reached its age";
+    const std::string reason = "the session has reached its maximum age";
     my.close(Code::kExpired, reason);
     my.untold = true;
     my.closed = Closed{.code = Code::kExpired, .reason = reason};

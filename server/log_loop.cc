@@ -23,7 +23,7 @@ const char* describe(HapticController::Fault fault) {
     case HapticController::Fault::kNone:
       return "none";
     case HapticController::Fault::kPositionNotFinite:
-      return "the device measured a position that is not a number";
+      return "a measured position is not a finite number";
     case HapticController::Fault::kDeviceSilent:
       return "the device has stopped responding";
     case HapticController::Fault::kPositionJumped:

@@ -12,7 +12,7 @@ namespace tendon {
 
 ClientKey read_client_key(const std::string& file) {
   const auto refuse = [&](const std::string& why) {
-    throw std::runtime_error(file + ": cannot read this key: " + why);
+    throw std::runtime_error("cannot read key file " + file + ": " + why);
   };
   struct stat status {};
   if (::stat(file.c_str(), &status) != 0) refuse(std::generic_category().message(errno));

@@ -47,20 +47,20 @@ Mat3 operator_from_device(std::string_view axes) {
     const bool back = axis.starts_with('-');
     if (back) axis.remove_prefix(1);
     if (side == kWords.end() || axis.size() != 1 || kAxes.find(axis.front()) == kAxes.npos) {
-      refuse(axes, "\"" + std::string(word) + "\" is none of right=, up= and user= with x, y, z, -x, -y or -z");
+      refuse(axes, "\"" + std::string(word) + "\" is not right=, up= or user= with x, y, z, -x, -y or -z");
     }
     const auto row = rotation.row(side - kWords.begin());
-    if (!row.isZero()) refuse(axes, std::string(*side) + " is there twice");
+    if (!row.isZero()) refuse(axes, std::string(*side) + " occurs twice");
     rotation(side - kWords.begin(), static_cast<Eigen::Index>(kAxes.find(axis.front()))) = back ? -1 : 1;
   }
   for (Eigen::Index i = 0; i < 3; ++i) {
     if (rotation.row(i).isZero()) refuse(axes, std::string(kWords[static_cast<std::size_t>(i)]) + " is missing");
     if (rotation.col(i).cwiseAbs().sum() > 1) {
       std::string why(kAxes.substr(static_cast<std::size_t>(i), 1));
-      refuse(axes, why.append(" points two ways"));
+      refuse(axes, why.append(" is used twice"));
     }
   }
-  if (rotation.determinant() < 0) refuse(axes, "these three make a left-handed frame");
+  if (rotation.determinant() < 0) refuse(axes, "these three axes form a left-handed frame");
   return rotation;
 }
 

@@ -23,20 +23,21 @@ struct AolPart {
 /// All parts of AOL+ in the order of the tables. Scenes, `tendond explain` and the lab use this list, and a test
 /// compares it with the table in core/control/README.md.
 inline constexpr std::tuple kAolParts{
-    AolPart<PointAolPlus::EnergyCap>{"energy_cap", "credit is capped", &PointAolPlus::Parts::energy_cap},
-    AolPart<PointAolPlus::Robust>{"robust_ledger", "rounding of positions earns nothing",
+    AolPart<PointAolPlus::EnergyCap>{"energy_cap", "limits the credit", &PointAolPlus::Parts::energy_cap},
+    AolPart<PointAolPlus::Robust>{"robust_ledger", "earns no credit from the rounding of positions",
                                   &PointAolPlus::Parts::robust_ledger},
-    AolPart<PointAolPlus::Knee>{"knee", "no hard edge where the limiter begins", &PointAolPlus::Parts::knee},
-    AolPart<PointAolPlus::LatencyReserve>{"latency_reserve", "forces under way are paid for",
+    AolPart<PointAolPlus::Knee>{"knee", "starts to limit gradually", &PointAolPlus::Parts::knee},
+    AolPart<PointAolPlus::LatencyReserve>{"latency_reserve", "reserves credit for forces that are not applied yet",
                                           &PointAolPlus::Parts::latency_reserve},
-    AolPart<PointAolPlus::BoundedAcceleration>{"bounded_acceleration", "for devices with next to no damping",
+    AolPart<PointAolPlus::BoundedAcceleration>{"bounded_acceleration",
+                                               "bounds the acceleration, for devices with little damping",
                                                &PointAolPlus::Parts::bounded_acceleration},
-    AolPart<PointAolPlus::Shaping>{"shaping", "no object is shown stiffer than this", &PointAolPlus::Parts::shaping},
-    AolPart<PointAolPlus::AdaptiveFriction>{"adaptive_friction", "friction bounds by place",
+    AolPart<PointAolPlus::Shaping>{"shaping", "limits the rendered stiffness", &PointAolPlus::Parts::shaping},
+    AolPart<PointAolPlus::AdaptiveFriction>{"adaptive_friction", "uses friction bounds that depend on the position",
                                             &PointAolPlus::Parts::adaptive_friction},
-    AolPart<PointAolPlus::Thrift>{"thrift", "the next contact finds some credit", &PointAolPlus::Parts::thrift},
-    AolPart<PointAolPlus::Damper>{"damper", "a hand that rings is damped", &PointAolPlus::Parts::damper},
-    AolPart<PointAolPlus::FadingContact>{"fading_contact", "a contact's credit fades instead of vanishing",
+    AolPart<PointAolPlus::Thrift>{"thrift", "saves credit for the next contact", &PointAolPlus::Parts::thrift},
+    AolPart<PointAolPlus::Damper>{"damper", "damps vibrations of the hand", &PointAolPlus::Parts::damper},
+    AolPart<PointAolPlus::FadingContact>{"fading_contact", "lets the credit of a contact decay slowly",
                                          &PointAolPlus::Parts::fading_contact},
 };
 

@@ -56,7 +56,8 @@ void check(const typename AolPlus<Blocks, Size>::Config& config) {
     }
     if (config.parts.latency_reserve) {
       throw std::invalid_argument(
-          "bounded_acceleration is not proved for forces that are held late: not together with latency_reserve");
+          "bounded_acceleration is not proved for forces that are held late, so it cannot be used with "
+          "latency_reserve");
     }
   }
   if (const auto& adaptive = config.parts.adaptive_friction) {
@@ -80,7 +81,8 @@ void check(const typename AolPlus<Blocks, Size>::Config& config) {
   if (const auto& fading = config.parts.fading_contact) {
     expect_above_zero(seconds(fading->memory), "fading_contact.memory");
     if (!config.parts.energy_cap) {
-      throw std::invalid_argument("fading_contact needs energy_cap: without it no contact has a credit of its own");
+      throw std::invalid_argument(
+          "fading_contact requires energy_cap, because only energy_cap has a credit for each contact");
     }
   }
 }

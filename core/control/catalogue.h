@@ -100,42 +100,44 @@ LawRow(LawInfo, Make) -> LawRow<Make>;
 
 /// Row i is enumerator i of Law.
 inline constexpr std::tuple kRows{
-    LawRow{{Law::kNone, "none", "no law: shows what happens without one", false, false},
+    LawRow{{Law::kNone, "none", "no limiter, for comparison", false, false},
            [](const LimiterConfig& c) { return Unlimited<3>({c.friction}); }},
-    LawRow{{Law::kClamp, "clamp", "no force is longer than max_force", false, false},
+    LawRow{{Law::kClamp, "clamp", "limits the length of the force vector", false, false},
            [](const LimiterConfig& c) { return HardClamp<3>({.friction = c.friction, .max_force = c.max_force}); }},
     LawRow{{Law::kPassivityControllerPublished, "tdpa-2002",
-            "passivity observer and controller as published: blind to the energy that sampling itself gives out", false,
-            false},
+            "passivity observer and controller as published: ignores the energy that sampling generates", false, false},
            [](const LimiterConfig& c) {
              return PassivityController<3>(
                  {.friction = c.friction, .observer = PassivityObserver::kSameSample, .max_damping = c.max_damping});
            }},
     LawRow{{Law::kPassivityController, "tdpa",
-            "passivity observer that counts the held force, and a damper against what it finds", false, false},
+            "passivity observer that accounts for the held force, and a damper that dissipates the observed energy",
+            false, false},
            [](const LimiterConfig& c) {
              return PassivityController<3>({.friction = c.friction, .max_damping = c.max_damping});
            }},
     LawRow{{Law::kParallelPassivityController, "tdpa-parallel",
-            "the same, but shows the environment less motion instead of the hand more force", false, false},
+            "the same, but reduces the motion of the environment instead of increasing the force on the hand", false,
+            false},
            [](const LimiterConfig& c) {
              return ParallelPassivityController<3>({.friction = c.friction, .max_mobility = kMostMobility});
            }},
     LawRow{{Law::kReferenceEnergy, "reference-energy",
-            "passivity controller that follows the energy the true environment would store", false, true},
+            "passivity controller that follows the energy stored by the true environment", false, true},
            [](const LimiterConfig& c) {
              return ReferenceEnergyController<3>({.friction = c.friction,
                                                   .stiffness = c.environment_stiffness.value_or(0),
                                                   .max_damping = c.max_damping});
            }},
-    LawRow{{Law::kVirtualCoupling, "virtual-coupling", "spring between hand and tool, Colgate's rule", false, false},
-           [](const LimiterConfig& c) {
-             return VirtualCoupling<3>({.friction = c.friction,
-                                        .longest_hold = c.longest_hold,
-                                        .stiffness = colgate_coupling(c.friction.viscous, c.longest_hold, 0)});
-           }},
+    LawRow{
+        {Law::kVirtualCoupling, "virtual-coupling", "spring between hand and tool, with Colgate's rule", false, false},
+        [](const LimiterConfig& c) {
+          return VirtualCoupling<3>({.friction = c.friction,
+                                     .longest_hold = c.longest_hold,
+                                     .stiffness = colgate_coupling(c.friction.viscous, c.longest_hold, 0)});
+        }},
     LawRow{{Law::kTwoPortCoupling, "virtual-coupling-two-port",
-            "spring and damper between hand and tool, Adams and Hannaford's rule", false, false},
+            "spring and damper between hand and tool, with the rule of Adams and Hannaford", false, false},
            [](const LimiterConfig& c) {
              const double viscous = c.friction.viscous;
              return VirtualCoupling<3>({.friction = c.friction,
@@ -144,49 +146,50 @@ inline constexpr std::tuple kRows{
                                         .damping = viscous});
            }},
     LawRow{{Law::kNonlinearCoupling, "nonlinear-coupling",
-            "passes static laws no steeper than 2b/T, ties all others to such a spring", true, false},
+            "passes static laws with a slope up to 2b/T, couples all others through a spring of this stiffness", true,
+            false},
            [](const LimiterConfig& c) {
              return NonlinearCoupling<3>({.friction = c.friction, .longest_hold = c.longest_hold});
            }},
     LawRow{{Law::kPassiveSynthesis, "passive-synthesis",
-            "softens the whole field until friction pays for sampling and delay", false, false},
+            "softens the whole field until friction dissipates the energy of sampling and delay", false, false},
            [](const LimiterConfig& c) {
              return PassiveSynthesis<3>({.friction = c.friction,
                                          .longest_hold = c.longest_hold,
                                          .delay = c.environment_delay,
                                          .stiffness = c.environment_stiffness});
            }},
-    LawRow{{Law::kPortHamiltonian, "port-hamiltonian", "a spring whose state is the energy that really went in", false,
-            true},
+    LawRow{{Law::kPortHamiltonian, "port-hamiltonian", "a spring whose state is the energy that the hand has put in",
+            false, true},
            [](const LimiterConfig& c) {
              return PortHamiltonian<3>({.friction = c.friction, .stiffness = c.environment_stiffness.value_or(0)});
            }},
-    LawRow{{Law::kEnergyBounding, "energy-bounding", "bounds how fast the force may change with position", true, false},
+    LawRow{{Law::kEnergyBounding, "energy-bounding", "bounds the change of the force with position", true, false},
            [](const LimiterConfig& c) {
              return EnergyBounding<3>({.friction = c.friction, .longest_hold = c.longest_hold});
            }},
-    LawRow{{Law::kForceBounding, "force-bounding", "a ledger of viscous friction bounds the force", true, false},
+    LawRow{{Law::kForceBounding, "force-bounding", "bounds the force by a ledger of viscous friction", true, false},
            [](const LimiterConfig& c) {
              return ForceBounding<3>({.friction = c.friction, .longest_hold = c.longest_hold});
            }},
     LawRow{{Law::kMemorylessForceBounding, "force-bounding-memoryless",
-            "the last force and the last motion bound the next force", true, false},
+            "bounds the force by the last force and the last motion", true, false},
            [](const LimiterConfig& c) {
              return MemorylessForceBounding<3>({.friction = c.friction, .longest_hold = c.longest_hold});
            }},
     LawRow{
-        {Law::kAolPerAxis, "aol-per-axis", "Adjusting Output-Limiter as in the paper, each axis by itself", true,
+        {Law::kAolPerAxis, "aol-per-axis", "Adjusting Output-Limiter as in the paper, separately for each axis", true,
          false},
         [](const LimiterConfig& c) { return PerAxisAol<3>({.friction = c.friction, .longest_hold = c.longest_hold}); }},
     LawRow{
-        {Law::kAol, "aol", "Adjusting Output-Limiter on one ledger; keeps the direction", true, false},
+        {Law::kAol, "aol", "Adjusting Output-Limiter with one ledger; keeps the direction of the force", true, false},
         [](const LimiterConfig& c) { return Aol<1, 3>({.friction = {c.friction}, .longest_hold = c.longest_hold}); }},
-    LawRow{{Law::kAolBox, "aol-box", "Adjusting Output-Limiter on one ledger, friction of each axis by itself", true,
+    LawRow{{Law::kAolBox, "aol-box", "Adjusting Output-Limiter with one ledger and the friction of each axis", true,
             false},
            [](const LimiterConfig& c) {
              return Aol<3>({.friction = {c.friction, c.friction, c.friction}, .longest_hold = c.longest_hold});
            }},
-    LawRow{{Law::kAolPlus, "aol+", "Adjusting Output-Limiter with the parts that are listed", true, false},
+    LawRow{{Law::kAolPlus, "aol+", "Adjusting Output-Limiter with the listed parts", true, false},
            [](const LimiterConfig& c) {
              return AolPlus<1, 3>({.friction = {c.friction},
                                    .longest_hold = c.longest_hold,

@@ -12,9 +12,9 @@ namespace tendon {
 namespace {
 
 constexpr std::array kPresets = {
-    PresetInfo{Preset::kFeel, "feel", "quiet, and true to the object, on every device"},
+    PresetInfo{Preset::kFeel, "feel", "low vibration and accurate rendering on every device"},
     PresetInfo{Preset::kFeelUnconditional, "feel-unconditional",
-               "the same without an assumption about the hand, for devices with 0.1 N·s/m of friction and more"},
+               "the same without assumptions about the hand, for devices with at least 0.1 N·s/m of friction"},
 };
 
 constexpr double kStiffness = 1500;    // N/m
@@ -46,11 +46,11 @@ PresetParts preset_parts(Preset preset, const PresetDevice& device) noexcept {
 }
 
 std::string promise_of(const LimiterConfig& limiter) {
-  if (!info(limiter.law).passive) return "no promise for every object: " + std::string(info(limiter.law).what);
+  if (!info(limiter.law).passive) return "not passive for every object: " + std::string(info(limiter.law).what);
   const auto& bounded = limiter.parts.bounded_acceleration;
-  if (limiter.law != Law::kAolPlus || !bounded) return "passive whatever the hand does";
+  if (limiter.law != Law::kAolPlus || !bounded) return "passive for every motion of the hand";
   return "passive while the handle accelerates by less than " + shortest(bounded->most[0]) +
-         " m/s²; a step beyond that counts on friction alone";
+         " m/s²; a step with a higher acceleration only relies on friction";
 }
 
 }  // namespace tendon

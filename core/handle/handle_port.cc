@@ -27,12 +27,13 @@ HandlePort<Blocks, Size>::HandlePort(const Config& config)
       first_(OutputBound::of(config.friction[0], config.longest_hold)),
       viscous_(config.friction[0].viscous) {
   if (config.law != Law::kAolPlus && config.law != Law::kAol && config.law != Law::kNone) {
-    throw std::invalid_argument("law \"" + std::string(info(config.law).name) +
-                                "\" knows a point only: expected aol+, aol or none for a handle that turns or grips");
+    throw std::invalid_argument(
+        "law \"" + std::string(info(config.law).name) +
+        "\" only limits the force on a point: expected aol+, aol or none for a handle with rotation or gripper");
   }
   if (config.shared_account && !limits_) {
     throw std::invalid_argument("law \"" + std::string(info(config.law).name) +
-                                "\" has no account that a purse could share: expected aol or aol+ for a handle");
+                                "\" has no energy account that a purse can share: expected aol or aol+ for a handle");
   }
   if (limits_ && config.follow_holds) holds_.emplace(config.longest_hold, *config.follow_holds);
 }
@@ -97,14 +98,14 @@ WrenchPort::Config wrench_config(const LimiterConfig& point, const RotationLimit
   if (const auto& bounded = parts.bounded_acceleration) {
     if (!rotation.most_acceleration) {
       throw std::invalid_argument(
-          "rotation.most_acceleration: expected a number above 0 rad/s², because bounded_acceleration is listed");
+          "rotation.most_acceleration: expected a number above 0 rad/s², because bounded_acceleration is used");
     }
     config.parts.bounded_acceleration = {.most = {bounded->most[0], *rotation.most_acceleration}};
   }
   if (const auto& shaping = parts.shaping) {
     if (!rotation.shaping_stiffness) {
       throw std::invalid_argument(
-          "rotation.shaping_stiffness: expected a number above 0 N·m/rad, because shaping is listed");
+          "rotation.shaping_stiffness: expected a number above 0 N·m/rad, because shaping is used");
     }
     config.parts.shaping = {.stiffness = {shaping->stiffness[0], *rotation.shaping_stiffness}};
   }

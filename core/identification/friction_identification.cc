@@ -79,14 +79,14 @@ KellyVerdict kelly_verdict(const Runs& runs) {
     verdict.flaw = "the slide of " + number(slow.slide_time) +
                    " s is shorter than 4 m/b = " + number(4 * slow.time_constant) + " s";
   } else if (!(slow.friction.coulomb > 0)) {
-    verdict.flaw = "its f_c = " + number(slow.friction.coulomb) + " is not positive";
+    verdict.flaw = "f_c = " + number(slow.friction.coulomb) + " is not positive";
   } else if (fast == nullptr) {
-    verdict.flaw = "there is no second slope, 1.5 times as steep or more, to compare with";
+    verdict.flaw = "expected a second slope that is at least 1.5 times as steep, found none";
   } else if (!fast->plausible()) {
     verdict.flaw = "at the second slope the slide of " + number(fast->slide_time) +
                    " s is shorter than 4 m/b = " + number(4 * fast->time_constant) + " s or f_c is not positive";
   } else if (std::abs(fast->friction.viscous - b) > kAgreement * b) {
-    verdict.flaw = "two slopes do not agree, b = " + number(b) + " and " + number(fast->friction.viscous);
+    verdict.flaw = "the two slopes differ, b = " + number(b) + " and " + number(fast->friction.viscous);
   }
   return verdict;
 }
@@ -140,17 +140,17 @@ void judge(Identification& result) {
   });
   if (flawed != result.places.end()) {
     result.trust = Trust::kIntegral;
-    result.reason = "Kelly's line is no asymptote yet" + at(*flawed) + ": " + flawed->kelly_flaw +
-                    " (it says b = " + number(flawed->kelly.viscous) + ", the integral " +
+    result.reason = "Kelly's fit is not valid" + at(*flawed) + ": " + flawed->kelly_flaw +
+                    " (it gives b = " + number(flawed->kelly.viscous) + ", the integral " +
                     number(flawed->integral.viscous) + ")";
   } else if (apart != result.places.end()) {
     result.trust = Trust::kNeither;
-    result.reason = "Kelly's validity test passed, yet the two differ" + at(*apart) +
+    result.reason = "Kelly's fit is valid, but the two methods differ" + at(*apart) +
                     ": b = " + number(apart->kelly.viscous) + " and " + number(apart->integral.viscous) +
-                    ". Is the mass right? Neither is a bound";
+                    ". Check the mass. Neither value is a bound";
   } else {
     result.trust = Trust::kBoth;
-    result.reason = "Kelly's validity test passed and the integral agrees. Published is the lesser of both";
+    result.reason = "Kelly's fit is valid and agrees with the integral. The smaller value is used";
   }
   for (const PlaceEstimate& place : result.places) {
     if (!place.kelly_valid) continue;
@@ -162,22 +162,24 @@ void judge(Identification& result) {
 void warn(Identification& result) {
   for (const PlaceEstimate& place : result.places) {
     if (!place.both_directions) {
-      result.warnings.push_back("one direction only" + at(place) + ": a constant force would be taken for friction");
+      result.warnings.push_back("only one direction" + at(place) +
+                                ": a constant force cannot be distinguished from friction");
     }
     const auto runs = std::ranges::count(result.runs, place.place, &RunEstimate::place);
     if (static_cast<std::size_t>(runs) < 2 * kEnoughRuns) {
       result.warnings.push_back(std::to_string(runs) + " runs" + at(place) +
-                                ": 3 slopes, repeated, in both directions " + "would show what scatters");
+                                ": use 3 slopes, repeated, in both directions to estimate the scatter");
     }
   }
   if (result.places.size() == 1) {
-    result.warnings.emplace_back("one place only: friction differs between axes and poses, and the least counts");
+    result.warnings.emplace_back(
+        "only one place: friction differs between axes and poses, and the lowest value is required");
   }
   if (result.lower_bound.viscous == 0) {
-    result.warnings.emplace_back("viscous friction cannot be told from none: its bound is 0");
+    result.warnings.emplace_back("viscous friction cannot be distinguished from zero: its bound is 0");
   }
   if (result.lower_bound.coulomb == 0) {
-    result.warnings.emplace_back("Coulomb friction cannot be told from none: its bound is 0");
+    result.warnings.emplace_back("Coulomb friction cannot be distinguished from zero: its bound is 0");
   }
 }
 
@@ -203,7 +205,7 @@ RunEstimate fit_run(const RampRun& run, const IdentificationConfig& config) {
   estimate.travel = slide.samples.back().position;
   estimate.integral = integral_fit(slide, config.mass);
   if (!(estimate.integral.mass > 0)) {
-    throw std::invalid_argument("the mass cannot be told from friction in this run: give it");
+    throw std::invalid_argument("the mass cannot be determined from this run: use --mass");
   }
   estimate.kelly = kelly_fit(slide, estimate.integral.mass);
   return estimate;
@@ -222,7 +224,7 @@ Identification identify_friction(std::span<const RampRun> runs, const Identifica
 }
 
 Identification identify_friction(std::vector<RunEstimate> runs) {
-  if (runs.empty()) throw std::invalid_argument("expected one run or more, found none");
+  if (runs.empty()) throw std::invalid_argument("expected at least one run, found none");
   Identification result;
   double squares = 0;
   double unit = 0;

@@ -39,7 +39,7 @@ void check(const RampRun& run, double encoder_step) {
       refuse("sample ", i, ": expected finite numbers");
     }
     if (i > 0 && !(sample.t > samples[i - 1].t)) {
-      refuse("sample ", i, ": expected a time after that of the sample before, found ", sample.t, " s");
+      refuse("sample ", i, ": expected a time later than that of the previous sample, found ", sample.t, " s");
     }
   }
 }
@@ -73,7 +73,7 @@ Slide slide_of(const RampRun& run, double encoder_step) {
   }
   const double travel = std::max(forth, back);
   if (!(travel > kFewestCounts * encoder_step)) {
-    refuse("expected a handle that moves more than ", kFewestCounts, " encoder counts, found ", travel);
+    refuse("expected a handle that moves by more than ", kFewestCounts, " encoder counts, found ", travel);
   }
   Slide slide;
   slide.direction = forth > back ? 1 : -1;
@@ -89,8 +89,8 @@ Slide slide_of(const RampRun& run, double encoder_step) {
   for (; path[i] < end; ++i) {
     farthest = std::max(farthest, path[i]);
     if (path[i] < farthest - std::max(margin, 1e-9 * travel)) {
-      refuse("sample ", i, ": expected a handle that only moves ", slide.direction > 0 ? "forth" : "back",
-             ", it turns round");
+      refuse("sample ", i, ": expected a handle that only moves ", slide.direction > 0 ? "forward" : "backward",
+             ", found a reversal");
     }
     const RampSample& sample = run.samples[i];
     slide.samples.push_back({sample.t, slide.direction * (sample.position - origin), slide.direction * sample.force});
@@ -98,7 +98,8 @@ Slide slide_of(const RampRun& run, double encoder_step) {
   if (slide.samples.size() < kFewestSamples) {
     refuse("expected ", kFewestSamples, " samples or more while the handle slides, found ", slide.samples.size());
   }
-  if (!(slide.samples.back().force > 0)) refuse("expected motion along the force, found motion against it");
+  if (!(slide.samples.back().force > 0))
+    refuse("expected motion in the direction of the force, found motion against it");
   return slide;
 }
 
@@ -127,7 +128,7 @@ Ramp ramp_of(const Slide& slide) {
   }
   if (std::sqrt(squares) > kRampTolerance * rise) {
     refuse("expected a force that rises at a constant rate, found ", 100 * std::sqrt(squares) / rise,
-           " % of its rise beside the line");
+           " % deviation from a line");
   }
   return ramp;
 }

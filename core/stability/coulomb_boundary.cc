@@ -16,7 +16,8 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 double abbott_okamura_stiffness(const SampledSpring& spring) {
   check_without_damper(spring);
-  expect(spring.delay_samples == 0, "delay_samples", spring.delay_samples, "0: this law knows no delay");
+  expect(spring.delay_samples == 0, "delay_samples", spring.delay_samples,
+         "0, because this law does not support a delay");
   const double held = 2 * spring.viscous / seconds(spring.period);
   return spring.encoder_step == 0 ? held : std::min(held, 2 * spring.coulomb / spring.encoder_step);
 }

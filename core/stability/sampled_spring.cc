@@ -29,7 +29,7 @@ void check(const SampledSpring& spring) {
 
 void check_without_damper(const SampledSpring& spring) {
   check(spring);
-  expect(spring.damping == 0, "damping", spring.damping, "0, this law knows no virtual damper");
+  expect(spring.damping == 0, "damping", spring.damping, "0, because this law does not support a virtual damper");
 }
 
 double mean_age(const SampledSpring& spring) {

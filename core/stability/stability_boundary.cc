@@ -78,7 +78,8 @@ double largest_stable_stiffness(const SampledSpring& spring) {
 double jury_stiffness(const SampledSpring& spring) {
   check_with_mass(spring);
   check_without_damper(spring);
-  expect(spring.delay_samples == 0, "delay_samples", spring.delay_samples, "0: this form knows no delay");
+  expect(spring.delay_samples == 0, "delay_samples", spring.delay_samples,
+         "0, because this form does not support a delay");
   const double b = spring.viscous;
   const double t = seconds(spring.period);
   const double u = b * t / spring.mass;

@@ -84,7 +84,7 @@ Coupling::Coupling(const Config& config)
   if (config.engage_by) {
     expect(*config.engage_by <= 31, "engage_by", *config.engage_by, "0 to 31");
     expect(!config.clutch || config.clutch->bit != *config.engage_by, "engage_by", *config.engage_by,
-           "another button than the clutch's");
+           "a different button than that of the clutch");
   }
   expect_not_negative(config.drift_rate, "drift_rate");
   expect_not_negative(config.centring, "centring");

@@ -19,23 +19,30 @@ bool leads(const CouplingConfig& config) { return config.role == PortRole::kLead
 
 constexpr std::array kCouplingRules = {
     CouplingRule{"clutch", [](const CouplingConfig& c) { return !leads(c) && c.clutch.has_value(); },
-                 [](const CouplingConfig&) { return std::string("expected none: the leader clutches"); }},
+                 [](const CouplingConfig&) {
+                   return std::string("expected no clutch for a follower: only the leader has a clutch");
+                 }},
     CouplingRule{"holds_place", [](const CouplingConfig& c) { return leads(c) && c.holds_place; },
-                 [](const CouplingConfig&) { return std::string("expected \"release\": a hand holds the leader"); }},
+                 [](const CouplingConfig&) {
+                   return std::string("expected \"release\" for a leader, which is held by a hand");
+                 }},
     CouplingRule{"engage_by", [](const CouplingConfig& c) { return !leads(c) && c.engage_by.has_value(); },
                  [](const CouplingConfig&) { return std::string("expected \"request\": the leader engages"); }},
     CouplingRule{"clutch", [](const CouplingConfig& c) { return c.absolute && c.clutch.has_value(); },
                  [](const CouplingConfig&) {
-                   return std::string("expected none with map.absolute: a clutch changes an offset, and there is none");
+                   return std::string(
+                       "expected no clutch with map.absolute: a clutch changes the offset, which is always 0");
                  }},
     CouplingRule{"absolute", [](const CouplingConfig& c) { return c.absolute && !has_places(c.method); },
                  [](const CouplingConfig&) {
                    return std::string(
-                       "expected the method position-position, position-force, surface or set-position: the others "
-                       "have no absolute places");
+                       "expected the method position-position, position-force, surface or set-position with "
+                       "map.absolute: the other methods have no absolute positions");
                  }},
     CouplingRule{"share", [](const CouplingConfig& c) { return leads(c) && c.share.has_value(); },
-                 [](const CouplingConfig&) { return std::string("expected none: only a follower has one"); }},
+                 [](const CouplingConfig&) {
+                   return std::string("expected no share for a leader: only a follower has shares");
+                 }},
     CouplingRule{"method", [](const CouplingConfig& c) { return c.share && !can_be_shared(c.method); },
                  [](const CouplingConfig& c) {
                    return "expected \"position-position\" or \"position-force\" with several leaders, found " +
@@ -44,28 +51,26 @@ constexpr std::array kCouplingRules = {
     CouplingRule{"rate", [](const CouplingConfig& c) { return c.method == CouplingMethod::kRate && !c.rate; },
                  [](const CouplingConfig& c) {
                    return "missing, expected this table with method " + in_quotation(c.method) +
-                          ": how fast the follower moves";
+                          ": it sets the speed of the follower";
                  }},
     CouplingRule{"rate", [](const CouplingConfig& c) { return c.method != CouplingMethod::kRate && c.rate; },
                  [](const CouplingConfig& c) {
-                   return "expected none with method " + in_quotation(c.method) + ": only \"rate\" has a speed";
+                   return "expected none with method " + in_quotation(c.method) + ": only the method \"rate\" uses it";
                  }},
-    CouplingRule{
-        "centring", [](const CouplingConfig& c) { return !leads(c) && c.centring > 0; },
-        [](const CouplingConfig&) { return std::string("expected none or 0: the leader's handle is centred"); }},
+    CouplingRule{"centring", [](const CouplingConfig& c) { return !leads(c) && c.centring > 0; },
+                 [](const CouplingConfig&) {
+                   return std::string("expected 0 or no value for a follower: only the leader's handle is centred");
+                 }},
     CouplingRule{
         "own_damping",
         [](const CouplingConfig& c) { return c.method == CouplingMethod::kPassivity && !(c.spring.own_damping > 0); },
         [](const CouplingConfig&) {
-          return std::string(
-              "expected a number above 0: nothing else takes energy up, so that nothing could begin to move");
+          return std::string("expected a number above 0: nothing else absorbs energy, so no motion could start");
         }},
     CouplingRule{
         "own_damping",
         [](const CouplingConfig& c) { return c.method == CouplingMethod::kWaves && !(c.spring.own_damping > 0); },
-        [](const CouplingConfig&) {
-          return std::string("expected a number above 0: it is the impedance of the waves");
-        }}};
+        [](const CouplingConfig&) { return std::string("expected a number above 0: it is the wave impedance"); }}};
 
 }  // namespace
 

@@ -14,7 +14,7 @@ std::vector<Coupling> couplings_of(const Coupling::Config& config, std::span<con
   expect(leaders.size() != 1 && leaders.size() <= Couplings::kMost, "leaders", static_cast<double>(leaders.size()),
          "none, or 2 to 4");
   expect(leaders.empty() || (!config.turn && !config.grip), "leaders", static_cast<double>(leaders.size()),
-         "none where orientations or grippers are coupled");
+         "none with coupled orientations or grippers");
   std::vector<Coupling> all;
   if (leaders.empty()) all.emplace_back(config);
   for (const CoupledLeader& leader : leaders) {

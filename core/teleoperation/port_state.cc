@@ -36,9 +36,9 @@ std::string_view to_string(CouplingMethod method) noexcept {
 std::string_view to_string(PortPhase phase) noexcept {
   switch (phase) {
     case PortPhase::kAlone:
-      return "alone: nothing is heard of the other end";
+      return "alone: nothing received from the other end";
     case PortPhase::kCoupled:
-      return "coupled: waits for the leader's act";
+      return "coupled: waiting for the leader to engage";
     case PortPhase::kAligning:
       return "aligning";
     case PortPhase::kEngaged:
@@ -46,9 +46,9 @@ std::string_view to_string(PortPhase phase) noexcept {
     case PortPhase::kClutched:
       return "clutched";
     case PortPhase::kLost:
-      return "lost: the other end fell silent";
+      return "lost: nothing received from the other end any more";
     case PortPhase::kFault:
-      return "waits until its device gives forces";
+      return "waiting until the device exerts forces";
   }
   return "unknown";
 }

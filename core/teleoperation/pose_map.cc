@@ -20,7 +20,7 @@ PoseMap::PoseMap(const Config& config)
   scale(config.position_scale, "position_scale");
   scale(config.force_scale, "force_scale");
   expect(is_rotation(config.rotation), "rotation", config.rotation.w, "a quaternion of length 1");
-  expect(!axes_.isZero(0), "axes", 0, "one axis at least");
+  expect(!axes_.isZero(0), "axes", 0, "at least one axis");
 }
 
 PoseMap PoseMap::scaled(double position_scale, double force_scale) const noexcept {

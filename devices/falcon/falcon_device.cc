@@ -245,7 +245,7 @@ const Driver& driver(const Config& /*config*/) {
                   .moves_a_hand = true,
                   .axes = "right=x up=y user=z",
                   .buttons = {"right", "forward", "centre", "left"},
-                  .buttons_in_words = "one of a Falcon's, 0 to 3",
+                  .buttons_in_words = "0 to 3, a button of the Falcon",
                   .homing = "homed: pull the grip all the way out, then push it all the way in",
                   .ids = kIds,
                   .zero_packet = {zero.begin(), zero.end()}};

@@ -65,7 +65,7 @@ std::vector<std::uint8_t> check_firmware(std::vector<std::uint8_t> bytes, const 
            (bytes.size() > kMostBytes ? "more" : std::to_string(bytes.size()) + " bytes"));
   }
   if (!std::equal(kBootKey.begin(), kBootKey.end(), bytes.begin())) {
-    refuse("expected the Falcon's firmware, which begins with the bytes AA 08, found a file that does not");
+    refuse("expected the Falcon's firmware, which starts with the bytes AA 08, found other bytes");
   }
   if (unknown == UnknownFirmware::kAccept) return bytes;
   const std::string sha256 = sha256_of(bytes);
@@ -73,7 +73,7 @@ std::vector<std::uint8_t> check_firmware(std::vector<std::uint8_t> bytes, const 
     std::string known;
     for (const KnownFile& file : kKnownFiles) known.append(known.empty() ? "" : ", ").append(file.name);
     refuse("expected one of the files that are known to work (" + known + "), found another one, with the SHA-256 " +
-           sha256 + "; accept it explicitly if you know where it came from");
+           sha256 + "; if you trust its source, accept it explicitly");
   }
   return bytes;
 }
@@ -81,7 +81,7 @@ std::vector<std::uint8_t> check_firmware(std::vector<std::uint8_t> bytes, const 
 std::vector<std::uint8_t> read_firmware(std::istream& file, const std::string& name, UnknownFirmware unknown) {
   std::vector<std::uint8_t> bytes(kMostBytes + 1);
   file.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
-  if (file.bad()) throw std::runtime_error(name + ": expected the Falcon's firmware, the file cannot be read on");
+  if (file.bad()) throw std::runtime_error(name + ": cannot read the rest of the firmware file");
   bytes.resize(static_cast<std::size_t>(file.gcount()));
   return check_firmware(std::move(bytes), name, unknown);
 }

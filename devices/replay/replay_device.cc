@@ -24,9 +24,9 @@ ReplayDevice::ReplayDevice(Config config) : config_(std::move(config)) {
   for (std::size_t i = 0; i < samples.size(); ++i) {
     expect_finite(samples[i].position, "replay.samples.position");
     expect(i == 0 || samples[i].at > samples[i - 1].at, "replay.samples.at", seconds(samples[i].at),
-           "a time after that of the sample before");
+           "a time later than that of the previous sample");
     expect(static_cast<double>(later(i)) <= kLongest_s * 1e9, "replay.samples.at (since the first)",
-           static_cast<double>(later(i)) / 1e9, "1e9 s at most");
+           static_cast<double>(later(i)) / 1e9, "at most 1e9 s");
   }
   expect_not_negative(config_.position_resolution, "replay.position_resolution");
   const Duration span = samples.back().at - samples.front().at;
@@ -42,7 +42,7 @@ std::vector<ReplayDevice::Sample> ReplayDevice::samples_of(const ScriptedMotion:
   samples.reserve(motion.samples.size());
   for (const auto& [t, x] : motion.samples) {
     const double since = t - motion.samples.front().t;
-    expect(since <= kLongest_s, "replay.samples.t (since the first)", since, "1e9 s at most");
+    expect(since <= kLongest_s, "replay.samples.t (since the first)", since, "at most 1e9 s");
     samples.push_back({Duration(std::llround(since * 1e9)), motion.origin + x * direction});
   }
   return samples;

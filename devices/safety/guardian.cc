@@ -193,7 +193,7 @@ constexpr char kStandsGuard = 'g';
 ZeroPacket::ZeroPacket(bool usb, std::uint8_t endpoint, std::span<const std::byte> bytes)
     : size_(static_cast<std::uint8_t>(bytes.size())), endpoint_(endpoint), usb_(usb) {
   if (bytes.empty() || bytes.size() > kMost) {
-    throw std::invalid_argument("a zero packet: expected 1 to 64 bytes, got " + std::to_string(bytes.size()));
+    throw std::invalid_argument("zero packet: expected 1 to 64 bytes, got " + std::to_string(bytes.size()));
   }
   std::copy(bytes.begin(), bytes.end(), bytes_.begin());
 }
@@ -221,14 +221,14 @@ bool ZeroPacket::send(int fd) const noexcept {
 Guardian::Guardian(const std::function<void()>& on_start) {
   std::array<int, 2> ends{};
   if (socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, ends.data()) != 0) {
-    throw std::system_error(errno, std::generic_category(), "no socket for the guardian");
+    throw std::system_error(errno, std::generic_category(), "cannot create a socket for the guardian process");
   }
   void* const shared =
       mmap(nullptr, kDevices * sizeof(Heartbeat), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
   if (shared == MAP_FAILED) {
     const int error = errno;
     for (const int end : ends) close(end);
-    throw std::system_error(error, std::generic_category(), "no memory for the guardian");
+    throw std::system_error(error, std::generic_category(), "cannot allocate memory for the guardian process");
   }
   hearts_ = new (shared) Heartbeat[kDevices];
   std::promise<pid_t> forked;
@@ -261,7 +261,7 @@ Guardian::Guardian(const std::function<void()>& on_start) {
     close(ends[0]);
     parent_.join();
     munmap(hearts_, kDevices * sizeof(Heartbeat));
-    throw std::system_error(pid_ < 0 ? -pid_ : ECHILD, std::generic_category(), "no process for the guardian");
+    throw std::system_error(pid_ < 0 ? -pid_ : ECHILD, std::generic_category(), "cannot start the guardian process");
   }
   socket_ = ends[0];
 }

@@ -67,25 +67,25 @@ std::string_view to_string(SafetyFault fault) noexcept {
     case SafetyFault::kNone:
       return "none";
     case SafetyFault::kForceNotFinite:
-      return "a force was asked for that is not a number";
+      return "a requested force is not a finite number";
     case SafetyFault::kPositionNotFinite:
-      return "the device measured a position that is not a number";
+      return "a measured position is not a finite number";
     case SafetyFault::kPositionJumped:
-      return "the device's position has jumped further than a hand can move";
+      return "the position has jumped further than a hand can move";
     case SafetyFault::kTooFast:
-      return "the handle was faster than a hand that holds it";
+      return "the handle was faster than speed_trip allows";
     case SafetyFault::kCommandSilent:
       return "no force was commanded in time";
     case SafetyFault::kDeviceSilent:
-      return "the device gave no position in time";
+      return "the device sent no position in time";
     case SafetyFault::kDeviceLost:
       return "the device was unplugged or has lost its origin";
     case SafetyFault::kNoRotation:
-      return "the device measured an orientation that is no rotation";
+      return "a measured orientation is not a rotation";
     case SafetyFault::kTurnsTooFast:
-      return "the handle turned faster than a hand that holds it";
+      return "the handle turned faster than turn_trip allows";
     case SafetyFault::kGuardianLost:
-      return "the guardian process was killed or stopped; if it was killed, start the server again";
+      return "the guardian process was killed or stopped; if it was killed, restart the server";
   }
   return "unknown";
 }
@@ -114,7 +114,7 @@ SafeDevice::SafeDevice(const Config& config, Device& device)
   expect_above_zero(arming_.rest_torque, "arming.rest_torque");
   expect_above_zero(seconds(arming_.patience), "arming.patience");
   if (arming_.by == Arming::By::kDeadMan && !dead_man_) {
-    throw std::invalid_argument("dead_man: expected to be listed, because the device is armed by its button");
+    throw std::invalid_argument("dead_man: expected this table, because the device is armed by its button");
   }
   info_ = limited_info(device.info(), force_limit_, torque_limit_, grip_limit_);
   if (arming_.by == Arming::By::kStart) request_until_ = LocalTime::max();

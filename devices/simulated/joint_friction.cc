@@ -96,7 +96,7 @@ JointFriction::JointFriction(const Config& config)
     expect_not_negative(viscous_[i], "joint_friction.viscous" + joint);
   }
   expect(coulomb_.sum() + viscous_.sum() > 0, "joint_friction.coulomb", 0,
-         "friction in one of the joints at least (left out when there is none)");
+         "friction in at least one joint (omit joint_friction if there is none)");
 }
 
 Friction JointFriction::least() const noexcept {

@@ -10,7 +10,7 @@ namespace tendon {
 
 OperatorHand::OperatorHand(Config config) : config_(std::move(config)) {
   expect(config_.stiffness > 0 && std::isfinite(config_.stiffness), "hand.stiffness", config_.stiffness,
-         "a number above 0 N/m (a device without a hand has no hand)");
+         "a number above 0 N/m (omit the hand for a device without one)");
   expect(config_.damping >= 0 && std::isfinite(config_.damping), "hand.damping", config_.damping, "0 N·s/m or more");
   expect(config_.mass >= 0 && std::isfinite(config_.mass), "hand.mass", config_.mass, "0 kg or more");
 }

@@ -43,7 +43,7 @@ struct Prepare {
     expect(s.points.size() >= 2, "minimum_jerk.points (their number)", static_cast<double>(s.points.size()),
            "2 or more");
     expect(s.durations.size() + 1 == s.points.size(), "minimum_jerk.durations (their number)",
-           static_cast<double>(s.durations.size()), "one fewer than points, one per leg");
+           static_cast<double>(s.durations.size()), "one fewer than points");
     for (const Vec3& p : s.points) expect_finite(p, "minimum_jerk.points");
     for (const Duration d : s.durations) {
       expect(d > Duration::zero(), "minimum_jerk.durations", seconds(d), "durations above 0 s");
@@ -56,7 +56,7 @@ struct Prepare {
     for (std::size_t i = 0; i < s.samples.size(); ++i) {
       expect(std::isfinite(s.samples[i].x), "recorded.samples.x", s.samples[i].x, "a finite number");
       expect(std::isfinite(s.samples[i].t) && (i == 0 || s.samples[i].t > s.samples[i - 1].t), "recorded.samples.t",
-             s.samples[i].t, "a time after that of the sample before");
+             s.samples[i].t, "a time later than that of the previous sample");
     }
     expect_finite(s.origin, "recorded.origin");
     s.direction = unit(s.direction, "recorded.direction");

@@ -19,8 +19,7 @@ namespace {
 
 void expect_effect(const std::optional<double>& value, std::string_view field) {
   if (!value) return;
-  expect(*value > 0 && std::isfinite(*value), field, *value,
-         "a number above 0 (left out when there is no such effect)");
+  expect(*value > 0 && std::isfinite(*value), field, *value, "a number above 0 (omit it to disable this effect)");
 }
 
 /// Limits the norm. Divides by the largest component first, because the square of a large force may overflow.
@@ -49,12 +48,12 @@ void check(const SimulatedDevice::Config::Press& press) {
 void expect_delay(const std::optional<Duration>& delay, std::string_view field) {
   if (!delay) return;
   expect(*delay > Duration::zero() && *delay <= SimulatedDevice::kMostDelay, field, seconds(*delay),
-         "above 0 s, and 0.1 s at most (left out when there is none)");
+         "above 0 s, at most 0.1 s (omit it if there is none)");
 }
 
 void check(const SimulatedDevice::Config::StructuralMode& mode, double mass) {
   expect(mode.handle_mass > 0 && mode.handle_mass < mass, "structural_mode.handle_mass", mode.handle_mass,
-         "above 0 kg and below the mass of " + shortest(mass) + " kg, of which it is the part that the hand holds");
+         "above 0 kg and below the mass of " + shortest(mass) + " kg");
   expect_above_zero(mode.stiffness, "structural_mode.stiffness");
   expect_not_negative(mode.damping, "structural_mode.damping");
 }
@@ -72,7 +71,7 @@ SimulatedDevice::SimulatedDevice(Config config) : config_(std::move(config)) {
   expect_effect(config_.coulomb_friction, "coulomb_friction");
   if (config_.joint_friction) {
     expect(!config_.coulomb_friction, "coulomb_friction", config_.coulomb_friction.value_or(0),
-           "none besides the friction in the joints");
+           "none in addition to joint_friction");
     joints_.emplace(*config_.joint_friction);
   }
   if (config_.structural_mode) check(*config_.structural_mode, config_.mass);
@@ -82,7 +81,7 @@ SimulatedDevice::SimulatedDevice(Config config) : config_(std::move(config)) {
   if (config_.force_sensor) expect_effect(config_.force_sensor->resolution, "force_sensor.resolution");
   if (config_.watchdog) {
     expect(*config_.watchdog > Duration::zero(), "watchdog", seconds(*config_.watchdog),
-           "a duration above 0 s (left out when there is none)");
+           "a duration above 0 s (omit it if there is none)");
   }
   expect_delay(config_.sample_delay, "sample_delay");
   expect_delay(config_.force_delay, "force_delay");
@@ -93,7 +92,7 @@ SimulatedDevice::SimulatedDevice(Config config) : config_(std::move(config)) {
   expect(config_.max_substep > Duration::zero(), "max_substep", seconds(config_.max_substep), "a duration above 0 s");
   if (config_.environment) {
     expect(!config_.structural_mode, "structural_mode.handle_mass",
-           config_.structural_mode ? config_.structural_mode->handle_mass : 0, "none beside an environment");
+           config_.structural_mode ? config_.structural_mode->handle_mass : 0, "none with an environment");
     environment_.emplace(*std::exchange(config_.environment, std::nullopt));
   }
   if (config_.hand) hand_.emplace(*std::exchange(config_.hand, std::nullopt));
@@ -101,7 +100,7 @@ SimulatedDevice::SimulatedDevice(Config config) : config_(std::move(config)) {
   if (config_.amplifier_bandwidth) amplifier_force_ = Vec3::Zero();
   if (config_.lets_go_after) {
     expect(*config_.lets_go_after >= Duration::zero() && hand_, "hand.lets_go_after", seconds(*config_.lets_go_after),
-           "0 s or more, of a device with a hand");
+           "0 s or more, for a device with a hand");
   }
   choose_substeps();
 

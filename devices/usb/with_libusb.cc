@@ -76,7 +76,7 @@ using Handle = std::unique_ptr<libusb_device_handle, Free>;
 Context make_context() {
   libusb_context* context = nullptr;
   if (const int error = libusb().init(&context); error != LIBUSB_SUCCESS) {
-    throw std::runtime_error(std::string("this machine has no USB that can be used: ") + libusb().strerror(error));
+    throw std::runtime_error(std::string("cannot use USB on this machine: ") + libusb().strerror(error));
   }
   return Context(context);
 }
@@ -331,7 +331,7 @@ bool LibusbPipe::open() {
     error = libusb().claim_interface(handle, 0);
   }
   if (error != LIBUSB_SUCCESS) {
-    tell(std::string("the USB device cannot be used, is it in use elsewhere? ") + libusb().strerror(error));
+    tell(std::string("cannot use the USB device; is another program using it? ") + libusb().strerror(error));
     close_node();
     return false;
   }

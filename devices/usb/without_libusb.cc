@@ -7,8 +7,7 @@ namespace tendon::usb {
 namespace {
 
 [[noreturn]] void refuse() {
-  throw std::runtime_error(
-      "this build knows no USB: it was made without libusb; install libusb-1.0-0-dev and configure it again");
+  throw std::runtime_error("this build does not support USB; install libusb-1.0-0-dev, then configure and build again");
 }
 
 }  // namespace

@@ -74,7 +74,7 @@ const Control* IncomingRequests::next() {
     if (mine.control.request) return &mine.control;
     const std::string_view field = mine.control.invalid;
     if (field.empty()) {
-      answer({mine.control.id, Code::kUnsupported, "this version does not know that request"});
+      answer({mine.control.id, Code::kUnsupported, "this version does not support this request"});
     } else {
       answer({mine.control.id, Code::kInvalid, std::string(field) + " is out of bounds"});
     }

@@ -69,7 +69,7 @@ Key parse_key(std::string_view digits) {
   for (std::size_t i = 0; i < key.bytes().size(); ++i) {
     const auto high = digit(digits[2 * i]);
     const auto low = digit(digits[2 * i + 1]);
-    if (!high || !low) throw std::invalid_argument("the key holds something else than hexadecimal digits");
+    if (!high || !low) throw std::invalid_argument("the key contains characters that are not hexadecimal digits");
     key.bytes()[i] = static_cast<std::byte>(*high << 4U | *low);
   }
   return key;
@@ -99,8 +99,8 @@ ClientKey read_key_file(std::string_view text, unsigned mode, std::string name) 
   constexpr unsigned kOthers = 077;
   if ((mode & kOthers) != 0) {
     throw std::invalid_argument(
-        "others than its owner may read or write this key; `chmod 600` it, and make a new one if "
-        "others may have read it");
+        "other users can read or write this key; run `chmod 600` on it, and create a new key if others may have read "
+        "it");
   }
   const std::vector<std::string_view> words = only_line(text);
   ClientKey key;
@@ -110,11 +110,11 @@ ClientKey read_key_file(std::string_view text, unsigned mode, std::string name) 
   } else if (words[0] == "observer") {
     key.role = Role::kObserver;
   } else {
-    throw std::invalid_argument(std::string(kExpected) + ", but the line begins with neither");
+    throw std::invalid_argument(std::string(kExpected) + ", got a line that begins with neither");
   }
   key.key = parse_key(words[1]);
   if (const auto weak = weakness(key.key)) {
-    throw std::invalid_argument("the key is weak: " + *weak + "; make one with `tendond keygen NAME`");
+    throw std::invalid_argument("the key is weak: " + *weak + "; create one with `tendond keygen NAME`");
   }
   return key;
 }
@@ -130,7 +130,7 @@ std::optional<std::string> weakness(const Key& key) {
   if (values.size() < kFewestDifferent) return "it repeats the same few bytes";
   if (steps.size() < kFewestDifferent) return "its bytes follow a pattern";
   const auto printable = [](std::byte b) { return b >= std::byte{0x20} && b < std::byte{0x7F}; };
-  if (std::all_of(bytes.begin(), bytes.end(), printable)) return "it is text that somebody has typed";
+  if (std::all_of(bytes.begin(), bytes.end(), printable)) return "it is typed text";
   return std::nullopt;
 }
 

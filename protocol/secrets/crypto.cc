@@ -64,7 +64,7 @@ Key::~Key() { sodium_memzero(bytes_.data(), bytes_.size()); }
 namespace crypto {
 
 void start() {
-  if (sodium_init() < 0) throw std::runtime_error("libsodium cannot be initialised");
+  if (sodium_init() < 0) throw std::runtime_error("cannot initialize libsodium");
 }
 
 Bytes32 sha256(Pieces message) noexcept {

@@ -35,12 +35,12 @@ std::string names_of(const Suites& suites) {
 
 void expect_speakable(const Suites& suites) {
   const Suites here = suites_of_this_machine();
-  if (suites.empty()) throw std::invalid_argument("no suite to seal by: expected some of " + names_of(here));
+  if (suites.empty()) throw std::invalid_argument("no cipher suite: expected at least one of " + names_of(here));
   for (const Suite suite : suites) {
     if (contains(here, suite)) continue;
     throw std::invalid_argument(suite == Suite::kAesGcm
                                     ? "this processor has no AES instructions: expected " + names_of(here)
-                                    : "expected suites that seal: " + names_of(here));
+                                    : "expected suites with encryption: " + names_of(here));
   }
 }
 

@@ -94,14 +94,14 @@ bool is_finite(const ForceCommand& command) noexcept {
 std::string_view objection(const ForceCommand& command) noexcept {
   if (in_bounds(command)) return {};
   if (!command.force.allFinite()) return "the force is not finite (NaN or infinity)";
-  if (!all_bounded(command.force)) return "the force is beyond 1e12 N";
+  if (!all_bounded(command.force)) return "the force exceeds 1e12 N";
   if (command.torque && !command.torque->torque.allFinite()) return "the torque is not finite (NaN or infinity)";
-  if (command.torque && !all_bounded(command.torque->torque)) return "the torque is beyond 1e12 N·m";
+  if (command.torque && !all_bounded(command.torque->torque)) return "the torque exceeds 1e12 N·m";
   if (command.torque && !in_bounds(*command.torque)) {
-    return "its rotation model has a number beyond its bound (WIRE.md), or its orientation is not of length 1";
+    return "its rotation model has a number out of bounds (WIRE.md), or an orientation whose length is not 1";
   }
-  if (command.grip_force && !bounded(*command.grip_force)) return "the grip force is not finite, or beyond 1e12 N";
-  return "its stiffness, radius, contact or error is not finite, or out of the bounds of WIRE.md";
+  if (command.grip_force && !bounded(*command.grip_force)) return "the grip force is not finite, or exceeds 1e12 N";
+  return "its stiffness, radius, contact or error is not finite, or out of the bounds in WIRE.md";
 }
 
 }  // namespace tendon

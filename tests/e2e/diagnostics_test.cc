@@ -171,7 +171,7 @@ max_m_per_s = 0.05
   }));
   EXPECT_EQ(watcher.client().device_report()->fault, "");
   ASSERT_TRUE(turn_until({&watcher, &engine}, [&] { return reported(Safety::kFault); }));
-  EXPECT_EQ(watcher.client().device_report()->fault, "the handle was faster than a hand that holds it");
+  EXPECT_EQ(watcher.client().device_report()->fault, "the handle was faster than speed_trip allows");
   const std::string told = server.process().wait_for_line("the steps before the fault are ");
   EXPECT_NE(told.find(" are saved in tendon.fault-1.mcap"), std::string::npos) << told;
   EXPECT_FALSE(read_recording(folder.path() / "tendon.fault-1.mcap").steps.empty());

@@ -141,10 +141,10 @@ TEST(Security, AKeyThatOthersMayReadIsRefusedByServerAndClient) {
   std::filesystem::permissions(lab.key("wall"), std::filesystem::perms(0644));
   Process server(program("tendond"), {lab.scene(), "--duration-s", "1"}, lab.folder());
   EXPECT_EQ(server.wait(), 1);
-  EXPECT_NE(server.err().find("wall.key: others than its owner may read"), std::string::npos) << server.err();
+  EXPECT_NE(server.err().find("wall.key: other users can read or write this key"), std::string::npos) << server.err();
   Process client(program("virtual_wall"), {"--key", lab.key("wall")}, lab.folder());
   EXPECT_EQ(client.wait(), 1);
-  EXPECT_NE(client.err().find("wall.key: others than its owner may read"), std::string::npos) << client.err();
+  EXPECT_NE(client.err().find("wall.key: other users can read or write this key"), std::string::npos) << client.err();
 }
 
 TEST(Security, KeygenSaysWhereTheKeyGoesAndWhatTheSceneNeeds) {

@@ -50,14 +50,14 @@ TEST(Discovery, ANameHas63BytesOfUtf8WithoutControlCharacters) {
 
 TEST(Discovery, WhatIsNoNameIsRefusedWithTheReason) {
   EXPECT_EQ(refusal("a\\"), R"(expected NAME or NAME.DOMAIN like "falcon at bench 3", got "a\": )"
-                            "a backslash at the end escapes nothing");
+                            "a backslash must not be the last character");
   EXPECT_NE(refusal("a\\25").find("three digits"), std::string::npos);
   EXPECT_NE(refusal("a\\256").find("three digits"), std::string::npos);
   EXPECT_NE(refusal("a\\027").find("without control characters"), std::string::npos);
   EXPECT_NE(refusal(std::string(64, 'a')).find("63 bytes"), std::string::npos);
   const std::string too_long(64, 'a');
   for (const std::string_view domain : {".", "..", "a..b", "exa mple", "a/b", "-.\n", too_long.c_str()}) {
-    EXPECT_NE(refusal("a." + std::string(domain)).find("after the first dot comes a domain"), std::string::npos)
+    EXPECT_NE(refusal("a." + std::string(domain)).find("after the first dot must be a domain"), std::string::npos)
         << domain;
   }
   std::string of_254_bytes(62, 'a');

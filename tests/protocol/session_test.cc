@@ -434,7 +434,7 @@ TEST_F(TwoEnds, ASilentPeerIsGoneAfterTheTimeoutAndNotBefore) {
   const auto at_z = events(z_);
   ASSERT_EQ(at_z.size(), 1U);
   EXPECT_EQ(std::get<Session::Closed>(at_z[0]).code, Code::kTimedOut);
-  EXPECT_EQ(std::get<Session::Closed>(at_z[0]).reason, "nothing heard for 2000 ms");
+  EXPECT_EQ(std::get<Session::Closed>(at_z[0]).reason, "nothing received for 2000 ms");
   EXPECT_TRUE(pull(z_, now_ + seconds(3)).empty());
   EXPECT_EQ(z_.next_tick(), LocalTime::max());
 }

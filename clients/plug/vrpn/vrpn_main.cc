@@ -66,7 +66,7 @@ vrpn::Server::Config config_of(VrpnOptions& options) {
   for (std::size_t i = 0; i < config.names.size(); ++i) {
     for (std::size_t k = 0; k < i; ++k) {
       if (config.names[i].name == config.names[k].name) {
-        throw std::runtime_error("--name " + config.names[i].name + ": it is there twice");
+        throw std::runtime_error("--name " + config.names[i].name + ": it occurs twice");
       }
     }
   }

@@ -44,22 +44,22 @@ class Answer:
         if not _usable(self.force):
             if not all(map(math.isfinite, self.force)):
                 return "the force is not finite (NaN or infinity)"
-            return f"the force is beyond {limits.MAX_VALUE:g} N"
+            return "the force exceeds 1e12 N"
         if self.torque is not None and not all(map(math.isfinite, self.torque)):
             return "the torque is not finite (NaN or infinity)"
         if self.torque is not None and not _usable(self.torque):
-            return f"the torque is beyond {limits.MAX_VALUE:g} N·m"
+            return "the torque exceeds 1e12 N·m"
         if self.angular_stiffness is not None and not all(map(_usable, self.angular_stiffness)):
-            return "its angular stiffness is not finite, or beyond the bound of WIRE.md"
+            return "its angular stiffness is not finite, or out of the bounds in WIRE.md"
         if self.grip_force is not None and not abs(self.grip_force) <= limits.MAX_VALUE:
-            return f"the grip force is not finite, or beyond {limits.MAX_VALUE:g} N"
+            return "the grip force is not finite, or exceeds 1e12 N"
         if (
             (self.stiffness is not None and not all(map(_usable, self.stiffness)))
             or (self.contact is not None and not codec.is_contact(self.contact))
             or not codec.is_radius(self.valid_radius)
             or (self.error is not None and not 0 <= self.error <= limits.MAX_VALUE)
         ):
-            return "its stiffness, radius, contact or error is not finite, or out of the bounds of WIRE.md"
+            return "its stiffness, radius, contact or error is not finite, or out of the bounds in WIRE.md"
         return ""
 
     def local_model(self, at: Vec3) -> LocalModel | None:

@@ -20,10 +20,13 @@ def read_key(file: Path | str) -> bytes:
     weak; OSError if it is unreadable or not a regular file; PermissionError if other users may read it.
     """
     if not stat.S_ISREG(os.stat(file).st_mode):  # check before opening, because opening a pipe would block
-        raise OSError(f"{file}: cannot read this key: it is not a regular file")
+        raise OSError(f"cannot read key file {file}: it is not a regular file")
     with open(file, encoding="utf-8-sig") as text:
         if os.name == "posix" and os.fstat(text.fileno()).st_mode & (stat.S_IRWXG | stat.S_IRWXO):
-            raise PermissionError(f"{file}: others may read this key; chmod 600 {file}")
+            raise PermissionError(
+                f"{file}: other users can read or write this key; run `chmod 600` on it, and create a new key if others "
+                "may have read it"
+            )
         lines = [line.split() for line in text if line.strip() and not line.lstrip().startswith("#")]
     match lines:
         case [["controller" | "observer", digits]] if _DIGITS.fullmatch(digits):
@@ -31,7 +34,7 @@ def read_key(file: Path | str) -> bytes:
         case _:
             raise ValueError(f"{file}: expected one line, `controller` or `observer` and 64 hexadecimal digits")
     if _weak(key):
-        raise ValueError(f"{file}: the key is weak; make one with `tendond keygen NAME`")
+        raise ValueError(f"{file}: the key is weak; create one with `tendond keygen NAME`")
     return key
 
 

@@ -105,7 +105,7 @@ class IncomingRequests:
             if control.invalid:
                 self.answer(ControlAck(control.id, Code.INVALID, f"{control.invalid} is out of bounds"))
             else:
-                self.answer(ControlAck(control.id, Code.UNSUPPORTED, "this version does not know that request"))
+                self.answer(ControlAck(control.id, Code.UNSUPPORTED, "this version does not support this request"))
         return None
 
     def answer(self, ack: ControlAck) -> None:

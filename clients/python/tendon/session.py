@@ -200,10 +200,10 @@ class Session:
             return
         if now - self._last_heard >= TIMEOUT_NS:
             self.open = False
-            self._closed = Closed(Code.TIMED_OUT, f"nothing heard for {TIMEOUT_NS // 1_000_000} ms")
+            self._closed = Closed(Code.TIMED_OUT, f"nothing received for {TIMEOUT_NS // 1_000_000} ms")
             self.has_events = True
         elif now >= self._expires or self.stats.forged >= limits.MAX_FORGED:
-            self._closed = Closed(Code.EXPIRED, "the session has reached its age")
+            self._closed = Closed(Code.EXPIRED, "the session has reached its maximum age")
             self.has_events = True
             self.close(self._closed.code, self._closed.reason)
 

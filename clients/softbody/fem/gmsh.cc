@@ -161,7 +161,7 @@ class Reader {
     const double y = words_.number();
     const double z = words_.number();
     if (!content_.nodes.try_emplace(number, x, y, z).second) {
-      words_.fail("node " + std::to_string(number) + " is there twice");
+      words_.fail("node " + std::to_string(number) + " occurs twice");
     }
   }
 

@@ -2,7 +2,6 @@
 // Result of a haptic function, its validation, and the part that a server supports.
 import { isBounded, isError, isRadius, isStiffness, isVec3 } from "./bounds.js";
 import { isContact } from "./codec.js";
-import { kMaxValue } from "./limits.js";
 import {
   kFeatureHandle, kFeatureLocalModel, type Contact, type DeviceState, type ForceCommand, type Stiffness, type Vec3,
 } from "./messages.js";
@@ -45,7 +44,7 @@ export interface Touch {
 
 const objectionTo = (what: string, { x, y, z }: Vec3, unit: string): string =>
   [x, y, z].every(Number.isFinite)
-    ? `the ${what} is beyond ${kMaxValue} ${unit}`
+    ? `the ${what} exceeds 1e12 ${unit}`
     : `the ${what} is not finite (NaN or infinity)`;
 
 /** Returns why an answer is unusable, or an empty string. */
@@ -54,14 +53,14 @@ export function objection(touch: Touch): string {
   if (!isVec3(force)) return objectionTo("force", force, "N");
   if (torque && !isVec3(torque)) return objectionTo("torque", torque, "N·m");
   if (angularStiffness && !isStiffness(angularStiffness)) {
-    return "its angular stiffness is not finite, or out of the bounds of WIRE.md";
+    return "its angular stiffness is not finite, or out of the bounds in WIRE.md";
   }
   if (gripForce !== undefined && !isBounded(gripForce)) {
-    return `the grip force is not finite, or beyond ${kMaxValue} N`;
+    return "the grip force is not finite, or exceeds 1e12 N";
   }
   const good = (!stiffness || isStiffness(stiffness)) && isRadius(validRadius) && (!contact || isContact(contact)) &&
     isError(error);
-  return good ? "" : "its stiffness, radius, contact or error is not finite, or out of the bounds of WIRE.md";
+  return good ? "" : "its stiffness, radius, contact or error is not finite, or out of the bounds in WIRE.md";
 }
 
 /** Returns the part of an answer that a server with these features supports, and a description of the rest. */

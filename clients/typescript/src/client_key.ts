@@ -12,7 +12,9 @@ export function readClientKey(file: string): ClientKey {
     if (!status.isFile()) throw new RangeError("it is not a regular file"); // opening a pipe would block
     // Windows has no permission bits; all are set there.
     if (process.platform !== "win32" && (status.mode & 0o077) !== 0) {
-      throw new RangeError(`others may read this key: run \`chmod 600 ${file}\``);
+      throw new RangeError(
+        "other users can read or write this key; run `chmod 600` on it, and create a new key if others may have read it",
+      );
     }
     return parseKeyFile(readFileSync(file, "utf8"));
   } catch (error) {

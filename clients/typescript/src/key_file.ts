@@ -23,14 +23,14 @@ export function parseKeyFile(text: string): ClientKey {
   const [word, digits, ...more] = (lines[0] ?? "").split(/[ \t]+/);
   if (digits === undefined || more.length > 0) throw new RangeError(kExpected);
   const role = word === "controller" ? Role.CONTROLLER : word === "observer" ? Role.OBSERVER : undefined;
-  if (role === undefined) throw new RangeError(`${kExpected}, but the line begins with neither`);
+  if (role === undefined) throw new RangeError(`${kExpected}, got a line that begins with neither`);
   if (digits.length !== 2 * kKeySize) {
     throw new RangeError(`the key is too ${digits.length < 2 * kKeySize ? "short" : "long"}: ${kExpected}`);
   }
-  if (!/^[0-9a-f]*$/i.test(digits)) throw new RangeError("the key holds something else than hexadecimal digits");
+  if (!/^[0-9a-f]*$/i.test(digits)) throw new RangeError("the key contains characters that are not hexadecimal digits");
   const key = Uint8Array.from({ length: kKeySize }, (_, i) => Number.parseInt(digits.slice(2 * i, 2 * i + 2), 16));
   const weak = weakness(key);
-  if (weak) throw new RangeError(`the key is weak: ${weak}; make one with \`tendond keygen NAME\``);
+  if (weak) throw new RangeError(`the key is weak: ${weak}; create one with \`tendond keygen NAME\``);
   return { role, key };
 }
 
@@ -39,6 +39,6 @@ function weakness(key: Uint8Array): string | undefined {
   if (new Set(key).size < kFewestDifferent) return "it repeats the same few bytes";
   const steps = new Set(Array.from(key.subarray(1), (byte, i) => (byte - key[i]!) & 0xff));
   if (steps.size < kFewestDifferent) return "its bytes follow a pattern";
-  if (key.every((byte) => byte >= 0x20 && byte < 0x7f)) return "it is text that somebody has typed";
+  if (key.every((byte) => byte >= 0x20 && byte < 0x7f)) return "it is typed text";
   return undefined;
 }

@@ -103,7 +103,7 @@ export class IncomingRequests {
       const { id, request, invalid } = mine.control;
       if (request) return { id, request };
       this.answer(invalid === undefined
-        ? { id, code: Code.UNSUPPORTED, detail: "this version does not know that request" }
+        ? { id, code: Code.UNSUPPORTED, detail: "this version does not support this request" }
         : { id, code: Code.INVALID, detail: `${invalid} is out of bounds` });
     }
     return undefined;

@@ -240,12 +240,12 @@ export class Session {
     if (!this.#open) return;
     if (now - this.#lastHeard >= timeout) {
       this.#open = false;
-      this.#closed = { kind: "closed", code: Code.TIMED_OUT, reason: `nothing heard for ${toMilliseconds(timeout)} ms` };
+      this.#closed = { kind: "closed", code: Code.TIMED_OUT, reason: `nothing received for ${toMilliseconds(timeout)} ms` };
     } else if (
       seal.suite !== CipherSuite.Plain &&
       (now - this.#opened >= life || this.#nextPacket >= kMaxPacketNumber || this.stats.forged >= kMaxForged)
     ) {
-      const reason = "the session has reached its age";
+      const reason = "the session has reached its maximum age";
       this.close(Code.EXPIRED, reason);
       this.#closed = { kind: "closed", code: Code.EXPIRED, reason };
     }

@@ -44,7 +44,7 @@ GripCoupling::GripCoupling(const Config& config, const End& end, const PoseMap& 
   expect_not_negative(config.damping, "grip.damping");
   if (end.adapts) {
     expect(config.damping > 0, "grip.damping", config.damping,
-           "a number above 0 N·s/m, because adapt_to_delay lowers the stiffness to 2 B over the round trip");
+           "a number above 0 N·s/m, because adapt_to_delay limits the stiffness to 2 B divided by the round-trip time");
   }
   expect_above_zero(config.speed, "grip.speed");
   expect_above_zero(config.arm, "grip.arm");

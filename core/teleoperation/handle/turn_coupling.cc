@@ -29,7 +29,8 @@ TurnCoupling::TurnCoupling(const Config& config, const End& end, const PoseMap& 
   expect_not_negative(config.damping, "turn.damping");
   if (end.adapts) {
     expect(config.damping > 0, "turn.damping", config.damping,
-           "a number above 0 N·m·s/rad, because adapt_to_delay lowers the stiffness to 2 B over the round trip");
+           "a number above 0 N·m·s/rad, because adapt_to_delay limits the stiffness to 2 B divided by the round-trip "
+           "time");
   }
   expect(config.max_torque > 0, "turn.max_torque", config.max_torque, "a number above 0 N·m, or infinity");
 }

@@ -31,7 +31,7 @@ SurfaceEstimator<N>::SurfaceEstimator(const Config& config) : config_(config) {
   expect_not_negative(config.position_noise, "position_noise");
   expect_above_zero(config.memory, "memory");
   expect(config.max_stiffness >= config.first_stiffness, "max_stiffness", config.max_stiffness,
-         "no less than first_stiffness, " + shortest(config.first_stiffness) + " N/m");
+         "at least first_stiffness, " + shortest(config.first_stiffness) + " N/m");
 }
 
 template <int N>

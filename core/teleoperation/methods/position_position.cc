@@ -31,7 +31,7 @@ PositionPosition<N>::PositionPosition(const Config& config)
   expect_not_negative(config.own_damping, "own_damping");
   if (config.adapt_to_delay) {
     expect(config.own_damping > 0, "own_damping", config.own_damping,
-           "a number above 0 N·s/m, because adapt_to_delay lowers the stiffness to 2 B over the round trip");
+           "a number above 0 N·s/m, because adapt_to_delay limits the stiffness to 2 B divided by the round-trip time");
   }
   expect_above_zero(seconds(config.period), "period");
   expect_above_zero(seconds(config.recovery), "recovery");

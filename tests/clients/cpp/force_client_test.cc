@@ -371,18 +371,18 @@ TEST(ForceClient, SaysWhyAnAnswerIsNotSent) {
     return world.a->stats().unusable;
   };
   EXPECT_EQ(reason(Vec3(0, kNan, 0)), "the force is not finite (NaN or infinity)");
-  EXPECT_EQ(reason(Vec3(0, 0, -2e12)), "the force is beyond 1e12 N");
+  EXPECT_EQ(reason(Vec3(0, 0, -2e12)), "the force exceeds 1e12 N");
   Touch stiff = Vec3(1, 0, 0);
   stiff.stiffness = Mat3::Constant(kInf);
   Touch twisted = Vec3(1, 0, 0);
   twisted.torque = Vec3(kNan, 0, 0);
   EXPECT_EQ(reason(twisted), "the torque is not finite (NaN or infinity)");
   twisted.torque = Vec3(2e12, 0, 0);
-  EXPECT_EQ(reason(twisted), "the torque is beyond 1e12 N·m");
+  EXPECT_EQ(reason(twisted), "the torque exceeds 1e12 N·m");
   Touch gripped = Vec3(1, 0, 0);
   gripped.grip_force = -kInf;
-  EXPECT_EQ(reason(gripped), "the grip force is not finite, or beyond 1e12 N");
-  EXPECT_EQ(reason(stiff), "its stiffness, radius, contact or error is not finite, or out of the bounds of WIRE.md");
+  EXPECT_EQ(reason(gripped), "the grip force is not finite, or exceeds 1e12 N");
+  EXPECT_EQ(reason(stiff), "its stiffness, radius, contact or error is not finite, or out of the bounds in WIRE.md");
 }
 
 TEST(ForceClient, ADeadbandLeavesOutForcesThatFeelAlikeInTime) {

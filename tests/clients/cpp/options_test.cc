@@ -130,9 +130,9 @@ TEST(CommandLine, AKeyThatIsAPipeOrAFolderIsRefusedAtOnce) {
   ::unlink(pipe.c_str());
   ::rmdir(folder.c_str());
   EXPECT_EQ(of_pipe.exit_code, 1);
-  EXPECT_NE(of_pipe.err.find(pipe + ": cannot read this key: it is not a regular file"), std::string::npos);
+  EXPECT_NE(of_pipe.err.find("cannot read key file " + pipe + ": it is not a regular file"), std::string::npos);
   EXPECT_EQ(of_folder.exit_code, 1);
-  EXPECT_NE(of_folder.err.find(folder + ": cannot read this key: it is a folder"), std::string::npos);
+  EXPECT_NE(of_folder.err.find("cannot read key file " + folder + ": it is a folder"), std::string::npos);
   EXPECT_EQ(of_nothing.exit_code, 1);
   EXPECT_NE(of_nothing.err.find("No such file or directory"), std::string::npos);
 }

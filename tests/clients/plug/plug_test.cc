@@ -177,9 +177,9 @@ TEST(Plug, SaysOnceWhyAForceIsNotSent) {
   const auto push = [&] { plug.push(kOld, world.now, world.now + milliseconds(100), Vec3(0, 1e13, 0)); };
   world.run(200, push);
   EXPECT_GT(plug.forces_unusable(), 1U);
-  EXPECT_TRUE(one_has(sentences_of(plug), "the force is beyond 1e12 N"));
+  EXPECT_TRUE(one_has(sentences_of(plug), "the force exceeds 1e12 N"));
   world.run(200, push);
-  EXPECT_FALSE(one_has(sentences_of(plug), "the force is beyond 1e12 N"));
+  EXPECT_FALSE(one_has(sentences_of(plug), "the force exceeds 1e12 N"));
 }
 
 TEST(Plug, ThatObservesSendsNothing) {

@@ -385,7 +385,7 @@ def test_an_answer_to_a_state_that_did_not_come_is_not_sent():
     stage.client.send(hand, Touch((1, 0, 0)))
     assert stage.client.stats.unusable == f"it answers tick {hand.tick}, which has not come"
     stage.client.send(stage.seen[-1], Touch((0, -2e12, 0)))
-    assert stage.client.stats.unusable == "the force is beyond 1e+12 N"
+    assert stage.client.stats.unusable == "the force exceeds 1e12 N"
     assert stage.client.stats.forces_unusable == 2
     assert len(stage.forces) == sent
 

@@ -58,9 +58,9 @@ def test_what_cannot_be_sent_is_said_and_the_force_is_sent(knows):
     "touch, why",
     [
         (Touch(torque=(nan, 0, 0)), "the torque is not finite (NaN or infinity)"),
-        (Touch(torque=(0, -2e12, 0)), "the torque is beyond 1e+12 N·m"),
-        (Touch(angular_stiffness=inf), "its angular stiffness is not finite, or beyond the bound of WIRE.md"),
-        (Touch(grip_force=nan), "the grip force is not finite, or beyond 1e+12 N"),
+        (Touch(torque=(0, -2e12, 0)), "the torque exceeds 1e12 N·m"),
+        (Touch(angular_stiffness=inf), "its angular stiffness is not finite, or out of the bounds in WIRE.md"),
+        (Touch(grip_force=nan), "the grip force is not finite, or exceeds 1e12 N"),
     ],
 )
 def test_an_answer_that_is_not_usable_is_not_sent(touch, why):

@@ -156,7 +156,7 @@ def test_silence_of_2_s_ends_the_session():
     assert session.open
     session.tick(2 * SECOND)
     assert not session.open
-    assert session.next_event() == Closed(Code.TIMED_OUT, "nothing heard for 2000 ms")
+    assert session.next_event() == Closed(Code.TIMED_OUT, "nothing received for 2000 ms")
     assert session.next_event() is None
     assert session.next_turn() == NEVER
 
@@ -179,7 +179,7 @@ def test_a_sealed_session_ends_after_24_h_and_says_so():
     ours.tick(now - 1)
     assert ours.open and ours.next_turn() == now - 1
     ours.tick(now)
-    assert ours.next_event() == Closed(Code.EXPIRED, "the session has reached its age")
+    assert ours.next_event() == Closed(Code.EXPIRED, "the session has reached its maximum age")
     byes = []
     while (datagram := ours.next_datagram(now)) is not None:
         byes.append(datagram)

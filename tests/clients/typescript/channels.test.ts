@@ -312,7 +312,7 @@ describe("devices and channels", () => {
   }
 
   it("a server that knows no leases leaves it the channel that it has", () => {
-    const unknown = { code: Code.UNSUPPORTED, detail: "this version does not know that request" };
+    const unknown = { code: Code.UNSUPPORTED, detail: "this version does not support this request" };
     const { seen, world } = controller(1, kFair, {}, answering(() => unknown));
     world.runMs(100);
     assert.equal(world.client.takeLease(), true);

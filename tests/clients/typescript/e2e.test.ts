@@ -235,7 +235,7 @@ describe("the programs", () => {
       ["examples/virtual_wall", ["--server", "[evil.example]:1"], /--server/],
       ["examples/virtual_wall", ["--stiffness-n-per-m", "nan"], /--stiffness-n-per-m: expected 0 to .* got "nan"/],
       ["examples/virtual_wall", ["--key", join(folder, "none")], /--key: .*none: .*no such file/],
-      ["examples/virtual_wall", ["--key", open], /--key: .*others may read this key/],
+      ["examples/virtual_wall", ["--key", open], /--key: .*other users can read or write this key/],
       ["examples/virtual_wall", ["--device", "d".repeat(25)], /--device: expected at most 24 bytes, got 25: "d+"/],
       ["examples/virtual_wall", ["--channel", "ä".repeat(13)], /--channel: expected at most 24 bytes, got 26: "ä+"/],
       ["examples/echo_motion", ["--rate-hz", "-1"], /rate-hz/],

@@ -62,7 +62,7 @@ TEST(Axes, EachOfThe24RightHandedBasesIsReadAndSaidAgain) {
   for (const Mat3& basis : axis_aligned_bases()) {
     const std::string words = words_of(basis);
     if (basis.determinant() < 0) {
-      EXPECT_TRUE(ends_with(refusal(words), "these three make a left-handed frame")) << words;
+      EXPECT_TRUE(ends_with(refusal(words), "these three axes form a left-handed frame")) << words;
       continue;
     }
     ++right_handed;
@@ -80,10 +80,10 @@ TEST(Axes, ARefusalSaysWhatIsWrong) {
   EXPECT_EQ(refusal("right=x up=y"),
             "axes = \"right=x up=y\": expected three words like \"right=x up=y user=z\": user is missing");
   EXPECT_TRUE(ends_with(refusal(""), "right is missing"));
-  EXPECT_TRUE(ends_with(refusal("right=x up=y user=z up=-y"), "up is there twice"));
-  EXPECT_TRUE(ends_with(refusal("right=x up=-x user=z"), "x points two ways"));
+  EXPECT_TRUE(ends_with(refusal("right=x up=y user=z up=-y"), "up occurs twice"));
+  EXPECT_TRUE(ends_with(refusal("right=x up=-x user=z"), "x is used twice"));
   for (const char* word : {"left=x", "right", "right=", "right=w", "right=--x", "right=xy", "=x", "right=-"}) {
-    EXPECT_NE(refusal(std::string(word) + " up=y user=z").find("\"" + std::string(word) + "\" is none of"),
+    EXPECT_NE(refusal(std::string(word) + " up=y user=z").find("\"" + std::string(word) + "\" is not right="),
               std::string::npos)
         << word << ": " << refusal(std::string(word) + " up=y user=z");
   }

@@ -570,7 +570,7 @@ TEST(AolPlus, SaysWhichFieldOfWhichPartCannotBe) {
   EXPECT_EQ(
       complaint(
           {.latency_reserve = {{}}, .bounded_acceleration = {{.most = {300}}}, .shaping = {{.stiffness = {600}}}}),
-      "bounded_acceleration is not proved for forces that are held late: not together with latency_reserve");
+      "bounded_acceleration is not proved for forces that are held late, so it cannot be used with latency_reserve");
 }
 
 }  // namespace

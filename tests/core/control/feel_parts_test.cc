@@ -232,10 +232,9 @@ TEST(Preset, ListsWhatItsPromiseSaysAndNothingThatTheDeviceLacks) {
     const PresetDevice falcon{.friction = {0.02, 0.26}, .longest_hold = milliseconds(1), .encoder_step = 3e-5};
     const PresetParts chosen = preset_parts(preset.preset, falcon);
     const std::string promise = promise_of({.parts = chosen.parts});
-    EXPECT_EQ(promise, preset.preset == Preset::kFeel
-                           ? "passive while the handle accelerates by less than 300 m/s²; a step beyond that counts on "
-                             "friction alone"
-                           : "passive whatever the hand does");
+    EXPECT_EQ(promise, preset.preset == Preset::kFeel ? "passive while the handle accelerates by less than 300 m/s²; a "
+                                                        "step with a higher acceleration only relies on friction"
+                                                      : "passive for every motion of the hand");
     EXPECT_TRUE(chosen.parts.robust_ledger && chosen.learned_model) << preset.name;
     AolPlus<1, 3>({.friction = {falcon.friction}, .longest_hold = falcon.longest_hold, .parts = chosen.parts});
     const PresetParts exact = preset_parts(preset.preset, {.friction = {0.02, 0.26}, .longest_hold = milliseconds(1)});

@@ -66,7 +66,7 @@ TEST(Slide, SaysWhatIsWrongWithARun) {
   EXPECT_EQ(error_of({}), "expected a run of 50 samples or more, found 0");
   RampRun run = ExactRamp{}.run();
   run.samples[7].t = run.samples[6].t;
-  EXPECT_EQ(error_of(run), "sample 7: expected a time after that of the sample before, found 0.006 s");
+  EXPECT_EQ(error_of(run), "sample 7: expected a time later than that of the previous sample, found 0.006 s");
   run = ExactRamp{}.run();
   run.samples[3].force = std::nan("");
   EXPECT_EQ(error_of(run), "sample 3: expected finite numbers");
@@ -79,20 +79,20 @@ TEST(Slide, SaysWhatIsWrongWithARun) {
 TEST(Slide, RefusesARunWithoutMotion) {
   RampRun run = ExactRamp{}.run();
   for (RampSample& sample : run.samples) sample.position = 0.1;
-  EXPECT_EQ(error_of(run), "expected a handle that moves more than 50 encoder counts, found 0");
-  EXPECT_EQ(error_of(run, 0), "expected a handle that moves more than 50 encoder counts, found 0");
+  EXPECT_EQ(error_of(run), "expected a handle that moves by more than 50 encoder counts, found 0");
+  EXPECT_EQ(error_of(run, 0), "expected a handle that moves by more than 50 encoder counts, found 0");
 }
 
 TEST(Slide, RefusesAHandleThatTurnsRound) {
   RampRun run = ExactRamp{}.run();
   for (std::size_t i = 1200; i < 1300; ++i) run.samples[i].position -= 0.02;
-  EXPECT_NE(error_of(run).find("only moves forth, it turns round"), std::string::npos) << error_of(run);
+  EXPECT_NE(error_of(run).find("only moves forward, found a reversal"), std::string::npos) << error_of(run);
 }
 
 TEST(Slide, RefusesMotionAgainstTheForce) {
   RampRun run = ExactRamp{}.run();
   for (RampSample& sample : run.samples) sample.force *= -1;
-  EXPECT_EQ(error_of(run), "expected motion along the force, found motion against it");
+  EXPECT_EQ(error_of(run), "expected motion in the direction of the force, found motion against it");
 }
 
 TEST(Slide, RefusesOneThatIsOverInFewSamples) { EXPECT_NE(error_of(ExactRamp{.rate = 1000}.run()), ""); }

@@ -236,7 +236,7 @@ TEST(StabilityLaws, NameTheFieldThatIsWrong) {
 
 TEST(StabilityLaws, RefuseWhatTheyKnowNothingOf) {
   EXPECT_EQ(thrown_by([] { diolaiti(spring(500, 0.1, 0)); }),
-            "damping = 0.1: expected 0, this law knows no virtual damper");
+            "damping = 0.1: expected 0, because this law does not support a virtual damper");
   EXPECT_NE(thrown_by([] { jury_stiffness(spring(500, 0.1, 0)); }), "");
   EXPECT_NE(thrown_by([] { jury_stiffness(spring(500, 0, 1)); }), "");
   EXPECT_NE(thrown_by([] { abbott_okamura_stiffness(spring(500, 0, 1)); }), "");

@@ -190,9 +190,8 @@ TEST(PositionPosition, RefusesImpossibleConfigurations) {
                       {"stiffness", [](auto& c) { c.stiffness = 0; }},
                       {"damping", [](auto& c) { c.damping = -1; }},
                       {"own_damping", [](auto& c) { c.own_damping = kNan; }},
-                      {"own_damping = 0: expected a number above 0 N·s/m, because adapt_to_delay lowers the stiffness "
-                       "to 2 B over the "
-                       "round trip",
+                      {"own_damping = 0: expected a number above 0 N·s/m, because adapt_to_delay limits the stiffness "
+                       "to 2 B divided by the round-trip time",
                        [](auto& c) { c.own_damping = 0; }},
                       {"period", [](auto& c) { c.period = {}; }},
                       {"recovery", [](auto& c) { c.recovery = {}; }},

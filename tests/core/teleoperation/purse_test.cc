@@ -315,7 +315,7 @@ TEST(SharedAccount, OnlyTheAolFamilyHasOne) {
       EXPECT_EQ(why, "") << law.name;
     } else {
       EXPECT_EQ(why, "law \"" + std::string(law.name) +
-                         "\" has no account that a purse could share: expected aol, aol-box or aol+");
+                         "\" has no energy account that a purse can share: expected aol, aol-box or aol+");
     }
   }
 }

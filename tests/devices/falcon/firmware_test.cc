@@ -32,7 +32,7 @@ TEST(FalconFirmware, AFileWithoutTheLoadersKeyIsNone) {
   auto bytes = fake_firmware(8192);
   bytes[1] = 0x09;
   EXPECT_EQ(refusal(bytes, UnknownFirmware::kAccept),
-            "a.bin: expected the Falcon's firmware, which begins with the bytes AA 08, found a file that does not");
+            "a.bin: expected the Falcon's firmware, which starts with the bytes AA 08, found other bytes");
 }
 
 TEST(FalconFirmware, AFileThatNobodyKnowsHasToBeAcceptedExplicitly) {

@@ -248,7 +248,7 @@ TEST(JointFriction, RefusesWhatIsNoFriction) {
   expect_refusals(JointFriction::Config{.mechanism = kPhantom, .coulomb = Vec3(1, 1, 1), .viscous = Vec3(1, 1, 1)},
                   Makes<JointFriction>(),
                   {
-                      {"joint_friction.coulomb = 0: expected friction in one of the joints",
+                      {"joint_friction.coulomb = 0: expected friction in at least one joint",
                        [](auto& c) { c = {.mechanism = kPhantom}; }},
                       {"joint_friction.coulomb[1] = -1: expected", [](auto& c) { c.coulomb[1] = -1; }},
                       {"joint_friction.viscous[2] = nan: expected", [](auto& c) { c.viscous[2] = NAN; }},

@@ -564,8 +564,8 @@ TEST(SimulatedDevice, RefusesImpossibleValuesAndNamesTheField) {
           {"mass = nan: expected a number above 0 kg", [](auto& c) { c.mass = kNan; }},
           {"mass = inf: expected a number above 0 kg", [](auto& c) { c.mass = kInf; }},
           {"viscous_friction = -1: expected", [](auto& c) { c.viscous_friction = -1; }},
-          {"coulomb_friction = 0: expected a number above 0 (left out when", [](auto& c) { c.coulomb_friction = 0; }},
-          {"coulomb_friction = 0.4: expected none besides the friction in the joints",
+          {"coulomb_friction = 0: expected a number above 0 (omit it to", [](auto& c) { c.coulomb_friction = 0; }},
+          {"coulomb_friction = 0.4: expected none in addition to joint_friction",
            [](auto& c) {
              c.coulomb_friction = 0.4;
              c.joint_friction = {.mechanism = Mechanism::Falcon{}, .coulomb = Vec3(1, 1, 1)};
@@ -578,7 +578,7 @@ TEST(SimulatedDevice, RefusesImpossibleValuesAndNamesTheField) {
           {"start_position.y = nan: expected a finite number", [](auto& c) { c.start_position = Vec3(0, kNan, 0); }},
           {"start_velocity.z = inf: expected a finite number", [](auto& c) { c.start_velocity.z() = kInf; }},
           {"hand.lets_go_after = -1: expected 0 s or more", [](auto& c) { c.lets_go_after = -1s; }},
-          {"hand.lets_go_after = 1: expected 0 s or more, of a device with a hand",
+          {"hand.lets_go_after = 1: expected 0 s or more, for a device with a hand",
            [](auto& c) {
              c.hand.reset();
              c.lets_go_after = 1s;

@@ -407,7 +407,8 @@ TEST_F(SealedHandshake, TwoClientsWithOneKeyAreAMistakeThatIsToldAtOnce) {
     Doorman door(config);
     FAIL();
   } catch (const std::invalid_argument& refused) {
-    EXPECT_STREQ(refused.what(), "the clients \"wall\" and \"copy\" have the same key: each needs one of its own");
+    EXPECT_STREQ(refused.what(),
+                 "the clients \"wall\" and \"copy\" have the same key: expected a different key for each client");
   }
 }
 

@@ -167,7 +167,7 @@ TEST(Health, SaysAllThatTheServerDoesLessOfWithinTheBoundOfAText) {
   const std::string degraded = report({}, now).degraded;
   EXPECT_EQ(degraded,
             "no real time; the log thread is too slow; recording has stopped; unsent datagrams; acceleration above the "
-            "limiter's bound; device fell silent");
+            "limiter's bound; device is silent");
   EXPECT_LE(degraded.size(), limits::kMaxDetail);
 }
 

@@ -108,7 +108,7 @@ TEST(KeyFolder, SaysWhichFileIsWrongAndWhy) {
                 ": expected a key file for each client, found none; create one with `tendond keygen NAME`");
   write_key_file(file, some_key("wall", 1));
   std::filesystem::permissions(file, std::filesystem::perms(0640));
-  EXPECT_TRUE(complaint_about(folder.path()).starts_with(file + ": others than its owner may read"));
+  EXPECT_TRUE(complaint_about(folder.path()).starts_with(file + ": other users can read or write this key"));
   std::filesystem::permissions(file, std::filesystem::perms(0600));
   std::ofstream(file) << "controller " << std::string(64, '0') << '\n';
   EXPECT_TRUE(complaint_about(folder.path()).starts_with(file + ": the key is weak: it repeats the same few bytes"));

@@ -55,7 +55,7 @@ TEST(Scene, AxesThatMakeNoRotationAreRefusedWithTheReason) {
       "s.toml:2: device.axes: expected the axes that point to the operator's right, up and towards the user, like "
       "\"right=x up=y user=z\"";
   EXPECT_EQ(refusal("\"right=x up=y user=-z\""),
-            expected + " (these three make a left-handed frame), found \"right=x up=y user=-z\"");
+            expected + " (these three axes form a left-handed frame), found \"right=x up=y user=-z\"");
   EXPECT_EQ(refusal("1"), expected + ", found 1");
 }
 
@@ -119,7 +119,7 @@ TEST(Scene, AFalconAlwaysHasToBeArmed) {
   EXPECT_EQ(scene.safety->arming.by, SafeDevice::Arming::By::kRequest);
   EXPECT_EQ(parse(std::string(kFalcon) + "[safety.dead_man]\nbutton = 3\n").safety->dead_man->button, 3U);
   EXPECT_EQ(error_of(std::string(kFalcon) + "[safety.dead_man]\nbutton = 4\n"),
-            "s.toml:7: safety.dead_man.button: expected one of a Falcon's, 0 to 3, found 4");
+            "s.toml:7: safety.dead_man.button: expected 0 to 3, a button of the Falcon, found 4");
 }
 
 constexpr std::string_view kReplay = "[device]\nkind = \"replay\"\n";

@@ -123,7 +123,7 @@ TEST(SceneError, OfTheSafetyLayerNamesTheLine) {
       {"[safety.workspace]\nkind = \"ball\"\n",
        "s.toml:5: safety.workspace.kind: expected one of \"sphere\", \"box\", found \"ball\""},
       {"[safety]\narm = \"by dead man\"\n",
-       "s.toml:4: safety: dead_man: expected to be listed, because the device is armed by its button"},
+       "s.toml:4: safety: dead_man: expected this table, because the device is armed by its button"},
       {"[safety.dead_man]\nbutton = 0\n",
        "s.toml:5: safety.dead_man.button: expected 0 with button_after_ms of [device.hand], or a button of "
        "[[device.hand.press]]: a simulated device has no other buttons"},
@@ -316,7 +316,7 @@ TEST(SceneError, RefusesPartsThatCannotBe) {
        "s.toml:6: limiter.robust_ledger.encoder_step_um: missing, expected a number of 0 µm or more, because the "
        "device has no encoder_step_um"},
       {"[limiter.latency_reserve]\n[limiter.bounded_acceleration]\n[limiter.shaping]\n",
-       "s.toml:4: limiter: bounded_acceleration is not proved for forces that are held late: not together with "
+       "s.toml:4: limiter: bounded_acceleration is not proved for forces that are held late, so it cannot be used with "
        "latency_reserve"},
   });
 }
@@ -389,10 +389,9 @@ TEST(SceneError, OfTheEffectsOfADeviceNamesTheLineAndWhatWasExpected) {
       {"[device.hand]\nprofile = \"foot\"\n",
        "s.toml:5: device.hand.profile: expected one of \"fingertip\", \"stylus\", \"arm\", found \"foot\""},
   });
-  EXPECT_EQ(
-      error_of(std::string(kWithoutProfile) + joints + "kind = \"falcon\"\n[force]\nmax_force_n = 1\n"),
-      "s.toml:5: device.effects.joint_friction: joint_friction.coulomb = 0: expected friction in one of the joints "
-      "at least (left out when there is none)");
+  EXPECT_EQ(error_of(std::string(kWithoutProfile) + joints + "kind = \"falcon\"\n[force]\nmax_force_n = 1\n"),
+            "s.toml:5: device.effects.joint_friction: joint_friction.coulomb = 0: expected friction in at least one "
+            "joint (omit joint_friction if there is none)");
 }
 
 TEST(SceneError, RefusesTimesThatContradictEachOther) {
@@ -486,8 +485,7 @@ TEST(SceneError, PassesOnWhatIsWrongWithARecordedMotion) {
 TEST(SceneError, WhatOnlyAConstructorRefusesHasTheLineOfItsTable) {
   EXPECT_EQ(error_of(std::string(kHand) +
                      "kind = \"minimum-jerk\"\npoints_mm = [[0, 0, 0], [1, 0, 0]]\ndurations_ms = [1, 2]\n"),
-            "s.toml:9: device.hand.motion: minimum_jerk.durations (their number) = 2: expected one fewer than points, "
-            "one per leg");
+            "s.toml:9: device.hand.motion: minimum_jerk.durations (their number) = 2: expected one fewer than points");
   EXPECT_EQ(
       error_of(std::string(kHand) + "kind = \"sine\"\namplitude_mm = 1\nfrequency_hz = 1\ndirection = [0, 0, 0]\n"),
       "s.toml:9: device.hand.motion: sine.direction (its length) = 0: expected a vector that is not zero");

@@ -121,8 +121,7 @@ TEST(SceneTeleoperation, NamesEachMethodAndWavesShareAccountsWithoutAPurse) {
             "have no energy account that ports can share");
   EXPECT_EQ(error_of_minimal_and("[teleoperation]\nrole = \"leader\"\nmethod = \"waves\"\n[teleoperation.coupling]\n"
                                  "stiffness_n_per_m = 400\nadapt_to_delay = false\n"),
-            "s.toml:6: teleoperation.coupling.damping_n_s_per_m: expected a number above 0: it is the impedance of the "
-            "waves");
+            "s.toml:6: teleoperation.coupling.damping_n_s_per_m: expected a number above 0: it is the wave impedance");
 }
 
 TEST(SceneTeleoperation, AnAbsoluteMapAlignsAndHasNoClutch) {
@@ -140,13 +139,13 @@ TEST(SceneTeleoperation, AnAbsoluteMapAlignsAndHasNoClutch) {
             "purse: the energy is paid into its account");
   EXPECT_EQ(
       error_of_minimal_and(kLeader + "[teleoperation.map]\nabsolute = true\n[teleoperation.clutch]\nbutton = 1\n"),
-      "s.toml:12: teleoperation.clutch: expected none with map.absolute: a clutch changes an offset, and there is "
-      "none");
+      "s.toml:12: teleoperation.clutch: expected no clutch with map.absolute: a clutch changes the offset, which is "
+      "always 0");
   EXPECT_EQ(
       error_of_minimal_and("[teleoperation]\nrole = \"leader\"\nmethod = \"waves\"\n[teleoperation.coupling]\n"
                            "stiffness_n_per_m = 400\ndamping_n_s_per_m = 4\n[teleoperation.map]\nabsolute = true\n"),
       "s.toml:11: teleoperation.map.absolute: expected the method position-position, position-force, surface or "
-      "set-position: the others have no absolute places");
+      "set-position with map.absolute: the other methods have no absolute positions");
 }
 
 TEST(SceneTeleoperation, TakesWhatPassivityRateAndSlowLinksNeed) {
@@ -179,12 +178,13 @@ TEST(SceneTeleoperation, SaysWhichMethodHasNoUseForAKey) {
               "move with energy from the leader");
   }
   EXPECT_EQ(refusal("rate", purse),
-            "s.toml:6: teleoperation.rate: missing, expected this table with method \"rate\": how fast the follower "
-            "moves");
+            "s.toml:6: teleoperation.rate: missing, expected this table with method \"rate\": it sets the speed of the "
+            "follower");
   EXPECT_EQ(refusal("waves", purse + kRate),
-            "s.toml:11: teleoperation.rate: expected none with method \"waves\": only \"rate\" has a speed");
+            "s.toml:11: teleoperation.rate: expected none with method \"waves\": only the method \"rate\" uses it");
   EXPECT_EQ(refusal("rate", purse + kRate + "centring_n_per_m = 200\n", "follower"),
-            "s.toml:15: teleoperation.rate.centring_n_per_m: expected none or 0: the leader's handle is centred");
+            "s.toml:15: teleoperation.rate.centring_n_per_m: expected 0 or no value for a follower: only the leader's "
+            "handle is centred");
   EXPECT_EQ(refusal("rate", purse + "[teleoperation.rate]\ndead_zone_mm = 3\ngain_per_s = 4\n"),
             "s.toml:11: teleoperation.rate.max_speed_mm_per_s: missing, expected a number above 0 mm/s");
   EXPECT_EQ(refusal("surface", "drift_rate_per_s = 5\n" + purse),
@@ -194,8 +194,8 @@ TEST(SceneTeleoperation, SaysWhichMethodHasNoUseForAKey) {
             "s.toml:9: teleoperation.coupling.mutual_damping_n_s_per_m: expected 0 or no value with method "
             "\"set-position\": it does not use the velocity of the other end");
   EXPECT_EQ(refusal("passivity", "[teleoperation.purse]\n"),
-            "s.toml:6: teleoperation.coupling.damping_n_s_per_m: expected a number above 0: nothing else takes energy "
-            "up, so that nothing could begin to move");
+            "s.toml:6: teleoperation.coupling.damping_n_s_per_m: expected a number above 0: nothing else absorbs "
+            "energy, so no motion could start");
 }
 
 TEST(SceneTeleoperation, SaysWhatCannotBeTogether) {
@@ -225,10 +225,10 @@ TEST(SceneTeleoperation, SaysWhatCannotBeTogether) {
             "of [network]");
   EXPECT_EQ(refusal("[teleoperation]\nrole = \"leader\"\non_loss = \"hold\"\n[teleoperation.coupling]\n"
                     "stiffness_n_per_m = 400\ndamping_n_s_per_m = 4\n[teleoperation.purse]\n"),
-            "s.toml:6: teleoperation.on_loss: expected \"release\": a hand holds the leader");
+            "s.toml:6: teleoperation.on_loss: expected \"release\" for a leader, which is held by a hand");
   EXPECT_EQ(refusal("[teleoperation]\nrole = \"follower\"\n[teleoperation.coupling]\nstiffness_n_per_m = 400\n"
                     "damping_n_s_per_m = 4\n[teleoperation.purse]\n[teleoperation.clutch]\nbutton = 1\n"),
-            "s.toml:10: teleoperation.clutch: expected none: the leader clutches");
+            "s.toml:10: teleoperation.clutch: expected no clutch for a follower: only the leader has a clutch");
 }
 
 /// Twelve lines after kMinimal, so the rest begins at line 16.
@@ -357,7 +357,7 @@ TEST(SceneTeleoperation, RefusesHandlesThatCannotBeCoupled) {
                                                             "stiffness_nm_per_rad = 0.5\n" +
                                                                 kPurse)),
             "s.toml:7: teleoperation: turn.damping = 0: expected a number above 0 N·m·s/rad, because adapt_to_delay "
-            "lowers the stiffness to 2 B over the round trip");
+            "limits the stiffness to 2 B divided by the round-trip time");
 }
 
 }  // namespace

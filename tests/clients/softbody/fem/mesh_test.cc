@@ -154,7 +154,7 @@ TEST(Gmsh, RefusesWhatIsNotAMesh) {
   EXPECT_EQ(refusal(kHead + "$Nodes\n99999999999\n"),
             "bad.msh:5: expected a count of at most 10 million, found 99999999999");
   EXPECT_EQ(refusal(kHead + "$Nodes\n1\n1 nan 0 0\n"), "bad.msh:6: expected a number, found \"nan\"");
-  EXPECT_EQ(refusal(kHead + "$Nodes\n2\n1 0 0 0\n1 0 0 1\n"), "bad.msh:7: node 1 is there twice");
+  EXPECT_EQ(refusal(kHead + "$Nodes\n2\n1 0 0 0\n1 0 0 1\n"), "bad.msh:7: node 1 occurs twice");
   EXPECT_EQ(refusal(kHead + kFive + "$Elements\n1\n7 2 0 1 2 3\n$EndElements\n"),
             "bad.msh: no volume element: this is a surface");
 }

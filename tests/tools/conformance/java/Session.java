@@ -172,8 +172,8 @@ final class Session {
 
   void tick(long now) {
     if (end != null) return;
-    if (now - lastHeard >= TIMEOUT) end = "nothing heard for 2 s";
-    if (aead != null && now - opened >= LIFE) end = "the session has reached its age";
+    if (now - lastHeard >= TIMEOUT) end = "nothing received for 2 s";
+    if (aead != null && now - opened >= LIFE) end = "the session has reached its maximum age";
   }
 
   // ---- Out ----

@@ -144,7 +144,7 @@ class Reader {
     const std::string key(line.substr(0, blank));
     const std::string_view value = line.substr(std::min(blank + 1, line.size()));
     if (value.empty()) fail("# " + key + " has no value");
-    if (std::ranges::find(seen_, key) != seen_.end()) fail("# " + key + " is there twice");
+    if (std::ranges::find(seen_, key) != seen_.end()) fail("# " + key + " occurs twice");
     seen_.push_back(key);
     if (key == "seed") {
       trace_.seed = number<std::uint64_t>(key, value, "a whole number");
@@ -254,7 +254,7 @@ class Reader {
       if (a.direction != b.direction || a.link != b.link) continue;
       if (a.index == b.index) {
         number_ = line_of(b);
-        fail("datagram " + std::to_string(b.index) + " of this flow is there twice, first in line " +
+        fail("datagram " + std::to_string(b.index) + " of this flow occurs twice, first in line " +
              std::to_string(line_of(a)));
       }
       if (b.arrival < a.arrival) {

@@ -156,7 +156,7 @@ TEST(Trace, WhatIsWrongIsNamedWithFileAndLine) {
   EXPECT_EQ(
       refusal("# tendon-trace 1\n# sed 7\n"),
       "run.csv:2: # \"sed\" is not known, expected seed, start, up, down, tables, build, benign up or benign down");
-  EXPECT_EQ(refusal("# tendon-trace 1\n# seed 7\n# seed 7\n"), "run.csv:3: # seed is there twice");
+  EXPECT_EQ(refusal("# tendon-trace 1\n# seed 7\n# seed 7\n"), "run.csv:3: # seed occurs twice");
   EXPECT_EQ(refusal("# tendon-trace 1\n# seed -1\n"), "run.csv:2: seed is \"-1\", expected a whole number");
   EXPECT_EQ(refusal("# tendon-trace 1\n# seed\n"), "run.csv:2: # seed has no value");
   EXPECT_EQ(refusal("# tendon-trace 1\n# benign up -1\n"),
@@ -191,7 +191,7 @@ TEST(Trace, WhatIsWrongIsNamedWithFileAndLine) {
   EXPECT_EQ(refusal(with_lines("up,0,0,1000,9,,pass,delay,9000,,,65,2000,,,0\n")),
             "run.csv:4: stale_back is \"65\", expected 1 to 64");
   EXPECT_EQ(refusal(with_lines(good + "# note half\n" + good)),
-            "run.csv:6: datagram 0 of this flow is there twice, first in line 4");
+            "run.csv:6: datagram 0 of this flow occurs twice, first in line 4");
   EXPECT_EQ(refusal(with_lines(good + "up,0,1,999,9,,pass,delay,9000,,,,,,,0\n")),
             "run.csv:5: t_in_ns is earlier than that of a datagram of the same flow with a smaller index");
   EXPECT_EQ(refusal(with_lines("up,0,1,999,9,,pass,delay,9000,,,,,,,0\n" + good)),
