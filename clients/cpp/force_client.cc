@@ -23,7 +23,7 @@ constexpr Duration kMaxObservedPeriod = std::chrono::milliseconds(100);
 /// The minimum time between two requests for a lease. The current holder renews its lease continuously.
 constexpr Duration kAskLeaseAgain = std::chrono::milliseconds(50);
 
-constexpr const char* kNoDiagnostics = "0: they are for observers only";
+constexpr const char* kNoDiagnostics = "0: only observers can use diagnostics";
 
 void expect_at_most(std::size_t most, const std::string& text, const std::string& field) {
   expect(text.size() <= most, field + ".size", static_cast<double>(text.size()),
@@ -41,7 +41,7 @@ const ForceClient::Config& checked(const ForceClient::Config& config) {
     expect(!way->empty(), field + ".size", 0, "at least 1 byte");
     expect_at_most(limits::kMaxLabel, *way, field);
     if (std::find(config.ways.begin(), way, *way) != way)
-      throw std::invalid_argument(field + " = \"" + *way + "\": expected no name twice");
+      throw std::invalid_argument(field + " = \"" + *way + "\": expected unique names");
   }
   expect(
       config.rate_hz == 0 || (config.rate_hz >= ForceClient::kMinRateHz && config.rate_hz <= ForceClient::kMaxRateHz),
@@ -194,7 +194,7 @@ void ForceClient::open(LocalTime now, const Welcome& welcome) {
   const auto& grants = welcome.grants;
   if (claims() && grants.size() != 1) {
     connection_.drop(now);
-    return end(Phase::kRefused, Code::kUnsupported, "that server has one device, with one channel: name none");
+    return end(Phase::kRefused, Code::kUnsupported, "this server has one device with one channel: omit their names");
   }
   welcome_ = welcome;
   lease_.open(grants.empty() ? Grant{.device = 0, .channel = 0, .role = welcome.role} : grants.front(), now);
@@ -290,7 +290,7 @@ void ForceClient::take_answer(LocalTime now, const Session::RequestAnswered& ans
 void ForceClient::take_request(LocalTime now, const Session::RequestArrived& arrived) {
   const auto* lost = std::get_if<LeaseLost>(&arrived.request);
   Session& session = *connection_.session();
-  if (lost == nullptr) return session.answer(arrived.id, Code::kUnsupported, "that is a client's to ask");
+  if (lost == nullptr) return session.answer(arrived.id, Code::kUnsupported, "only a client can send this request");
   session.answer(arrived.id, Code::kOk, {});
   if (lease_.take(*lost, session, now)) stats_.lease_lost_to = lost->to;
 }
@@ -340,11 +340,11 @@ bool ForceClient::answer(LocalTime now, const Reply& reply) {
 
 void ForceClient::leave_out(const Touch& touch, const DeviceState& answered, ForceCommand& command) {
   if (command.model && !agreed_to(kFeatureLocalModel)) command.model.reset();
-  if (command.way > config_.ways.size()) stats_.left_out = "the way of answering: Config::ways has none of its number";
+  if (command.way > config_.ways.size()) stats_.left_out = "the solver path: its number is not in Config::ways";
   if (command.way > config_.ways.size() || (command.way > 0 && !agreed_to(kFeatureWays))) command.way = 0;
   if (!touch.torque && !touch.angular_stiffness && !touch.grip_force) return;
   if (!agreed_to(kFeatureHandle)) {
-    stats_.left_out = "torque and grip force: the server does not know them";
+    stats_.left_out = "torque and grip force: the server does not support them";
     command.torque.reset();
     command.grip_force.reset();
   } else if (touch.angular_stiffness && !answered.turning) {

@@ -44,7 +44,7 @@ CLI::Validator at_least(double least) {
         const std::optional<double> value = to_number(text);
         if (value && *value >= least && *value <= std::numeric_limits<double>::max()) return {};
         std::ostringstream expected;
-        expected << "expected a number from " << least << " on, got \"" << text << '"';
+        expected << "expected a number of " << least << " or more, got \"" << text << '"';
         return expected.str();
       },
       "");
@@ -58,7 +58,7 @@ struct CommandLine::Parser {
 
   void set_example(const std::string& argument) {
     app.footer("Example: " + options.client.name + argument + " --server " + options.server.text() +
-               " --duration-s 10\nExit: 0 done; 1 it failed or was never connected; 2 wrong usage.");
+               " --duration-s 10\nExit: 0 success; 1 failed or never connected; 2 wrong usage.");
   }
 };
 
@@ -67,34 +67,35 @@ CommandLine::CommandLine(std::string purpose, Options& options)
   CLI::App& app = parser_->app;
   usage::dress(app);
   parser_->set_example("");
-  app.set_help_flag("-h,--help", "Print this text and exit");
+  app.set_help_flag("-h,--help", "Print this help and exit");
   app.set_version_flag("--version", TENDON_VERSION);
   app.add_option_function<std::string>(
          "--server", [&](const std::string& text) { options.server = text; },
-         "Where tendond listens: a host name or an address; unix:PATH on this machine; or dns-sd:NAME, where dns-sd: "
-         "lists the names")
+         "Address of tendond: a host name or an IP address; unix:PATH on this machine; or dns-sd:NAME. Use dns-sd: to "
+         "list all names")
       ->type_name("HOST:PORT")
       ->default_str(options.server.text())
       ->check(usage::accepted_by([](const std::string& text) { ServerName{text}; }));
   app.add_option_function<std::string>(
          "--key", [&](const std::string& file) { options.client.key = read_client_key(file).key; },
-         "Key file (see `tendond keygen`); needed unless the server is on this machine and has no keys")
+         "Key file from `tendond keygen`. Not required for a server on this machine without keys")
       ->type_name("FILE");
-  app.add_option("--device", options.client.device, "The device's name, for a server that has several")
+  app.add_option("--device", options.client.device, "Name of the device, for a server with several devices")
       ->type_name("NAME");
-  app.add_option("--channel", options.client.channel, "Name of the device's channel that takes the forces")
-      ->type_name("NAME");
-  app.add_flag("--take-lease", options.client.take_lease, "Ask for the channel until this client holds it");
-  app.add_option("--rate-hz", options.client.rate_hz, "Times per second; 0 = for every device state that arrives")
+  app.add_option("--channel", options.client.channel, "Name of the channel of the device")->type_name("NAME");
+  app.add_flag("--take-lease", options.client.take_lease, "Request the channel until this client holds it");
+  app.add_option("--rate-hz", options.client.rate_hz, "Rate of the answers, Hz. 0: answer every state")
       ->capture_default_str()
       ->check(number(ForceClient::kMinRateHz, ForceClient::kMaxRateHz));
   app.add_option_function<double>(
-         "--duration-s", [&](double s) { options.duration = from_seconds(s); }, "Stop after this time; 0 = at Ctrl-C")
+         "--duration-s", [&](double s) { options.duration = from_seconds(s); },
+         "Stop after this time, s. 0: run until Ctrl-C")
       ->default_str("0")
       ->check(number(0, kMaxDurationS));
-  app.add_flag("--busy", options.busy,
-               "Never sleep: answers some 10 to 50 µs sooner, for a whole processor all the time");
-  app.add_flag("--json", options.json, "One JSON object per line on stdout");
+  app.add_flag(
+      "--busy", options.busy,
+      "Poll instead of sleeping. Answers are sent about 10 to 50 µs earlier, but a whole processor is always used");
+  app.add_flag("--json", options.json, "Print JSON on stdout, one object per line");
 }
 
 CommandLine::~CommandLine() = default;

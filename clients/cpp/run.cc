@@ -103,13 +103,13 @@ std::string Guest::sentence() const {
              ", " + std::to_string(client_.welcome()->loop_hz) + " Hz)";
     case ForceClient::Phase::kUnanswered:
       return "no answer from " + server + "; is tendond running there" +
-             (options_.client.key ? ", and does it have this key" : "") + "? Trying on";
+             (options_.client.key ? ", and does it have this key" : "") + "? Retrying";
     case ForceClient::Phase::kRefused:
-      return server + " refuses: " + stats.reason + (is_final(stats.code) ? "" : "; trying again");
+      return server + " refused the connection: " + stats.reason + (is_final(stats.code) ? "" : "; retrying");
     case ForceClient::Phase::kLost:
-      return "lost " + server + ": " + stats.reason + "; trying again";
+      return "lost " + server + ": " + stats.reason + "; retrying";
     case ForceClient::Phase::kStopped:
-      return stats.code == Code::kReplaced ? server + " has ended this: " + stats.reason : "";
+      return stats.code == Code::kReplaced ? server + " has ended the session: " + stats.reason : "";
     case ForceClient::Phase::kGreeting:
       return {};
   }
@@ -166,7 +166,7 @@ std::optional<LocalTime> Guest::turn(LocalTime now) {
   const std::string text = sentence();
   if (!text.empty() && text != said_) say(said_ = text);
   if (const auto why = client_.stats().unusable; !why.empty() && why != unusable_) {
-    say("a force is not sent: " + std::string(unusable_ = why));
+    say("a force was not sent: " + std::string(unusable_ = why));
   }
   if (const auto what = client_.stats().left_out; !what.empty() && what != left_out_) {
     say("not sent with a force: " + std::string(left_out_ = what));
@@ -175,7 +175,7 @@ std::optional<LocalTime> Guest::turn(LocalTime now) {
     if (options_.json) {
       say_json({{"report", to_json(*report)}});
     } else if (!report->words.empty()) {
-      say("the server says: " + report->words);
+      say("report of the server: " + report->words);
     }
   }
   if (client_.phase() == ForceClient::Phase::kRefused && is_final(client_.stats().code)) return {};
@@ -203,12 +203,12 @@ bool Guest::end(LocalTime now, Duration duration) {
                         {"round_trip_variation_ms", milliseconds(link.round_trip_variation)}});
     say_json({{"summary", std::move(summary)}});
   } else if (stats.sessions == 0) {
-    say("was not connected");
+    say("was never connected");
   } else {
     std::array<char, 400> text{};
     std::snprintf(text.data(), text.size(),
-                  "%.1f s, %llu states came in (%llu skipped for a newer one), %llu forces went out (%llu more were "
-                  "unusable), lost on the way: %llu in, %llu out, round trip %.2f ± %.2f ms",
+                  "%.1f s, %llu states received (%llu skipped), %llu forces sent (%llu more unusable), "
+                  "datagrams lost: %llu incoming, %llu outgoing, round trip %.2f ± %.2f ms",
                   seconds(duration), ull{stats.states}, ull{stats.states_skipped}, ull{stats.forces},
                   ull{stats.forces_unusable}, ull{link.lost}, ull{link.lost_outgoing},
                   milliseconds(link.smoothed_round_trip), milliseconds(link.round_trip_variation));
@@ -286,7 +286,8 @@ int run_with(const Options& options, const std::vector<Seat<Callback>>& seats, c
     const StopSignals signals;
     const Punctual punctual;
     if (options.busy && has_one_processor()) {
-      std::cerr << options.client.name << ": busy: this machine has one processor, and nothing else gets its turn\n";
+      std::cerr << options.client.name
+                << ": busy: this machine has only one processor, so other programs will be blocked\n";
     }
     const LocalTime start = read_clock();
     const LocalTime end = options.duration > Duration::zero() ? start + options.duration : LocalTime::max();
@@ -362,11 +363,11 @@ int run(const Options& options, Watch watch) { return run_with<Watch>(options, {
 
 int run(const Options& options, const std::map<std::string, Physics>& physics) {
   if (physics.empty() || physics.contains("") || !options.client.device.empty()) {
-    std::cerr << options.client.name << ": this program names its devices itself\n";
+    std::cerr << options.client.name << ": this program selects its devices itself: expected no --device\n";
     return 1;
   }
   if (options.on_silence) {
-    std::cerr << options.client.name << ": on_silence is for one device alone\n";
+    std::cerr << options.client.name << ": on_silence can only be used with one device\n";
     return 1;
   }
   std::vector<Seat<Physics>> seats;
@@ -376,7 +377,8 @@ int run(const Options& options, const std::map<std::string, Physics>& physics) {
 
 int run(const Options& options, const std::vector<HandAt>& hands, const Together& engine) {
   if (hands.empty() || !options.client.device.empty() || options.on_silence) {
-    std::cerr << options.client.name << ": this program names its devices itself, at least one, without on_silence\n";
+    std::cerr << options.client.name
+              << ": expected one or more devices in the program, no --device, and no on_silence\n";
     return 1;
   }
   AllHands all{engine, std::vector<std::optional<DeviceState>>(hands.size())};

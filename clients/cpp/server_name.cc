@@ -121,11 +121,12 @@ ServerName::Place ServerName::look_up(bool has_key) const {
     return {addresses_of(host, port), {}};
   }
   if (instance_->name.empty())
-    throw std::runtime_error(text_ + " is a list, which echo_motion --server " + text_ +
+    throw std::runtime_error(text_ + " is a list, which is printed by echo_motion --server " + text_ +
                              " prints: expected a name in it");
   if (!has_key) {
-    throw std::runtime_error(text_ + ": anybody can announce this name, and a key alone tells whose it is: expected " +
-                             "a key (--key FILE) besides, or HOST:PORT in place of the name");
+    throw std::runtime_error(
+        text_ + ": anyone can announce this name, and only a key proves the identity of the server: expected " +
+        "a key (--key FILE), or HOST:PORT instead of the name");
   }
   Place place;
   for (const dns_sd::Found& found : dns_sd::resolve(*instance_)) {

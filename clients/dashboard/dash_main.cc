@@ -89,7 +89,7 @@ std::optional<int> parse(int argc, char** argv, Options& options) {
       "Example: tendon-dash --server 127.0.0.1:47100 --recordings . --listen 127.0.0.1:8080\n"
       "then open http://127.0.0.1:8080 in a browser, or ws://127.0.0.1:8080/foxglove in Foxglove or Lichtblick.\n\n"
       "Exit: 0 done; 1 something failed, or no server has answered; 2 wrong usage.");
-  app.set_help_flag("-h,--help", "Print this text and exit");
+  app.set_help_flag("-h,--help", "Print this help and exit");
   app.set_version_flag("--version", TENDON_VERSION);
   std::string server = options.server.text();
   std::string listen = to_string(options.web.listen);
@@ -127,10 +127,10 @@ std::optional<int> parse(int argc, char** argv, Options& options) {
       ->type_name("URL");
   app.add_option("--recordings", options.recordings, "Folder whose recordings (*.mcap) the page may open")
       ->type_name("FOLDER");
-  app.add_option("--duration-s", options.duration_s, "Stop after this time; 0 = at Ctrl-C")
+  app.add_option("--duration-s", options.duration_s, "Stop after this time, s. 0: run until Ctrl-C")
       ->capture_default_str()
       ->check(CLI::Range(0.0, 1e9));
-  app.add_flag("--json", options.json, "One JSON object per line on stdout: listening, stopped");
+  app.add_flag("--json", options.json, "Print JSON on stdout, one object per line: listening, stopped");
   try {
     usage::parse(app, argc, argv);
   } catch (const CLI::ParseError& error) {

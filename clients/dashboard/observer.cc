@@ -87,7 +87,7 @@ void Observer::end(const Connection::Ended& ended) {
       // The address may now belong to another server with other devices.
       names_.clear();
       counted_ = false;
-      return board_.tell(Contact::kRefused, server + " refuses: " + ended.reason);
+      return board_.tell(Contact::kRefused, server + " refused the connection: " + ended.reason);
     case Connection::Cause::kLost:
       return board_.tell(Contact::kLost, "lost " + server + ": " + ended.reason);
   }

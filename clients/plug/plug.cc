@@ -178,11 +178,11 @@ std::string Plug::connection_in_words() const {
              std::to_string(client.welcome()->loop_hz) + " Hz)";
     case Phase::kUnanswered:
       return "no answer from " + at + "; is tendond running there" +
-             (config_.client.key ? ", and does it have this key" : "") + "? Trying on";
+             (config_.client.key ? ", and does it have this key" : "") + "? Retrying";
     case Phase::kRefused:
-      return at + " refuses: " + stats.reason + "; trying again";
+      return at + " refused the connection: " + stats.reason + "; retrying";
     case Phase::kLost:
-      return "lost " + at + ": " + stats.reason + "; trying again";
+      return "lost " + at + ": " + stats.reason + "; retrying";
     case Phase::kStopped:
     case Phase::kGreeting:
       return {};

@@ -14,22 +14,21 @@ void add_common(CLI::App& app, DeskConfig& desk) {
   desk.client.name = "tendon-plug " + app.get_name();
   app.add_option_function<std::string>(
          "--server", [&](const std::string& text) { desk.server = text; },
-         "Where tendond listens: a host name or an address; or dns-sd:NAME, which --key has to go with")
+         "Address of tendond: a host name or an IP address; or dns-sd:NAME, which --key has to go with")
       ->type_name("HOST:PORT")
       ->default_str(desk.server.text())
       ->check(usage::accepted_by([](const std::string& text) { ServerName{text}; }));
   app.add_option_function<std::string>(
          "--key", [&](const std::string& file) { desk.client.key = read_client_key(file).key; },
-         "Key file (see `tendond keygen`); needed unless the server is on this machine and has no keys")
+         "Key file from `tendond keygen`. Not required for a server on this machine without keys")
       ->type_name("FILE");
   app.add_option("--device", desk.devices, "A device's name; several times for several. None: the server's first one")
       ->allow_extra_args(false)
       ->type_name("NAME");
-  app.add_option("--channel", desk.client.channel, "Name of the device's channel that takes the forces")
-      ->type_name("NAME");
+  app.add_option("--channel", desk.client.channel, "Name of the channel of the device")->type_name("NAME");
   app.add_flag("--take-lease", desk.client.take_lease, "Ask for the channel until it is ours");
   app.add_flag("--observe", desk.observe, "Send no forces");
-  app.add_flag("--json", desk.json, "One JSON object per line on stdout, once a second for each device");
+  app.add_flag("--json", desk.json, "Print JSON on stdout, one object per line, once a second for each device");
 }
 
 namespace {
@@ -47,7 +46,7 @@ int run(int argc, char** argv) {
   app.footer(std::string("Example: tendon-plug vrpn --server lab:47100 --name Phantom0=right\n\n"
                          "tendon-plug COMMAND --help tells more.") +
              kExitCodes);
-  app.set_help_flag("-h,--help", "Print this text and exit");
+  app.set_help_flag("-h,--help", "Print this help and exit");
   app.set_version_flag("--version", TENDON_VERSION);
   app.require_subcommand(1);
   Chosen chosen;

@@ -205,7 +205,7 @@ int main(int argc, char** argv) {
   app.add_option("--kills", kills, "How often the server is killed while it pushes")
       ->check(CLI::Range(0, 1000))
       ->capture_default_str();
-  app.add_flag("--json", json, "One JSON object per line on stdout: run, kills");
+  app.add_flag("--json", json, "Print JSON on stdout, one object per line: run, kills");
   try {
     tendon::usage::parse(app, argc, argv);
   } catch (const CLI::ParseError& problem) {

@@ -93,7 +93,7 @@ TEST_P(FrontWorker, ThatGoesWrongIsReplacedInOneSession) {
   EXPECT_GE(gone.workers("launches"), 2U) << gone.err;
   EXPECT_GE(gone.workers("answers"), 300U);
   EXPECT_GT(gone.late_engine, gone.late_network) << "blamed on the engine, not on the network";
-  EXPECT_NE(gone.err.find("tendon-fem: worker 1 is given up: "), std::string::npos) << gone.err;
+  EXPECT_NE(gone.err.find("tendon-fem: worker 1 was stopped: "), std::string::npos) << gone.err;
 }
 
 INSTANTIATE_TEST_SUITE_P(AllWays, FrontWorker, ::testing::Values("dies", "stops", "sleeps", "nan", "shouts"),
@@ -107,7 +107,8 @@ TEST(Front, RefusesNoiseAndTakesTheAnswerAfterIt) {
   const Outcome noise = run("babbles 300");
   EXPECT_GE(noise.workers("refused"), 1000U);
   EXPECT_GE(noise.workers("answers"), 301U);
-  EXPECT_NE(noise.err.find("an answer of the worker is refused: it is no Datagram"), std::string::npos) << noise.err;
+  EXPECT_NE(noise.err.find("an answer of the worker was rejected: it is not a Datagram"), std::string::npos)
+      << noise.err;
 }
 
 TEST(Front, DoesNotSendLateAnswersAndKeepsTheWorker) {
@@ -123,7 +124,7 @@ TEST(Front, WithoutAWorkerThatStartsIsASilentEngine) {
   EXPECT_EQ(none.sessions(), 1U);
   EXPECT_GE(none.workers("launches"), 2U);
   EXPECT_EQ(none.modes, std::vector<Mode>{Mode::kIdle});
-  EXPECT_NE(none.err.find("it ended with exit status 3; the next one starts in 0.5 s"), std::string::npos) << none.err;
+  EXPECT_NE(none.err.find("it exited with status 3; the next one starts in 0.5 s"), std::string::npos) << none.err;
 }
 
 TEST(Front, AnswersFromATableUntilTheNextWorker) {

@@ -108,7 +108,7 @@ TEST(Softbody, PassesItsSelfTest) {
   Process tested(program("tendon-softbody"), {"selftest", softbody_scene(), "--rate-hz", "200", "--json"},
                  folder.path());
   EXPECT_EQ(tested.wait(), 0) << tested.out() << tested.err();
-  const std::string stiff = R"("verdict":"passed","what":"its stiffness is that of its force, 0.006 m)";
+  const std::string stiff = R"("verdict":"passed","what":"its stiffness matches its force, 0.006 m)";
   EXPECT_NE(tested.out().find(stiff), std::string::npos) << tested.out();
   EXPECT_EQ(tested.out().find(R"("verdict":"failed")"), std::string::npos);
 }

@@ -54,12 +54,12 @@ class Conversation {
  public:
   Conversation(std::string what, std::uint64_t longest) : what_(std::move(what)) {
     sd_event* loop = nullptr;
-    expect(sd_event_new(&loop), "no event loop");
+    expect(sd_event_new(&loop), "cannot create an event loop");
     loop_.reset(loop);
     sd_bus* bus = nullptr;
     expect(sd_bus_open_system(&bus), "there is no D-Bus system bus");
     bus_.reset(bus);
-    expect(sd_bus_attach_event(bus, loop, 0), "no event loop");
+    expect(sd_bus_attach_event(bus, loop, 0), "cannot create an event loop");
     end_after(longest);
   }
 
@@ -80,7 +80,7 @@ class Conversation {
 
   /// Runs until end() or the deadline. Throws the error kept by refused().
   void run() {
-    expect(sd_event_loop(loop_.get()), "the event loop ended");
+    expect(sd_event_loop(loop_.get()), "the event loop has failed");
     if (!refusal_.empty()) throw std::runtime_error(refusal_);
   }
 
@@ -90,15 +90,15 @@ class Conversation {
     const std::string_view name = error->name;
     if (name == "org.freedesktop.Avahi.TimeoutError") return;
     const bool absent = name.starts_with("org.freedesktop.DBus.Error.");
-    refuse(absent ? "avahi-daemon does not answer" : "avahi-daemon refuses",
+    refuse(absent ? "avahi-daemon does not respond" : "avahi-daemon refused the request",
            error->message != nullptr ? error->message : error->name);
     end();
   }
 
  private:
   void refuse(const char* problem, const std::string& why) {
-    refusal_ = "cannot look for " + what_ + ": " + problem + " (" + why +
-               "). Expected a running avahi-daemon, or HOST:PORT in place of a name";
+    refusal_ = "cannot search for " + what_ + ": " + problem + " (" + why +
+               "). Expected a running avahi-daemon, or HOST:PORT instead of a name";
   }
 
   void expect(int result, const char* problem) {
@@ -110,7 +110,7 @@ class Conversation {
   /// Like expect(), for callbacks of libsystemd, which exceptions must not cross.
   void asked(int result) {
     if (result >= 0) return;
-    refuse("the D-Bus system bus is gone", std::generic_category().message(-result));
+    refuse("the connection to the D-Bus system bus was lost", std::generic_category().message(-result));
     end();
   }
 
@@ -172,8 +172,8 @@ class Resolution {
   Found run() {
     avahi_.run();
     if (found_.addresses.empty()) {
-      throw std::runtime_error("cannot find " + what_ + ": nobody on this network answers for " +
-                               full_name(found_.instance) + ". --server dns-sd: lists what is there");
+      throw std::runtime_error("cannot find " + what_ + ": no reply on this network for " + full_name(found_.instance) +
+                               ". Use --server dns-sd: to list all devices");
     }
     return std::move(found_);
   }

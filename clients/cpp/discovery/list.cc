@@ -54,7 +54,7 @@ std::optional<int> list_servers(const ServerName& server, bool json) {
       std::cout << line << '\n';
     }
     std::cout.flush();
-    if (all.empty()) std::cerr << "nobody answers for " << full_name(*server.instance()) << '\n';
+    if (all.empty()) std::cerr << "no reply for " << full_name(*server.instance()) << '\n';
     return 0;
   } catch (const std::exception& error) {
     std::cerr << error.what() << '\n';

@@ -51,7 +51,7 @@ std::uint16_t two_bytes(const Record& record, std::size_t offset) {
 class Resolver {
  public:
   explicit Resolver(const std::optional<Address>& server) {
-    if (res_ninit(&state_) != 0) throw std::runtime_error("the C library's resolver does not start");
+    if (res_ninit(&state_) != 0) throw std::runtime_error("cannot start the resolver of the C library");
     state_.retrans = 1;  // s
     state_.retry = 2;
     if (!server) return;
@@ -74,16 +74,16 @@ class Resolver {
         res_nquery(&state_, name.c_str(), ns_c_in, type, answer.bytes.data(), static_cast<int>(answer.bytes.size()));
     if (size < 0) {
       if (state_.res_h_errno == HOST_NOT_FOUND || state_.res_h_errno == NO_DATA) return {};
-      refuse(name, state_.res_h_errno == TRY_AGAIN ? "no name server answers" : "the name server refuses");
+      refuse(name, state_.res_h_errno == TRY_AGAIN ? "no name server replies" : "the name server refused the request");
     }
     answer.bytes.resize(std::min(answer.bytes.size(), static_cast<std::size_t>(size)));
     ns_msg message;
     if (ns_initparse(answer.bytes.data(), static_cast<int>(answer.bytes.size()), &message) != 0) {
-      refuse(name, "the name server's answer cannot be read");
+      refuse(name, "the reply of the name server is malformed");
     }
     for (int i = 0; i < ns_msg_count(message, ns_s_an); ++i) {
       ns_rr record;
-      if (ns_parserr(&message, ns_s_an, i, &record) != 0) refuse(name, "the name server's answer cannot be read");
+      if (ns_parserr(&message, ns_s_an, i, &record) != 0) refuse(name, "the reply of the name server is malformed");
       if (ns_rr_type(record) != type) continue;
       const auto* const data = reinterpret_cast<const std::byte*>(ns_rr_rdata(record));
       answer.records.push_back({static_cast<std::uint16_t>(ns_rr_type(record)),
@@ -95,8 +95,8 @@ class Resolver {
 
  private:
   [[noreturn]] static void refuse(const std::string& name, const char* why) {
-    throw std::runtime_error("cannot look for " + name + ": " + why +
-                             ". Expected records of DNS-SD in that domain, or HOST:PORT in place of a name");
+    throw std::runtime_error("cannot search for " + name + ": " + why +
+                             ". Expected DNS-SD records in this domain, or HOST:PORT instead of a name");
   }
 
   struct __res_state state_ {};
@@ -132,7 +132,7 @@ std::vector<Found> resolve_by_dns(const Instance& instance, const std::optional<
   std::vector<Found> all = hosts_of(resolver, instance);
   if (all.empty()) {
     throw std::runtime_error("cannot find dns-sd:" + to_string(instance) + ": the name servers have no SRV record of " +
-                             full_name(instance) + ". --server dns-sd:." + instance.domain + " lists what is there");
+                             full_name(instance) + ". --server dns-sd:." + instance.domain + " lists all devices");
   }
   return all;
 }

@@ -132,7 +132,7 @@ class Words {
     } else {
       result = std::from_chars(word.data(), end, value);
     }
-    if (result.ec != std::errc{} || result.ptr != end) fail("\"" + word + "\" is no number of its kind");
+    if (result.ec != std::errc{} || result.ptr != end) fail("\"" + word + "\" is not a valid number");
   }
   template <typename Matrix>
   void take_all(Matrix& values) {
@@ -140,7 +140,7 @@ class Words {
       for (int col = 0; col < values.cols(); ++col) take(values(row, col));
   }
   void expect_no_more() const {
-    if (more()) fail("\"" + words_[next_] + "\" is no part of an answer here");
+    if (more()) fail("\"" + words_[next_] + "\" is not expected in an answer here");
   }
   [[noreturn]] void fail(const std::string& what) const {
     throw std::runtime_error("line " + std::to_string(line_) + ": " + what);
@@ -227,7 +227,7 @@ Replay replay(std::istream& from, const Physics& engine) {
   Replay found;
   for (std::uint64_t line = 2; std::getline(from, text); ++line) {
     Words words(line, text);
-    if (from.eof()) throw std::runtime_error("line " + std::to_string(line) + ": it is cut off");
+    if (from.eof()) throw std::runtime_error("line " + std::to_string(line) + ": truncated");
     const DeviceState hand = take_state(words);
     const Touch was = take_touch(words);
     const Touch is = engine(hand);
@@ -254,7 +254,7 @@ std::string Replay::text() const {
   vector(first->was.force);
   out << " and is ";
   vector(first->is.force);
-  if (first->was.force == first->is.force) out << "; what comes with the force differs";
+  if (first->was.force == first->is.force) out << "; only the rest of the answer differs";
   return out.str();
 }
 

@@ -70,9 +70,9 @@ class Hand {
     try {
       touch = engine_(state_);
     } catch (const std::exception& error) {
-      throw Unusable("it threw \"" + std::string(error.what()) + "\" at " + words(state_.position, "m"));
+      throw Unusable("exception \"" + std::string(error.what()) + "\" at " + words(state_.position, "m"));
     } catch (...) {
-      throw Unusable("it threw at " + words(state_.position, "m"));
+      throw Unusable("exception at " + words(state_.position, "m"));
     }
     if (state_.position.allFinite() && !usable(touch))
       throw Unusable("at " + words(state_.position, "m") + " the force is " + words(touch.force, "N"));
@@ -165,15 +165,15 @@ class Tester {
       for (const Vec3& aside : aside_) {
         const Vec3 away = script_.slide * aside;
         walk("press, slide, release", {deep, deep + away, script_.start + away}, speed);
-        walk("the same, the other way round", {script_.start + away, deep + away, deep}, speed);
+        walk("the same in the opposite direction", {script_.start + away, deep + away, deep}, speed);
       }
       const Vec3 one = script_.slide * aside_[0];
       const Vec3 two = script_.slide * aside_[1];
       walk("slide in a square", {deep, deep + one, deep + one + two, deep + two, deep}, speed);
-      walk("the same, the other way round", {deep, deep + two, deep + one + two, deep + one, deep}, speed);
+      walk("the same in the opposite direction", {deep, deep + two, deep + one + two, deep + one, deep}, speed);
     }
     if (!felt_)
-      add(Verdict::kFailed, "is felt", "no force anywhere on the way: see start, into and depth of the script");
+      add(Verdict::kFailed, "is felt", "no force anywhere on the path: check start, into and depth of the script");
     judge_stiffness();
     judge_odd_states();
     return std::move(result_);
@@ -189,7 +189,7 @@ class Tester {
     std::ostringstream name;
     name << way << ", " << speed << " m/s";
     const std::string route = name.str();
-    const std::string claim = "gives out no more than it was given: " + route;
+    const std::string claim = "generates no energy: " + route;
     try {
       const Work work = around(hand_, std::move(corners), speed);
       felt_ = felt_ || work.largest_n > 0;
@@ -212,7 +212,7 @@ class Tester {
     const double lost = -work.given;
     std::ostringstream why;
     why << lost << " J of " << work.put_in << " J put in did not come back; up to " << bound << " J are allowed";
-    add(lost <= bound ? Verdict::kPassed : Verdict::kFailed, "gives back what it took: " + route, why.str(), lost,
+    add(lost <= bound ? Verdict::kPassed : Verdict::kFailed, "returns the stored energy: " + route, why.str(), lost,
         bound);
   }
 
@@ -228,7 +228,7 @@ class Tester {
   void judge_stiffness() {
     for (const double share : {0.25, 0.5, 0.75, 1.0}) {
       std::ostringstream claim;
-      claim << "its stiffness is that of its force, " << share * script_.depth << " m from the start";
+      claim << "its stiffness matches its force, " << share * script_.depth << " m from the start";
       try {
         judge_stiffness_at(script_.start + share * script_.depth * into_, claim.str());
       } catch (const Unusable& error) {
@@ -243,14 +243,15 @@ class Tester {
     // Rest for 0.2 s, so that the body settles.
     for (int i = 0; i < std::lround(script_.rate_hz / 5); ++i) hand_.at(place);
     const Touch touch = hand_.at(place);
-    if (!touch.stiffness) return add(Verdict::kNotJudged, claim, "it gives none");
+    if (!touch.stiffness) return add(Verdict::kNotJudged, claim, "it provides no stiffness");
     const auto force_at = [&](const Vec3& position) { return hand_.at(position).force; };
     const FdStiffness found = fd_stiffness(force_at, place, script_.stiffness_step, script_.state).value();
     const double again = (hand_.at(place).force - touch.force).norm();
     if (!script_.state.save && again > kSameForce * std::max(touch.force.norm(), 1.0))
-      return add(Verdict::kNotJudged, claim, "its force is not one of the place alone: give save and restore");
+      return add(Verdict::kNotJudged, claim,
+                 "its force does not only depend on the position: provide save and restore");
     const double size = found.stiffness.norm();
-    if (found.kink > kSmoothKink * size) return add(Verdict::kNotJudged, claim, "a surface is within a step");
+    if (found.kink > kSmoothKink * size) return add(Verdict::kNotJudged, claim, "there is a surface within the step");
     const Mat3 given = (*touch.stiffness + touch.stiffness->transpose()) / 2;
     const double off = (given - found.stiffness).norm();
     const double bound = script_.stiffness_tolerance * size + 2 * found.asymmetry + roundoff(touch.force);
@@ -269,7 +270,7 @@ class Tester {
     constexpr double kInfinity = std::numeric_limits<double>::infinity();
     const Vec3 deep = script_.start + script_.depth * into_;
     const auto odd = [&](const char* what, auto does) {
-      const std::string claim = std::string("is well after ") + what;
+      const std::string claim = std::string("works after ") + what;
       try {
         does();
         hand_.at(script_.start);
@@ -283,7 +284,7 @@ class Tester {
     odd("a hand at NaN", [&] { hand_.at(Vec3::Constant(kNan), Vec3::Constant(kNan)); });
     odd("a hand at infinity", [&] { hand_.at(Vec3(kInfinity, 0, 0)); });
     odd("a hand 1 km away", [&] { hand_.at(1e3 * into_); });
-    odd("a hand 1 km away, the other way", [&] { hand_.at(-1e3 * into_); });
+    odd("a hand 1 km away in the opposite direction", [&] { hand_.at(-1e3 * into_); });
     odd("a denormal", [&] { hand_.at(Vec3::Constant(std::numeric_limits<double>::denorm_min())); });
     odd("the same state twice", [&] {
       hand_.at(deep);

@@ -14,7 +14,7 @@ constexpr char kJson[] =
 
 int main(int argc, char** argv) {
   Options options{.client = {.name = "echo_motion", .rate_hz = 10}};
-  CommandLine line("Prints the hand's motion, the force it feels and the network's round trip.", options);
+  CommandLine line("Print the motion of the hand, the force on it, and the round-trip time of the network.", options);
   if (const auto exit_code = line.parse(argc, argv)) return *exit_code;
 
   return run(options, [&](const DeviceState& hand, const LinkStats& link) {

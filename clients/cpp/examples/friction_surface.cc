@@ -9,10 +9,10 @@ using namespace tendon;
 int main(int argc, char** argv) {
   Options options{.client = {.name = "friction_surface"}};
   double height_mm = 2, friction = 0.5;
-  CommandLine line("A dry table: it carries the hand, and a bristle that slips at Coulomb's limit holds it back.",
+  CommandLine line("Render a table with Coulomb friction, which uses a bristle that slips at the friction limit.",
                    options);
-  line.add("--height-mm", height_mm, "Of the table, along y", -100);
-  line.add("--friction", friction, "Its coefficient");
+  line.add("--height-mm", height_mm, "Height of the table along y, mm", -100);
+  line.add("--friction", friction, "Coefficient of friction");
   if (const auto exit_code = line.parse(argc, argv)) return *exit_code;
 
   constexpr double kTable = 1000, kBristle = 500;  // N/m

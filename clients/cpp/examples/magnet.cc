@@ -9,9 +9,10 @@ using namespace tendon;
 int main(int argc, char** argv) {
   Options options{.client = {.name = "magnet"}};
   double stiffness = 300, reach_mm = 8;
-  CommandLine line("A magnet at the origin: within its reach it draws the hand in, and holds it there.", options);
-  line.add("--stiffness-n-per-m", stiffness, "At the magnet");
-  line.add("--reach-mm", reach_mm, "Where the pull is strongest", 1);
+  CommandLine line("Render a magnet at the origin, which attracts the hand within its reach and holds it there.",
+                   options);
+  line.add("--stiffness-n-per-m", stiffness, "Stiffness at the magnet, N/m");
+  line.add("--reach-mm", reach_mm, "Distance of the maximum force, mm", 1);
   if (const auto exit_code = line.parse(argc, argv)) return *exit_code;
 
   return run(options, [&](const DeviceState& hand) -> Touch {

@@ -9,8 +9,8 @@ using namespace tendon;
 
 int main(int argc, char** argv) {
   Options options{.client = {.name = "maze"}};
-  CommandLine line("A maze in the x-y plane: each wall pushes back through the face by which the hand came in.",
-                   options);
+  CommandLine line(
+      "Render a maze in the x-y plane. Each wall pushes the hand back through the face by which it entered.", options);
   if (const auto exit_code = line.parse(argc, argv)) return *exit_code;
 
   const std::string maze[] = {"#########", "#   #   #", "# #   # #", "#   #   #", "#########"};

@@ -11,7 +11,9 @@ using namespace tendon;
 
 int main(int argc, char** argv) {
   Options options{.client = {.name = "robot", .rate_hz = 200}};
-  CommandLine line("A robot follows the hand and feels a table; button 0 engages it and is its clutch.", options);
+  CommandLine line(
+      "Let a simulated robot follow the hand at half scale and touch a table. Button 0 engages it, and is its clutch.",
+      options);
   if (const auto exit_code = line.parse(argc, argv)) return *exit_code;
 
   Follower follow({.scale = 0.5, .clutch_button = 0});

@@ -10,9 +10,9 @@ using namespace tendon;
 int main(int argc, char** argv) {
   Options options{.client = {.name = "texture"}};
   double pitch_mm = 4, force_n = 0.8;
-  CommandLine line("Corduroy: ridges along x, which push the hand into the grooves between them.", options);
-  line.add("--pitch-mm", pitch_mm, "From ridge to ridge", 0.5);
-  line.add("--force-n", force_n, "At the flank of a ridge");
+  CommandLine line("Render corduroy: ridges along x that push the hand into the grooves between them.", options);
+  line.add("--pitch-mm", pitch_mm, "Distance between ridges, mm", 0.5);
+  line.add("--force-n", force_n, "Force at the flank of a ridge, N");
   if (const auto exit_code = line.parse(argc, argv)) return *exit_code;
 
   return run(options, [&](const DeviceState& hand) -> Touch {

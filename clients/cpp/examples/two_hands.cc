@@ -9,10 +9,11 @@ using namespace tendon;
 int main(int argc, char** argv) {
   Options options{.client = {.name = "two_hands"}};
   double stiffness = 400, length_mm = 200;
-  CommandLine line("A rod from the device \"left\" to \"right\", 200 mm beside it along x: each hand feels the other.",
-                   options);
-  line.add("--stiffness-n-per-m", stiffness, "How hard it is to stretch");
-  line.add("--length-mm", length_mm, "At which it is at rest", 1);
+  CommandLine line(
+      "Connect the devices \"left\" and \"right\", 200 mm apart along x, by a rod: each hand feels the other.",
+      options);
+  line.add("--stiffness-n-per-m", stiffness, "Stiffness of the rod, N/m");
+  line.add("--length-mm", length_mm, "Length of the rod at rest, mm", 1);
   if (const auto exit_code = line.parse(argc, argv)) return *exit_code;
 
   std::map<std::string, Vec3> ends;  // of the rod, m, in the frame centered between the two devices

@@ -10,10 +10,12 @@ int main(int argc, char** argv) {
   Options options{.client = {.name = "virtual_fixture"}};
   std::string shape;
   double k = 400;
-  CommandLine line("The hand is free along a line, in a plane or inside a cone, and is led back when it leaves.",
-                   options);
-  line.add_argument("SHAPE", shape, {"line", "plane", "cone"}, "Along y; y = 0; with its tip at the origin, up y");
-  line.add("--stiffness-n-per-m", k, "Of the way back");
+  CommandLine line(
+      "Render a virtual fixture: the hand is free along a line, in a plane or inside a cone, and is pulled back "
+      "otherwise.",
+      options);
+  line.add_argument("SHAPE", shape, {"line", "plane", "cone"}, "Along y; y = 0; or from the origin along +y");
+  line.add("--stiffness-n-per-m", k, "Stiffness of the pull back, N/m");
   if (const auto exit_code = line.parse(argc, argv)) return *exit_code;
 
   const double slope = std::tan(0.35);  // of the cone: its radius over its height

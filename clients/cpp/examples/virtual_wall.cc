@@ -8,9 +8,9 @@ int main(int argc, char** argv) {
   Options options{.client = {.name = "virtual_wall", .rate_hz = 100}};
   double stiffness = 2000;
   bool local_model = false;
-  CommandLine line("A wall at x = 0 that pushes the hand back out along -x.", options);
-  line.add("--stiffness-n-per-m", stiffness, "How hard the wall is");
-  line.add("--local-model", local_model, "Send the stiffness too, so that the device loop can follow the hand");
+  CommandLine line("Render a wall at x = 0 that pushes the hand out along -x.", options);
+  line.add("--stiffness-n-per-m", stiffness, "Stiffness of the wall, N/m");
+  line.add("--local-model", local_model, "Also send the stiffness, for use between two answers");
   if (const auto exit_code = line.parse(argc, argv)) return *exit_code;
 
   return run(options, [&](const DeviceState& hand) -> Touch {

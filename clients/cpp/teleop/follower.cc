@@ -42,11 +42,12 @@ const Follower::Config& checked(const Follower::Config& config) {
   expect_scales(config.scale, config.force_scale);
   expect_text(is_rotation(config.rotation), "rotation",
               "of length " + rounded(std::sqrt(w * w + x * x + y * y + z * z), 6), "a unit quaternion");
-  expect_text(are_axes(config.axes), "axes", '"' + config.axes + '"', "some of \"xyz\", in that order");
+  expect_text(are_axes(config.axes), "axes", '"' + config.axes + '"',
+              "one or more of the letters \"xyz\", in this order");
   if (config.clutch_button) expect_between(0, 31, "clutch_button", *config.clutch_button);
   const bool by_button = config.engage_by == Follower::EngageBy::kButton;
-  expect_text(!by_button || config.clutch_button, "engage_by", "\"button\"", "\"call\": there is no clutch_button");
-  expect_text(!config.toggle || config.clutch_button, "toggle", "true", "false: there is no clutch_button");
+  expect_text(!by_button || config.clutch_button, "engage_by", "\"button\"", "\"call\" without clutch_button");
+  expect_text(!config.toggle || config.clutch_button, "toggle", "true", "false without clutch_button");
   expect_between(0.001, 10, "speed", config.speed);
   expect_between(0.01, 100, "spin", config.spin);
   expect_between(0, 10, "ramp_s", config.ramp_s);

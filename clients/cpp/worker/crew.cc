@@ -60,7 +60,7 @@ class PrivateFolder {
  public:
   PrivateFolder() {
     std::string name = (std::filesystem::temp_directory_path() / "tendon-front-XXXXXX").string();
-    if (::mkdtemp(name.data()) == nullptr) fail_with("cannot make a folder " + name);
+    if (::mkdtemp(name.data()) == nullptr) fail_with("cannot create the folder " + name);
     path_ = name;
   }
   ~PrivateFolder() {
@@ -78,7 +78,8 @@ class PrivateFolder {
 File listen_at_path(const std::string& path) {
   sockaddr_un to{};
   to.sun_family = AF_UNIX;
-  if (path.size() >= sizeof to.sun_path) throw std::runtime_error(path + " is too long for a socket: set TMPDIR");
+  if (path.size() >= sizeof to.sun_path)
+    throw std::runtime_error(path + " is too long for a socket: set TMPDIR to a shorter path");
   std::ranges::copy(path, std::begin(to.sun_path));
   File file(::socket(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
   if (!file.is_open() || ::bind(file.get(), reinterpret_cast<const sockaddr*>(&to), sizeof to) != 0 ||
@@ -92,7 +93,8 @@ File listen_at_path(const std::string& path) {
 File listen_at(const ServerName& name, std::uint16_t& port) {
   const Address address = name.look_up().addresses.front();
   if (address.ip == parse_address("0.0.0.0:0").ip || address.ip == Address{}.ip) {
-    throw std::runtime_error("listen: expected the address by which workers reach this machine, got " + name.text());
+    throw std::runtime_error("listen: expected the address at which workers can reach this machine, got " +
+                             name.text());
   }
   sockaddr_in6 to{};
   to.sin6_family = AF_INET6;
@@ -148,8 +150,8 @@ std::vector<pid_t> descendants(pid_t but) {
 }
 
 std::string in_words(int status) {
-  if (WIFSIGNALED(status)) return "it was ended by signal " + std::to_string(WTERMSIG(status));
-  return "it ended with exit status " + std::to_string(WEXITSTATUS(status));
+  if (WIFSIGNALED(status)) return "it was terminated by signal " + std::to_string(WTERMSIG(status));
+  return "it exited with status " + std::to_string(WEXITSTATUS(status));
 }
 
 }  // namespace
@@ -177,7 +179,7 @@ struct Crew::Files {
 };
 
 Crew::Crew(const Config& config) : config_(config), files_(std::make_unique<Files>()) {
-  if (::prctl(PR_SET_CHILD_SUBREAPER, 1) != 0) fail_with("cannot adopt orphans");
+  if (::prctl(PR_SET_CHILD_SUBREAPER, 1) != 0) fail_with("cannot become the subreaper of its worker processes");
   files_->poll = File(::epoll_create1(EPOLL_CLOEXEC));
   if (!files_->poll.is_open()) fail_with("epoll_create1");
   if (config.listen.empty()) {
@@ -277,7 +279,7 @@ void Crew::send(const Record& record) {
   if (!files_->stream.is_open()) return;
   const std::vector<std::byte> bytes = to_bytes(record);
   const ssize_t sent = ::send(files_->stream.get(), bytes.data(), bytes.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
-  if (sent != static_cast<ssize_t>(bytes.size())) fail("it does not read its stream");
+  if (sent != static_cast<ssize_t>(bytes.size())) fail("it does not read the data");
 }
 
 void Crew::accept_one() {
@@ -329,7 +331,7 @@ void Crew::read_stream() {
   }
   if (!more) {
     reap();  // the exit status explains more than the end of the stream
-    fail("its stream has ended");
+    fail("it has closed the connection");
   }
 }
 

@@ -84,11 +84,11 @@ void Front::give_up(LocalTime now, const std::string& why) {
 
 std::optional<Front::Order> Front::turn(LocalTime now) {
   if (worker_ == Worker::kBusy && now - asked_ > dead()) {
-    give_up(now, "it has not answered for " + std::to_string(dead() / std::chrono::milliseconds(1)) + " ms");
+    give_up(now, "it has not replied for " + std::to_string(dead() / std::chrono::milliseconds(1)) + " ms");
   }
   if (worker_ == Worker::kStarting && now >= due_) {
-    give_up(now, "it has not opened its stream within " + std::to_string(config_.start / std::chrono::seconds(1)) +
-                     " s of its start");
+    give_up(now, "it has not connected within " + std::to_string(config_.start / std::chrono::seconds(1)) +
+                     " s after its start");
   }
   if (to_give_up_) return GiveUp{*std::exchange(to_give_up_, std::nullopt)};
   if (worker_ == Worker::kAbsent && now >= due_) {

@@ -53,7 +53,7 @@ void FrontEngine::take(LocalTime now, const Crew::Event& event) {
     if (answer.touch) return front_.answered(now, *answer.touch);
     front_.refused(answer.refused);
     if (answer.refused != std::exchange(refused_, answer.refused)) {
-      say("an answer of the worker is refused: " + std::string(answer.refused));
+      say("an answer of the worker was rejected: " + std::string(answer.refused));
     }
   }
 }
@@ -66,7 +66,7 @@ std::optional<Reply> FrontEngine::carry_out(LocalTime now, const Front::Order& o
   } else if (const auto* give_up = std::get_if<Front::GiveUp>(&order)) {
     crew_.kill();
     const auto wait = std::chrono::duration<double>(front_.next_turn() - now).count();
-    says_ << name_ << ": worker " << front_.stats().launches << " is given up: " << give_up->why
+    says_ << name_ << ": worker " << front_.stats().launches << " was stopped: " << give_up->why
           << "; the next one starts in " << wait << " s\n"
           << std::flush;
   } else {

@@ -95,20 +95,20 @@ Record Codec::answer(std::uint64_t sequence, const DeviceState& hand, const Touc
 }
 
 Codec::ReadAnswer Codec::read_answer(const Record& record, std::uint64_t sequence, const DeviceState& hand) {
-  if (record.sequence != sequence) return {.refused = "it answers a state that it was not asked for"};
+  if (record.sequence != sequence) return {.refused = "it answers a state that was not requested"};
   const DataContent* const content = reader_.read(record.body);
-  if (content == nullptr) return {.refused = "it is no Datagram"};
-  if (content->forces_not_finite > 0) return {.refused = "a number of it is not finite"};
-  if (content->forces_out_of_bounds > 0) return {.refused = "a value of it is out of bounds"};
+  if (content == nullptr) return {.refused = "it is not a Datagram"};
+  if (content->forces_not_finite > 0) return {.refused = "it contains a number that is not finite"};
+  if (content->forces_out_of_bounds > 0) return {.refused = "it contains a value that is out of bounds"};
   if (content->frames.empty() && content->invalid == 0) {
     Touch unknown;
     unknown.unknown = true;
     return {.touch = unknown};
   }
   const auto* command = only_frame<ForceCommand>(content);
-  if (command == nullptr) return {.refused = "it is not one force"};
+  if (command == nullptr) return {.refused = "it does not contain exactly one force"};
   if (command->based_on_tick != hand.tick || command->sequence != sequence) {
-    return {.refused = "its force is of another state"};
+    return {.refused = "its force answers another state"};
   }
   return {.touch = to_touch(*command)};
 }

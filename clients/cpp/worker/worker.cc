@@ -27,7 +27,8 @@ constexpr std::string_view kTcp = "tcp:";
 std::string variable(const char* name) {
   const char* const value = std::getenv(name);  // NOLINT(concurrency-mt-unsafe): before any thread
   if (value == nullptr) {
-    throw std::runtime_error(std::string(name) + ": expected in the environment of a worker, which a front starts");
+    throw std::runtime_error(std::string(name) +
+                             ": expected in the environment of the worker, which is started by a front");
   }
   return value;
 }
@@ -78,7 +79,7 @@ WorkerStream::WorkerStream() {
   if (socket_ < 0 || !send(opening(secret))) {
     const std::string why = std::strerror(errno);  // NOLINT(concurrency-mt-unsafe)
     if (socket_ >= 0) ::close(socket_);
-    throw std::runtime_error(std::string(kAddressVariable) + ": no front listens at " + address + ": " + why);
+    throw std::runtime_error(std::string(kAddressVariable) + ": no front is listening at " + address + ": " + why);
   }
 }
 
@@ -111,7 +112,7 @@ void work(const Physics& engine) {
   Codec codec;
   while (const auto record = stream.next()) {
     const auto hand = codec.read_state(*record);
-    if (!hand) throw std::runtime_error("the front has sent what is no state");
+    if (!hand) throw std::runtime_error("expected a state from the front, received something else");
     if (!stream.send(codec.answer(record->sequence, *hand, engine(*hand)))) return;
   }
 }

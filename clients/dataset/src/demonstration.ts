@@ -66,6 +66,6 @@ export async function readDemonstration(file: string): Promise<Moment[]> {
       if (!(error instanceof SyntaxError) || !begun) throw broken;
     }
   }
-  if (!begun) throw new Error(`${file}: expected a demonstration, and it is empty`);
+  if (!begun) throw new Error(`${file}: expected a demonstration, found an empty file`);
   return moments;
 }

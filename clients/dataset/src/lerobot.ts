@@ -93,9 +93,9 @@ const padded = (value: number, digits: number): string => String(value).padStart
 
 /** Returns the number of written frames. Throws an Error if `out` is not empty or there is no episode. */
 export function writeDataset(episodes: readonly Episode[], { out, fps, task, robot }: DatasetConfig): number {
-  if (episodes.length === 0) throw new Error("no episode: the follower was engaged in none of the recordings");
+  if (episodes.length === 0) throw new Error("expected at least one episode: the follower is never engaged in the recordings");
   mkdirSync(out, { recursive: true });
-  if (readdirSync(out).length > 0) throw new Error(`${out}: expected an empty folder, or none; nothing is overwritten`);
+  if (readdirSync(out).length > 0) throw new Error(`${out}: expected an empty folder, or a new one; existing files are never overwritten`);
   mkdirSync(join(out, "meta"));
   const features = featuresOf(episodes);
   const lines: Record<"episodes" | "episodes_stats", object[]> = { episodes: [], episodes_stats: [] };

@@ -6,20 +6,20 @@ import { episodesOf, episodesOfRobot, type Episode } from "./episodes.js";
 import { writeDataset } from "./lerobot.js";
 import { readCoupling } from "./recording.js";
 
-const kHelp = `tendon-dataset: makes a robot-learning dataset of recordings of a coupling. LeRobot v2.1, without videos.
+const kHelp = `tendon-dataset: convert recordings of a coupling to a robot-learning dataset (LeRobot v2.1, without videos).
 
 Usage: tendon-dataset FILE... --out DIR [OPTIONS]
 
-  FILE.mcap               What tendon-replay --merge has written: a leader and its follower
-  FILE.jsonl              What a robot's program has written: tendon.demonstration of clients/python
-  -h, --help              Print this and leave
-  --out DIR               The dataset: a folder that is empty or does not exist
+  FILE.mcap               Recording of a leader and its follower, written by tendon-replay --merge
+  FILE.jsonl              Demonstration of a robot's program, written by tendon.demonstration of clients/python
+  -h, --help              Print this help and exit
+  --out DIR               Folder of the dataset; must be empty or not exist
   --fps NUMBER            Frames per second, 1 to 1000 [30]
-  --task TEXT             What the operator did [teleoperation]
-  --robot NAME            What the follower is [tendon]
-  --json                  One JSON object on stdout instead of a sentence
+  --task TEXT             Task of the operator [teleoperation]
+  --robot NAME            Type of the follower [tendon]
+  --json                  Print JSON on stdout, one object, instead of a sentence
 
-Each time that the operator engages begins an episode. Exit: 0 done; 1 a file cannot be used; 2 wrong usage.
+An episode starts each time the operator engages. Exit: 0 success; 1 a file cannot be used; 2 wrong usage.
 
 Example: tendon-replay leader.mcap --merge follower.mcap --into pair.mcap
          tendon-dataset pair.mcap --out press --task "press the wall"

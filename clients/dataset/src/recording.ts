@@ -138,13 +138,13 @@ export async function readCoupling(file: string): Promise<Coupling> {
     }
   } catch (error) {
     const { code, message } = error as { code?: string; message: string };
-    if (code === "ENOENT") throw new Error(`cannot read ${file}: there is no such file`);
+    if (code === "ENOENT") throw new Error(`cannot read ${file}: no such file`);
     if (code !== undefined) throw new Error(`cannot read ${file}: ${message}`);
-    throw new Error(`${file}: ${message}; tendon-replay ${file} --repair whole.mcap writes what can be read`);
+    throw new Error(`${file}: ${message}; tendon-replay ${file} --repair whole.mcap recovers the readable part`);
   }
   const { leader, follower } = ends as { leader: End; follower: End };
   if (scene === undefined || leader.ports.length === 0 || follower.ports.length === 0) {
-    if (!ended) throw new Error(`${file}: is cut off before both ends of a coupling are in it`);
+    if (!ended) throw new Error(`${file}: truncated before the data of both ends of a coupling`);
     throw new Error(`${file}: expected both ends of a coupling: tendon-replay LEADER.mcap --merge FOLLOWER.mcap --into pair.mcap`);
   }
   return { leader, follower, map: mapOf(scene) };

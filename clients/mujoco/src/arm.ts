@@ -66,7 +66,7 @@ export class Arm {
   private constructor(mj: MainModule, model: MjModel, site: string) {
     [this.#mj, this.#model] = [mj, model];
     this.#site = mj.mj_name2id(model, mj.mjtObj.mjOBJ_SITE.value, site);
-    if (this.#site < 0) throw new Error(`MuJoCo scene: it has no site "${site}"`);
+    if (this.#site < 0) throw new Error(`MuJoCo scene: expected a site "${site}", found none`);
     if (model.nu !== model.nv || model.nq !== model.nv)
       throw new Error(`MuJoCo scene: expected one servo for each of ${model.nv} hinges or slides, found ${model.nu}`);
     const body: number = model.site_bodyid[this.#site];

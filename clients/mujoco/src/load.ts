@@ -44,7 +44,7 @@ function compile(mj: MainModule, xml: string, assets: Assets): { readonly model:
     return { flexes: flexesOf(mj, spec), model: mj.mj_compile(spec, files) };
   } catch (error) {
     const text = error instanceof Error ? error.message : String(error);
-    const hint = /Poisson/.test(text) ? "; a solid that keeps its volume wants an engine for it: tendon-softbody's hex8-sri" : "";
+    const hint = /Poisson/.test(text) ? "; use an engine for incompressible solids: tendon-softbody with hex8-sri" : "";
     throw sceneError(text.replace(/^(MuJoCo Error: |Could not create Spec from XML string: |Error: )+/, "").trim() + hint);
   } finally {
     spec?.delete();
@@ -76,21 +76,21 @@ export function loadModel(mj: MainModule, xml: string, assets: Assets, warn: (te
   const soft = flexes.filter(({ young }) => young > 0);
   if (soft.length > 0 && option.integrator !== mj.mjtIntegrator.mjINT_DISCRETE.value) {
     model.delete();
-    throw sceneError(`flex "${soft[0]!.name}" is elastic and wants <option integrator="discrete"/>: other integrators let ` +
-      `it blow up (393 kN were seen), whereupon MuJoCo begins again at time 0 without a word`);
+    throw sceneError(`flex "${soft[0]!.name}" is elastic and requires <option integrator="discrete"/>: with other integrators, ` +
+      `it can become unstable, and MuJoCo restarts at time 0 without a warning`);
   }
   for (const { name, dim, poisson } of soft) {
     if (dim === 3 && poisson > kLargestPoisson)
-      warn(`flex "${name}": at poisson="${poisson}" tetrahedra lock, and it feels several times too hard; ${kLargestPoisson} is ` +
-        `as much as they bear (there a block of 8 x 8 x 4 cells is 1.7 times too stiff)`);
+      warn(`flex "${name}": at poisson="${poisson}" tetrahedra lock, and the body is several times too stiff; use at most ${kLargestPoisson} ` +
+        `(a block of 8 x 8 x 4 cells is then 1.7 times too stiff)`);
   }
   const changed = (model.ngeom > 0 ? stiffen(model.geom_solref, model.geom_solimp, model.ngeom) : 0) +
     (model.nflex > 0 ? stiffen(model.flex_solref, model.flex_solimp, model.nflex) : 0);
   if (changed > 0)
-    warn(`contact of ${changed} geoms and flexes was MuJoCo's default, into which a tool sinks half of its way; it is now ` +
-      `solref="${kStiffSolref.join(" ")}" solimp="${kStiffSolimp.join(" ")}". Write solref and solimp to have others`);
+    warn(`the contact of ${changed} geoms and flexes had MuJoCo's default, which is too soft for a tool; it was changed to ` +
+      `solref="${kStiffSolref.join(" ")}" solimp="${kStiffSolimp.join(" ")}". Set solref and solimp to use other values`);
   if (2 * option.timestep > kStiffSolref[0]!)
-    warn(`timestep="${option.timestep}" softens contact: MuJoCo raises solref to two steps, so that the force depends on the ` +
-      `step (B1: 0.56 N at 2 ms, 0.48 N at 50 ms); ${kStiffSolref[0]! / 2} does not`);
+    warn(`timestep="${option.timestep}" softens the contact: MuJoCo increases solref to two steps, so the force depends on the ` +
+      `step (0.56 N at 2 ms, 0.48 N at 50 ms); use at most ${kStiffSolref[0]! / 2}`);
   return model;
 }

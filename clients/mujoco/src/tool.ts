@@ -128,8 +128,8 @@ class HeldTool implements Tool {
       const inertia: number = model.dof_M0[this.#dof + i];
       if (!(inertia >= stiffness * step * step)) {
         const [least, unit, of] = i < 3 ? ["mass", "kg", "N/m"] : ["moment of inertia", "kg·m²", "N·m/rad"];
-        throw toolError(name, `is too light for its coupling: at ${stiffness} ${of} and a step of ${step} s it wants a ${least} of ` +
-          `${(stiffness * step * step).toExponential(1)} ${unit} or more, got ${inertia.toExponential(1)}`);
+        throw toolError(name, `is too light for its coupling: at ${stiffness} ${of} and a step of ${step} s, expected a ${least} of ` +
+          `at least ${(stiffness * step * step).toExponential(1)} ${unit}, got ${inertia.toExponential(1)}`);
       }
       return 2 * Math.sqrt(stiffness * inertia);
     });
@@ -221,9 +221,9 @@ export function toolOf(
   derives: boolean,
 ): Tool {
   if (!geoms.some((geom) => model.geom_contype[geom] !== 0 || model.geom_conaffinity[geom] !== 0))
-    throw toolError(name, "has no geom that touches anything");
+    throw toolError(name, "has no geom that can touch other geoms");
   if (model.body_mocapid[body] >= 0) return new LedTool(mj, model, data, body, geoms);
   const free = model.body_jntnum[body] === 1 && model.jnt_type[model.body_jntadr[body]] === mj.mjtJoint.mjJNT_FREE.value;
-  if (!free) throw toolError(name, `wants mocap="true", and the hand leads it, or a <freejoint/>, and the hand holds and turns it`);
+  if (!free) throw toolError(name, `requires mocap="true", so that the hand moves it, or a <freejoint/>, so that the hand holds and turns it`);
   return new HeldTool(mj, model, data, body, name, coupling, derives);
 }

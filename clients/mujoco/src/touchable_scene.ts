@@ -165,7 +165,7 @@ export class TouchableScene {
     // MuJoCo silently treats a tool at NaN or 1e30 as not in contact.
     if (!hand.every((value) => Math.abs(value) < this.mujoco.mjMAXVAL) || !isTurn || !(elapsed >= 0 && Number.isFinite(elapsed))) {
       const turned = isTurn ? "" : `, turned by (${[w, x, y, z].join(", ")}),`;
-      this.#tell(++this.#stats.badPositions, `a hand at (${hand.join(", ")}) m,${turned} ${elapsed} s later, is nowhere: not computed`);
+      this.#tell(++this.#stats.badPositions, `a hand at (${hand.join(", ")}) m,${turned} ${elapsed} s later, is not a valid position: not computed`);
       return undefined;
     }
     const steps = this.#stepsFor(elapsed);
@@ -175,7 +175,7 @@ export class TouchableScene {
     const lost = this.#lost();
     const touch = lost || this.#isIncomplete() ? undefined : this.#felt(orientation !== undefined);
     if (lost) {
-      this.#tell(++this.#stats.restarts, `MuJoCo lost the solution (${lost}): no force, and the scene begins anew`);
+      this.#tell(++this.#stats.restarts, `the simulation has become invalid (${lost}): no force, and the scene is reset`);
       this.#restart();
     }
     if (touch) ++this.#stats.answers;
@@ -203,7 +203,7 @@ export class TouchableScene {
 
   #body(name: string): number {
     const id: number = this.mujoco.mj_name2id(this.model, this.mujoco.mjtObj.mjOBJ_BODY.value, name);
-    if (id < 0) throw new Error(`MuJoCo scene: it has no body "${name}"`);
+    if (id < 0) throw new Error(`MuJoCo scene: expected a body "${name}", found none`);
     return id;
   }
 
@@ -218,7 +218,7 @@ export class TouchableScene {
     const due = Math.floor(this.#due / this.#timestep + 1e-6);
     const done = Math.min(due, this.#config.maxSteps);
     if (due > done && this.#stats.behind === 0)
-      this.#config.onWarning(`more than maxSteps = ${this.#config.maxSteps} were due for one answer: simulated time falls behind`);
+      this.#config.onWarning(`more than maxSteps = ${this.#config.maxSteps} steps were due for one answer: the simulation is slower than real time`);
     this.#stats.behind += (due - done) * this.#timestep;
     this.#due = Math.max(this.#due - due * this.#timestep, 0);
     return done;
@@ -240,7 +240,7 @@ export class TouchableScene {
     // 1 if there is no displacement: reach / 0
     const share = Math.min(1, (maxToolSpeed * time) / Math.hypot(...way), (maxToolSpin * time) / Math.hypot(...spin));
     if (share < 1)
-      this.#tell(++this.#stats.lagging, `the hand is faster than ${maxToolSpeed} m/s or ${maxToolSpin} rad/s: the tool lags behind it`);
+      this.#tell(++this.#stats.lagging, `the hand is faster than ${maxToolSpeed} m/s or ${maxToolSpin} rad/s: the tool lags behind the hand`);
     for (let step = 1; step <= steps; ++step) {
       const part = share * (step / steps);
       const turn = unit(product(rotationBy([part * spin[0], part * spin[1], part * spin[2]]), from.turn));
@@ -276,7 +276,7 @@ export class TouchableScene {
     const full = [contacts.value, constraints.value].some((kind) => now[kind]! > this.#warned[kind]!);
     this.#warned = now;
     if (full)
-      this.#tell(++this.#stats.incomplete, `MuJoCo has no room for all contacts: no force. <size memory="200M"/> gives it more`);
+      this.#tell(++this.#stats.incomplete, `MuJoCo has not enough memory for all contacts: no force. Use <size memory="200M"/>`);
     return full;
   }
 

@@ -84,7 +84,7 @@ void add_inverse(CLI::App& app, Chosen& chosen) {
                    "Pages from there may come in, beside those of this machine: https://lab.example")
       ->type_name("URL");
   command->add_flag("--anybody", options.anybody, "Listen beyond this machine: whoever reaches the port moves a motor");
-  command->add_option("--duration-s", options.duration_s, "Stop after this time; 0 = at Ctrl-C")
+  command->add_option("--duration-s", options.duration_s, "Stop after this time, s. 0: run until Ctrl-C")
       ->capture_default_str()
       ->check(CLI::Range(0.0, 1e9));
   command->callback([&chosen] { chosen = [] { return run_inverse(options); }; });

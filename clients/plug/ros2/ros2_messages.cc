@@ -66,7 +66,7 @@ std::variant<RosView::Wish, std::string> RosView::wish(const RosWrench& command,
     return "the frame_id \"" + printable(frame) + "\" is not known here: expected none, " + base_id_ + " or " +
            operator_id_;
   }
-  if (!command.force.allFinite() || !command.torque.allFinite()) return "a number of it is not finite";
+  if (!command.force.allFinite() || !command.torque.allFinite()) return "it contains a number that is not finite";
   const View& view = of_operator ? operator_ : base_;
   const double sign = negate ? -1 : 1;
   return Wish{.force = view.base_force(sign * command.force), .torque = view.base_torque(sign * command.torque)};

@@ -167,9 +167,8 @@ void Server::serve_states(const Moment& now) {
     if (plug.lost() != seen_[i].lost) {
       seen_[i].lost = plug.lost();
       for (const auto& client : clients_) {
-        client->peer.tell(
-            now, i, seen_[i].lost ? Severity::kWarning : Severity::kNormal,
-            seen_[i].lost ? "the haptic server is lost; trying again" : "the haptic server is looked for");
+        client->peer.tell(now, i, seen_[i].lost ? Severity::kWarning : Severity::kNormal,
+                          seen_[i].lost ? "the haptic server is lost; retrying" : "the haptic server is looked for");
       }
     }
     if (!plug.state() || plug.states() == seen_[i].states) continue;

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Prints the hand's motion, the force it feels and the network's round trip."""
+"""Print the motion of the hand, the force on it, and the round-trip time of the network."""
 import json
 import sys
 

@@ -1,14 +1,14 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""A dry table: it carries the hand, and a bristle that slips at Coulomb's limit holds it back (Dahl's model)."""
+"""Render a table with Coulomb friction, which uses a bristle that slips at the friction limit (Dahl's model)."""
 import sys
 from math import hypot
 
 from tendon import DeviceState, Touch, cli
 
 parser = cli.parser("friction_surface", __doc__)
-parser.add_argument("--height-mm", type=cli.at_least(-100), default=2, help="Of the table, along y [%(default)s]")
-parser.add_argument("--friction", type=cli.number(), default=0.5, help="Its coefficient [%(default)s]")
+parser.add_argument("--height-mm", type=cli.at_least(-100), default=2, help="Height of the table along y, mm [%(default)s]")
+parser.add_argument("--friction", type=cli.number(), default=0.5, help="Coefficient of friction [%(default)s]")
 options = parser.parse_args()
 TABLE, BRISTLE = 1000, 500  # N/m
 foot: list[float] = []  # end point of the bristle on the table; empty: no contact

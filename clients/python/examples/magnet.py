@@ -1,14 +1,14 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""A magnet at the origin: within its reach it draws the hand in, and holds it there."""
+"""Render a magnet at the origin, which attracts the hand within its reach and holds it there."""
 import sys
 from math import exp
 
 from tendon import DeviceState, Touch, cli
 
 parser = cli.parser("magnet", __doc__)
-parser.add_argument("--stiffness-n-per-m", type=cli.number(), default=300, help="At the magnet [%(default)s]")
-parser.add_argument("--reach-mm", type=cli.at_least(1), default=8, help="Where the pull is strongest [%(default)s]")
+parser.add_argument("--stiffness-n-per-m", type=cli.number(), default=300, help="Stiffness at the magnet, N/m [%(default)s]")
+parser.add_argument("--reach-mm", type=cli.at_least(1), default=8, help="Distance of the maximum force, mm [%(default)s]")
 options = parser.parse_args()
 
 

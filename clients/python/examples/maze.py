@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""A maze in the x-y plane: each wall pushes back through the face by which the hand came in."""
+"""Render a maze in the x-y plane. Each wall pushes the hand back through the face by which it entered."""
 import sys
 
 from tendon import DeviceState, Touch, cli

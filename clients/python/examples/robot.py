@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""A robot follows the hand at half its way and feels a table; button 0 engages it when let go, and is its clutch."""
+"""Let a simulated robot follow the hand at half scale and touch a table. Button 0 engages it, and is its clutch."""
 import sys
 import time
 

@@ -1,14 +1,14 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Corduroy: ridges along x, which push the hand into the grooves between them."""
+"""Render corduroy: ridges along x that push the hand into the grooves between them."""
 import sys
 from math import cos, pi, sin
 
 from tendon import DeviceState, Touch, cli
 
 parser = cli.parser("texture", __doc__)
-parser.add_argument("--pitch-mm", type=cli.at_least(0.5), default=4, help="From ridge to ridge [%(default)s]")
-parser.add_argument("--force-n", type=cli.number(), default=0.8, help="At the flank of a ridge [%(default)s]")
+parser.add_argument("--pitch-mm", type=cli.at_least(0.5), default=4, help="Distance between ridges, mm [%(default)s]")
+parser.add_argument("--force-n", type=cli.number(), default=0.8, help="Force at the flank of a ridge, N [%(default)s]")
 options = parser.parse_args()
 
 

@@ -1,14 +1,14 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""A rod from the device "left" to "right", which stands 200 mm beside it along x: each hand feels the other."""
+"""Connect the devices "left" and "right", 200 mm apart along x, by a rod: each hand feels the other."""
 import sys
 from math import dist
 
 from tendon import DeviceState, Touch, cli
 
 parser = cli.parser("two_hands", __doc__)
-parser.add_argument("--stiffness-n-per-m", type=cli.number(), default=400, help="How hard it is to stretch [%(default)s]")
-parser.add_argument("--length-mm", type=cli.at_least(1), default=200, help="At which it is at rest [%(default)s]")
+parser.add_argument("--stiffness-n-per-m", type=cli.number(), default=400, help="Stiffness of the rod, N/m [%(default)s]")
+parser.add_argument("--length-mm", type=cli.at_least(1), default=200, help="Length of the rod at rest, mm [%(default)s]")
 options = parser.parse_args()
 ends: dict[str, list[float]] = {}  # of the rod, m, in the frame centered between the two devices
 

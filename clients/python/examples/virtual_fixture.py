@@ -1,14 +1,14 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""A virtual fixture: the hand is free along a line, in a plane or inside a cone, and is led back when it leaves."""
+"""Render a virtual fixture: the hand is free along a line, in a plane or inside a cone, and is pulled back otherwise."""
 import sys
 from math import hypot, tan
 
 from tendon import DeviceState, Touch, cli
 
 parser = cli.parser("virtual_fixture", __doc__)
-parser.add_argument("shape", choices=("line", "plane", "cone"), help="Along y; y = 0; with its tip at the origin, up y")
-parser.add_argument("--stiffness-n-per-m", type=cli.number(), default=400, help="Of the way back [%(default)s]")
+parser.add_argument("shape", choices=("line", "plane", "cone"), help="Along y; y = 0; or from the origin along +y")
+parser.add_argument("--stiffness-n-per-m", type=cli.number(), default=400, help="Stiffness of the pull back, N/m [%(default)s]")
 options = parser.parse_args()
 SLOPE = tan(0.35)  # of the cone: its radius over its height
 

@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""A wall at x = 0 that pushes the hand back out along -x."""
+"""Render a wall at x = 0 that pushes the hand out along -x."""
 import sys
 
 from tendon import DeviceState, Touch, cli
 
 parser = cli.parser("virtual_wall", __doc__, rate_hz=100)
-parser.add_argument("--stiffness-n-per-m", type=cli.number(), default=2000, help="How hard the wall is [%(default)s]")
-parser.add_argument("--local-model", action="store_true", help="Send the stiffness too: the device follows the hand")
+parser.add_argument("--stiffness-n-per-m", type=cli.number(), default=2000, help="Stiffness of the wall, N/m [%(default)s]")
+parser.add_argument("--local-model", action="store_true", help="Also send the stiffness, for use between two answers")
 options = parser.parse_args()
 
 

@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Honey: the faster the hand moves, the more it is held back."""
+"""Render a viscous field: the force is proportional to the speed of the hand."""
 import sys
 
 from tendon import DeviceState, Touch, cli
 
 parser = cli.parser("viscous_field", __doc__)
-parser.add_argument("--damping-n-s-per-m", type=cli.number(), default=5, help="How thick it is [%(default)s]")
+parser.add_argument("--damping-n-s-per-m", type=cli.number(), default=5, help="Damping of the field, N·s/m [%(default)s]")
 options = parser.parse_args()
 
 

@@ -19,10 +19,10 @@ try:
     import nacl.bindings as _nacl
 except ImportError as _missing:
     raise ImportError(
-        f"tendon needs the packages protobuf and PyNaCl, and this Python ({_sys.executable}) does not have them: "
+        f"tendon requires the packages protobuf and PyNaCl, which this Python ({_sys.executable}) does not have: "
         f"{_missing}. "
-        "Either use Debian's: `apt install python3-protobuf python3-nacl`, and run your program with /usr/bin/python3. "
-        "Or install them for the Python of a virtual environment: "
+        "Either use those of Debian: `apt install python3-protobuf python3-nacl`, and run your program with "
+        "/usr/bin/python3. Or install them in a virtual environment: "
         f"`python3 -m venv venv && venv/bin/pip install {_Path(__file__).resolve().parents[1]}`, "
         "and run your program with venv/bin/python3."
     ) from None

@@ -36,7 +36,7 @@ def number(least: float = 0, most: float = math.inf) -> Callable[[str], float]:
         if value == 0 or (math.isfinite(value) and least <= value <= most):
             return value
         expected = "0, or " if least > 0 else ""
-        expected += f"{least:g} to {most:g}" if most < math.inf else f"a number from {least:g} on"
+        expected += f"{least:g} to {most:g}" if most < math.inf else f"a number of {least:g} or more"
         raise argparse.ArgumentTypeError(f'expected {expected}, got "{text}"')
 
     return parse
@@ -52,7 +52,7 @@ def at_least(least: float) -> Callable[[str], float]:
             value = math.nan
         if math.isfinite(value) and value >= least:
             return value
-        raise argparse.ArgumentTypeError(f'expected a number from {least:g} on, got "{text}"')
+        raise argparse.ArgumentTypeError(f'expected a number of {least:g} or more, got "{text}"')
 
     return parse
 
@@ -84,29 +84,28 @@ def parser(name: str, purpose: str | None, rate_hz: float = 0) -> argparse.Argum
         type=_address,
         default="127.0.0.1:47100",
         metavar="HOST:PORT",
-        help="Where tendond listens: a host name or an address, or unix:PATH on this machine [%(default)s]",
+        help="Address of tendond: a host name or an IP address, or unix:PATH on this machine [%(default)s]",
     )
     line.add_argument(
-        "--key", type=partial(_key, name), metavar="FILE", help="The client's key; without one only a server on this machine can be reached"
+        "--key",
+        type=partial(_key, name),
+        metavar="FILE",
+        help="Key file from `tendond keygen`. Not required for a server on this machine without keys",
     )
-    line.add_argument("--device", default="", metavar="NAME", help="The device's name, for a server that has several")
-    line.add_argument(
-        "--channel", default="", metavar="NAME", help="Name of the device's channel that takes the forces"
-    )
-    line.add_argument(
-        "--take-lease", action="store_true", help="Ask for the channel until this client holds it"
-    )
+    line.add_argument("--device", default="", metavar="NAME", help="Name of the device, for a server with several devices")
+    line.add_argument("--channel", default="", metavar="NAME", help="Name of the channel of the device")
+    line.add_argument("--take-lease", action="store_true", help="Request the channel until this client holds it")
     line.add_argument(
         "--rate-hz",
         type=number(MIN_RATE_HZ, MAX_RATE_HZ),
         default=rate_hz,
         metavar="HZ",
-        help="Times per second; 0 = for every device state that arrives [%(default)s]",
+        help="Rate of the answers, Hz. 0: answer every state [%(default)s]",
     )
     line.add_argument(
-        "--duration-s", type=number(0, 1e9), default=0.0, metavar="S", help="Stop after this time; 0 = at Ctrl-C"
+        "--duration-s", type=number(0, 1e9), default=0.0, metavar="S", help="Stop after this time, s. 0: run until Ctrl-C"
     )
-    line.add_argument("--json", action="store_true", help="One JSON object per line on stdout")
+    line.add_argument("--json", action="store_true", help="Print JSON on stdout, one object per line")
     line.set_defaults(name=name)
     return line
 
@@ -140,7 +139,7 @@ def run(
     logging.basicConfig(format=f"{options.name}: %(message)s", level=logging.INFO)
     if isinstance(physics, Mapping):
         if on_silence is not None:
-            raise TypeError("run: on_silence is for one device")
+            raise TypeError("run: on_silence can only be used with one device")
         return _run_several(options, physics)
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     start = time.monotonic()
@@ -185,7 +184,7 @@ def _config(options: argparse.Namespace, device: str, role: Role) -> Config:
 
 def _run_several(options: argparse.Namespace, physics: Mapping[str, Physics]) -> int:
     if not physics or "" in physics or options.device:
-        log.error("this program names its devices itself")
+        log.error("this program selects its devices itself: expected no --device")
         return 1
     start = time.monotonic()
     try:
@@ -311,11 +310,11 @@ def _print_summary(stats: Stats, duration_s: float, as_json: bool, device: str =
         }
         print(json.dumps({"summary": summary}, separators=(",", ":")), flush=True)
     elif stats.sessions == 0:
-        log.error("%swas not connected", f"{device}: " if device else "")
+        log.error("%swas never connected", f"{device}: " if device else "")
     else:
         log.info(
-            "%s%.1f s, %d states came in (%d skipped for a newer one), %d forces went out (%d more were unusable), "
-            "lost on the way: %d in, %d out, round trip %.2f ± %.2f ms",
+            "%s%.1f s, %d states received (%d skipped), %d forces sent (%d more unusable), "
+            "datagrams lost: %d incoming, %d outgoing, round trip %.2f ± %.2f ms",
             f"{device}: " if device else "",
             duration_s,
             stats.states,

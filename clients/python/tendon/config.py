@@ -88,7 +88,7 @@ class Config:
         for i, way in enumerate(self.ways):
             expect(way != "", f"ways[{i}].size", 0, "at least 1 byte")
             expect_at_most(limits.MAX_LABEL, way, f"ways[{i}]")
-            expect(way not in self.ways[:i], f"ways[{i}]", way, "no name twice")
+            expect(way not in self.ways[:i], f"ways[{i}]", way, "unique names")
         if self.key is not None:
             expect(len(self.key) == KEY_SIZE, "key.size", len(self.key), f"{KEY_SIZE} bytes")
         usable = bool(self.suites) and set(self.suites) <= set(usable_suites())
@@ -100,7 +100,7 @@ class Config:
         if self.state_deadband:
             check_state_deadband(self.state_deadband)
         observes = self.role is Role.OBSERVER
-        expect(not self.diagnostics or observes, "diagnostics", True, "False: they are for observers only")
+        expect(not self.diagnostics or observes, "diagnostics", True, "False: only observers can use diagnostics")
         expect(self.patience_s > 0, "patience_s", self.patience_s, "more than 0")
         expect(self.retry_min_s > 0, "retry_min_s", self.retry_min_s, "more than 0")
         expect(self.retry_max_s >= self.retry_min_s, "retry_max_s", self.retry_max_s, "at least retry_min_s")

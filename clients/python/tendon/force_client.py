@@ -151,7 +151,7 @@ class ForceClient:
     def _objection(self, hand: DeviceState, answer: Answer) -> str:
         """Returns why an answer is unusable, or an empty string."""
         if not 0 < hand.tick <= max(self._seen_tick, self._newest.tick if self._newest else 0):
-            return f"it answers tick {hand.tick}, which has not come"
+            return f"it answers tick {hand.tick}, which was not received"
         return answer.objection()
 
     def _of_handle(self, hand: DeviceState, answer: Answer) -> tuple[Torque | None, float | None]:
@@ -159,7 +159,7 @@ class ForceClient:
         if not answer.asks_for_handle:
             return None, None
         if self.welcome is None or FEATURE_HANDLE not in self.welcome.features:
-            self._stats.left_out = "torque and grip force: the server does not know them"
+            self._stats.left_out = "torque and grip force: the server does not support them"
             return None, None
         if answer.angular_stiffness is not None and hand.turning is None:
             self._stats.left_out = "angular stiffness: the device does not measure its orientation"
@@ -175,7 +175,7 @@ class ForceClient:
         computation.
         """
         if self.config.role is not Role.CONTROLLER:
-            raise PermissionError("an observer sends no force: role=Role.CONTROLLER")
+            raise PermissionError("an observer cannot send forces: expected role=Role.CONTROLLER")
         answer = read_touch(touch)
         session = self._session
         if session is None or self.welcome is None or not self.holds:
@@ -216,7 +216,7 @@ class ForceClient:
 
     def _way(self, answer: Answer) -> int:
         if not 0 <= answer.way <= len(self.config.ways):
-            self._stats.left_out = "the way of answering: Config.ways has none of its number"
+            self._stats.left_out = "the solver path: its number is not in Config.ways"
             return 0
         return answer.way if self.welcome and FEATURE_WAYS in self.welcome.features else 0
 
@@ -408,7 +408,7 @@ class ForceClient:
             return
         grants = outcome.welcome.grants
         if self._claims() and len(grants) != 1:
-            sentence = "that server has one device, with one channel: name none"
+            sentence = "this server has one device with one channel: omit their names"
             self._end(now, Phase.REFUSED, Code.UNSUPPORTED, sentence)
             return
         self._handshake = None
@@ -499,7 +499,7 @@ class ForceClient:
     def _take_request(self, now: int, session: Session, asked: Control) -> None:
         lost = asked.request
         if not isinstance(lost, LeaseLost):
-            session.answer(asked.id, Code.UNSUPPORTED, "that is a client's to ask")
+            session.answer(asked.id, Code.UNSUPPORTED, "only a client can send this request")
             return
         session.answer(asked.id, Code.OK, "")
         if (lost.device, lost.channel) != (self._place.device, self._place.channel):

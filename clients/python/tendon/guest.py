@@ -70,9 +70,9 @@ def parse_address(text: str) -> tuple[str, int]:
     host, colon, port = text.rpartition(":")
     bracketed = host.startswith("[") and host.endswith("]")
     if not colon or not port.isascii() or not port.isdigit() or not 0 < int(port) < 65536:
-        raise ValueError(f'expected HOST:PORT, got "{text}"')
+        raise ValueError(f'expected HOST:PORT like 127.0.0.1:47100 or [::1]:47100, got "{text}"')
     if not host or (":" in host and not bracketed):
-        raise ValueError(f'expected HOST:PORT, [IPv6]:PORT for an IPv6 address, got "{text}"')
+        raise ValueError(f'expected HOST:PORT like 127.0.0.1:47100 or [::1]:47100, got "{text}"')
     return (host[1:-1] if bracketed else host, int(port))
 
 
@@ -87,7 +87,7 @@ def unix_path(server: str) -> str | None:
         return None
     path = server.removeprefix("unix:")
     if not 0 < len(os.fsencode(path)) <= _MAX_UNIX_PATH or "\0" in path:
-        raise ValueError(f'expected unix:PATH with a path of 1 to {_MAX_UNIX_PATH} bytes, got "{server}"')
+        raise ValueError(f'expected unix:PATH with a path of 1 to {_MAX_UNIX_PATH} bytes, like unix:/run/tendon.sock, got "{server}"')
     return path
 
 
@@ -160,9 +160,9 @@ class Guest:
             return
         stats = self.core.stats
         if stats.phase is Phase.REFUSED and stats.code not in _KEEP_TRYING:
-            raise RefusedForGood(f"{self.server} refuses: {stats.reason}", stats.code)
+            raise RefusedForGood(f"{self.server} refused the connection: {stats.reason}", stats.code)
         if stats.phase is Phase.STOPPED and stats.code is Code.REPLACED:
-            raise RefusedForGood(f"{self.server} has ended this: {stats.reason}", stats.code)
+            raise RefusedForGood(f"{self.server} has ended the session: {stats.reason}", stats.code)
 
     def _follow_the_name(self) -> None:
         """Resolves the name again between two attempts, because the address of the server may have changed. If the
@@ -217,10 +217,10 @@ class Guest:
         if report is not self._told and report is not None:
             self._told = report
             if report.words:
-                log.warning("the server says: %s", report.words)
+                log.warning("report of the server: %s", report.words)
         if stats.unusable != self._said_unusable and stats.unusable:
             self._said_unusable = stats.unusable
-            log.warning("a force is not sent: %s", stats.unusable)
+            log.warning("a force was not sent: %s", stats.unusable)
         if stats.left_out != self._said_left_out and stats.left_out:
             self._said_left_out = stats.left_out
             log.warning("not sent with a force: %s", stats.left_out)
@@ -237,9 +237,9 @@ class Guest:
         if phase is Phase.OPEN and welcome is not None:
             return f"connected to {welcome.device_name} at {self.server} ({welcome.server}, {welcome.loop_hz} Hz)"
         if phase is Phase.UNANSWERED:
-            return f"no answer from {self.server}; {self._doubt}? Trying on"
+            return f"no answer from {self.server}; {self._doubt}? Retrying"
         if phase is Phase.REFUSED:
-            return f"{self.server} refuses: {self.core.live_stats.reason}"
+            return f"{self.server} refused the connection: {self.core.live_stats.reason}"
         if phase is Phase.LOST:
             return f"lost {self.server}: {self.core.live_stats.reason}"
         return ""
@@ -271,7 +271,7 @@ class AnyClient:
                 self._first_none_ns = hand.sampled_ns
             if hand.sampled_ns - self._first_none_ns >= 1_000_000_000:
                 self._may_lack_return = False
-                log.warning("the engine has returned None for 1 s, so no force is sent: is its `return` missing?")
+                log.warning("the engine has returned None for 1 s, so no force is sent; check for a missing `return`")
 
     def rearm(self) -> bool:
         """Asks the server to clear a latched fault of its device. Returns False if there is no session."""
@@ -381,7 +381,7 @@ def _look_up(server: str) -> list[Place]:
     try:
         found = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)
     except (OSError, UnicodeError) as error:
-        why = error.strerror if isinstance(error, OSError) else "that is no host name"
+        why = error.strerror if isinstance(error, OSError) else "not a valid host name"
         raise OSError(f"cannot find {host}: {why}") from None
     return [(family, protocol, address) for family, _, protocol, _, address in found]
 

@@ -97,13 +97,13 @@ class FollowerConfig:
         length = math.sqrt(sum(c * c for c in self.rotation))
         expect(len(self.rotation) == 4 and abs(length - 1) <= 1e-3, "rotation", f"of length {length:g}", "a unit quaternion")
         known = self.axes != "" and self.axes in ("x", "y", "z", "xy", "xz", "yz", "xyz")
-        expect(known, "axes", f'"{self.axes}"', 'some of "xyz", in that order')
+        expect(known, "axes", f'"{self.axes}"', 'one or more of the letters "xyz", in this order')
         if self.clutch_button is not None:
             between(0, 31, clutch_button=self.clutch_button)
         expect(self.engage_by in ("button", "call"), "engage_by", f'"{self.engage_by}"', '"button" or "call"')
         by_button = self.engage_by == "button" and self.clutch_button is None
-        expect(not by_button, "engage_by", '"button"', '"call": there is no clutch_button')
-        expect(not (self.toggle and self.clutch_button is None), "toggle", "true", "false: there is no clutch_button")
+        expect(not by_button, "engage_by", '"button"', '"call" without clutch_button')
+        expect(not (self.toggle and self.clutch_button is None), "toggle", "true", "false without clutch_button")
         between(0.001, 10, speed=self.speed)
         between(0.01, 100, spin=self.spin)
         between(0, 10, ramp_s=self.ramp_s)

@@ -99,7 +99,7 @@ class Stream:
         match content.frames if content is not None else ():
             case [DeviceState() as hand]:
                 return int.from_bytes(record[:_SEQUENCE_BYTES], "little"), hand
-        raise RuntimeError("the front has sent what is no state")
+        raise RuntimeError("expected a state from the front, received something else")
 
     def send(self, sequence: int, hand: DeviceState, touch: Touch | Sequence[float] | None) -> bool:
         """Answers the state `hand` with that `sequence`. If it is None, no force is known. Returns False if the
@@ -182,7 +182,7 @@ def _record(sequence: int, body: bytes) -> bytes:
 def _variable(name: str) -> str:
     value = os.environ.get(name)
     if not value:
-        raise RuntimeError(f"{name}: expected in the environment of a worker, which a front starts")
+        raise RuntimeError(f"{name}: expected in the environment of the worker, which is started by a front")
     return value
 
 
@@ -202,7 +202,7 @@ def _connected(address: str, opening: bytes) -> socket.socket:
             link.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         link.sendall(_record(0, opening))
     except OSError as error:
-        raise ConnectionError(f"{ADDRESS_VARIABLE}: no front listens at {address}: {error}") from None
+        raise ConnectionError(f"{ADDRESS_VARIABLE}: no front is listening at {address}: {error}") from None
     return link
 
 

@@ -129,7 +129,7 @@ int answer(const Arguments& arguments, const Ranks& ranks) {
     share_out(bytes);
     if (bytes.empty()) return 0;
     const auto hand = codec.read_state({.body = bytes});
-    if (!hand) throw std::runtime_error("the front has sent what is no state");
+    if (!hand) throw std::runtime_error("expected a state from the front, received something else");
     const tendon::Touch touch = body.answer(*hand);
     if (stream) stream->send(codec.answer(sequence, *hand, touch));
   }

@@ -2,7 +2,7 @@
 // Prints the position of the hand, the force on it, and the network's round-trip time. An observer.
 import { commandLine, run, type Vec3 } from "tendon-client/node";
 
-const { options } = commandLine("Prints the hand's motion, the force it feels and the network's round trip.", {
+const { options } = commandLine("Print the motion of the hand, the force on it, and the round-trip time of the network.", {
   name: "echo_motion",
   rateHz: 10,
 });

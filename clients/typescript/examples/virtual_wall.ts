@@ -3,11 +3,11 @@
 import { commandLine, run } from "tendon-client/node";
 
 const { options, values } = commandLine(
-  "A wall at x = 0 that pushes the hand back out along -x.",
+  "Render a wall at x = 0 that pushes the hand out along -x.",
   { name: "virtual_wall", rateHz: 100 },
   {
-    "stiffness-n-per-m": [2000, "How hard the wall is"],
-    "local-model": [false, "Send the stiffness too, so that the device loop can follow the hand"],
+    "stiffness-n-per-m": [2000, "Stiffness of the wall, N/m"],
+    "local-model": [false, "Also send the stiffness, for use between two answers"],
   },
 );
 const k = values["stiffness-n-per-m"];

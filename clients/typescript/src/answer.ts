@@ -73,7 +73,7 @@ export function usable(
   const turns = torque !== undefined || angularStiffness !== undefined;
   if (!turns && gripForce === undefined) return { answer: { force, model }, leftOut: "" };
   if (!features.includes(kFeatureHandle)) {
-    return { answer: { force, model }, leftOut: "torque and grip force: the server does not know them" };
+    return { answer: { force, model }, leftOut: "torque and grip force: the server does not support them" };
   }
   const at = hand.turning?.orientation;
   const turned = angularStiffness && at && { at, stiffness: angularStiffness };

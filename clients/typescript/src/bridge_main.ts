@@ -4,19 +4,19 @@ import { parseArgs } from "node:util";
 import { Bridge, kBridgeDefaults, type BridgeConfig } from "./bridge.js";
 import { parseAddress, parseServer } from "./udp.js";
 
-const kHelp = `tendon-bridge: lets pages in browsers talk to tendond. One WebSocket message is one datagram; it has no key.
+const kHelp = `tendon-bridge: connect web pages to tendond. One WebSocket message is one datagram; the bridge has no key.
 
 Usage: tendon-bridge [OPTIONS]
 
-  -h, --help              Print this and leave
-  --listen HOST:PORT      For WebSockets; port 0 lets the system choose [${kBridgeDefaults.listen}]
-  --to HOST:PORT          Where tendond listens [${kBridgeDefaults.to}]
-  --origin URL            Pages from there may connect, besides those from this machine; may be repeated
-  --max-peers NUMBER      WebSockets at once [${kBridgeDefaults.maxPeers}]
-  --max-rate-hz NUMBER    Datagrams per second that one page may send [${kBridgeDefaults.maxRateHz}]
-  --json                  One JSON object per line on stdout: listening, stopped
+  -h, --help              Print this help and exit
+  --listen HOST:PORT      Address for WebSockets; port 0: a free port [${kBridgeDefaults.listen}]
+  --to HOST:PORT          Address of tendond [${kBridgeDefaults.to}]
+  --origin URL            Also accept pages from this origin; otherwise only from this machine. Repeatable
+  --max-peers NUMBER      Maximum number of WebSockets [${kBridgeDefaults.maxPeers}]
+  --max-rate-hz NUMBER    Maximum number of datagrams per second from one page [${kBridgeDefaults.maxRateHz}]
+  --json                  Print JSON on stdout, one object per line: listening, stopped
 
-From another machine it passes encrypted datagrams on only.
+From pages on other machines, only encrypted datagrams are forwarded.
 
 Example: tendon-bridge --to 127.0.0.1:47100 --origin https://lab.example
 `;

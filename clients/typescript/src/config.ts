@@ -126,7 +126,7 @@ export function checked(config: ClientConfig): Required<ClientConfig> {
   for (const [i, way] of full.ways.entries()) {
     expect(way !== "", `ways[${i}].size`, 0, "at least 1 byte");
     expectAtMost(kMaxLabel, way, `ways[${i}]`);
-    expect(full.ways.indexOf(way) === i, `ways[${i}]`, way, "no name twice");
+    expect(full.ways.indexOf(way) === i, `ways[${i}]`, way, "unique names");
   }
   expect(!key || key.length === kKeySize, "key.size", key?.length, `${kKeySize} bytes`);
   const usable = full.suites.length > 0 && full.suites.every((suite) => kUsableSuites.includes(suite));

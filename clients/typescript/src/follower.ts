@@ -90,11 +90,11 @@ function complete(given: FollowerConfig): Complete {
   between(0.01, 100, { scale, forceScale });
   const length = Math.hypot(rotation.w, rotation.x, rotation.y, rotation.z);
   expect(Math.abs(length - 1) <= 1e-3, "rotation", `of length ${Number(length.toPrecision(6))}`, "a unit quaternion");
-  expect(/^(?=.)x?y?z?$/.test(axes), "axes", `"${axes}"`, 'some of "xyz", in that order');
+  expect(/^(?=.)x?y?z?$/.test(axes), "axes", `"${axes}"`, 'one or more of the letters "xyz", in this order');
   if (isClutch) between(0, 31, { clutchButton: clutchButton! });
   expect(engageBy === "button" || engageBy === "call", "engageBy", `"${engageBy}"`, '"button" or "call"');
-  expect(engageBy === "call" || isClutch, "engageBy", '"button"', '"call": there is no clutchButton');
-  expect(!toggle || isClutch, "toggle", "true", "false: there is no clutchButton");
+  expect(engageBy === "call" || isClutch, "engageBy", '"button"', '"call" without clutchButton');
+  expect(!toggle || isClutch, "toggle", "true", "false without clutchButton");
   between(0.001, 10, { speed });
   between(0.01, 100, { spin });
   between(0, 10, { rampS });

@@ -111,7 +111,7 @@ export class ForceClient {
   ) {
     this.#config = checked(config);
     this.#physics = "physics" in callback ? callback.physics : undefined;
-    expect(!(this.#physics && this.#config.diagnostics), "diagnostics", true, "false: they are for observers only");
+    expect(!(this.#physics && this.#config.diagnostics), "diagnostics", true, "false: only observers can use diagnostics");
     this.#watch = "watch" in callback ? callback.watch : undefined;
     this.#role = this.#physics ? Role.CONTROLLER : Role.OBSERVER;
     this.#send = send;
@@ -302,7 +302,7 @@ export class ForceClient {
     }
     const { connectionId, welcome, seal } = outcome;
     if (this.#claims && welcome.grants?.length !== 1) {
-      this.#end(now, "refused", Code.UNSUPPORTED, "that server has one device, with one channel: name none");
+      this.#end(now, "refused", Code.UNSUPPORTED, "this server has one device with one channel: omit their names");
       return;
     }
     this.#handshake = undefined;
@@ -404,7 +404,7 @@ export class ForceClient {
 
   #takeRequest(now: Nanoseconds, id: number, request: Request): void {
     if (request.kind !== "leaseLost") {
-      this.#session?.answer({ id, code: Code.UNSUPPORTED, detail: "that is a client's to ask" });
+      this.#session?.answer({ id, code: Code.UNSUPPORTED, detail: "only a client can send this request" });
       return;
     }
     this.#session?.answer({ id, code: Code.OK, detail: "" });
@@ -497,7 +497,7 @@ export class ForceClient {
     if (Number.isInteger(way) && way >= 0 && way <= this.#config.ways.length) {
       return way > 0 && this.#welcome!.features.includes(kFeatureWays) ? way : undefined;
     }
-    this.#stats.leftOut = "the way of answering: the config's ways have none of its number";
+    this.#stats.leftOut = "the solver path: its number is not in the ways of the config";
     return undefined;
   }
 

@@ -40,8 +40,9 @@ function label(option: string, text: string): string {
 
 /**
  * Parses the command line shared by all clients, --server, --key, --device, --channel, --take-lease, --rate-hz,
- * --duration-s, --json and --help, and the options of the program: `{ "stiffness-n-per-m": [2000, "How hard the wall
- * is"] }`. Exits with 0 after --help, with 1 if the key cannot be read, and with 2 if the command line is invalid.
+ * --duration-s, --json and --help, and the options of the program: `{ "stiffness-n-per-m": [2000, "Stiffness of
+ * the wall, N/m"] }`. Exits with 0 after --help, with 1 if the key cannot be read, and with 2 if the command line is
+ * invalid.
  */
 export function commandLine<Extras extends Record<string, Extra> = Record<never, never>>(
   purpose: string,
@@ -107,15 +108,15 @@ function readKey(program: string, file: string): Uint8Array {
 
 function help(purpose: string, { name, rateHz }: Shared, extras: Record<string, Extra>): string {
   const lines: [string, string][] = [
-    ["-h, --help", "Print this text and exit"],
-    ["--server HOST:PORT", "Where tendond listens: a host name or an address [127.0.0.1:47100]"],
-    ["--key FILE", "Key file (see `tendond keygen`); a server on this machine that has no keys needs none"],
-    ["--device NAME", "The device's name, for a server that has several"],
-    ["--channel NAME", "Name of the device's channel that takes the forces"],
-    ["--take-lease", "Ask for the channel until this client holds it"],
-    ["--rate-hz NUMBER", `Times per second; 0 = for every device state that arrives [${rateHz}]`],
-    ["--duration-s NUMBER", "Stop after this time; 0 = at Ctrl-C [0]"],
-    ["--json", "One JSON object per line on stdout"],
+    ["-h, --help", "Print this help and exit"],
+    ["--server HOST:PORT", "Address of tendond: a host name or an IP address [127.0.0.1:47100]"],
+    ["--key FILE", "Key file from `tendond keygen`. Not required for a server on this machine without keys"],
+    ["--device NAME", "Name of the device, for a server with several devices"],
+    ["--channel NAME", "Name of the channel of the device"],
+    ["--take-lease", "Request the channel until this client holds it"],
+    ["--rate-hz NUMBER", `Rate of the answers, Hz. 0: answer every state [${rateHz}]`],
+    ["--duration-s NUMBER", "Stop after this time, s. 0: run until Ctrl-C [0]"],
+    ["--json", "Print JSON on stdout, one object per line"],
     ...Object.entries(extras).map(([option, [value, meaning]]): [string, string] =>
       value === false ? [`--${option}`, meaning] : [`--${option} NUMBER`, `${meaning} [${value}]`]),
   ];

@@ -26,13 +26,13 @@ function sentence(guest: Guest, { server, key }: Options): string {
       return `connected to ${deviceName} at ${server} (${program}, ${loopHz} Hz)`;
     }
     case "unanswered":
-      return `no answer from ${server}; is tendond running there${key ? ", and does it have this key" : ""}? Trying on`;
+      return `no answer from ${server}; is tendond running there${key ? ", and does it have this key" : ""}? Retrying`;
     case "refused":
-      return `${server} refuses: ${reason}${isFinal(code) ? "" : "; trying again"}`;
+      return `${server} refused the connection: ${reason}${isFinal(code) ? "" : "; retrying"}`;
     case "lost":
-      return `lost ${server}: ${reason}; trying again`;
+      return `lost ${server}: ${reason}; retrying`;
     case "stopped":
-      return code === Code.OK ? "" : `${server} ends it: ${reason}`;
+      return code === Code.OK ? "" : `${server} has ended the session: ${reason}`;
     case "greeting":
       return "";
   }
@@ -48,19 +48,19 @@ function printSummary(stats: ClientStats, seconds: number, { name, json }: Optio
     };
     console.log(JSON.stringify({ summary }));
   } else if (!link) {
-    say(name, "was not connected");
+    say(name, "was never connected");
   } else {
     say(name,
-      `${seconds.toFixed(1)} s, ${states} states came in (${statesSkipped} skipped for a newer one), ` +
-      `${forces} forces went out (${forcesUnusable} more were unusable), lost on the way: ${link.lost} in, ` +
-      `${link.lostOutgoing} out, round trip ${link.smoothedRoundTripMs.toFixed(2)} ± ` +
+      `${seconds.toFixed(1)} s, ${states} states received (${statesSkipped} skipped), ` +
+      `${forces} forces sent (${forcesUnusable} more unusable), datagrams lost: ${link.lost} incoming, ` +
+      `${link.lostOutgoing} outgoing, round trip ${link.smoothedRoundTripMs.toFixed(2)} ± ` +
       `${link.roundTripVariationMs.toFixed(2)} ms`);
   }
 }
 
 function printReport(report: LinkReport, { name, json }: Options): void {
   if (!json) {
-    if (report.words) say(name, `the server says: ${report.words}`);
+    if (report.words) say(name, `report of the server: ${report.words}`);
     return;
   }
   const ms = (ns: bigint): number => Number(ns) / 1e6;
@@ -108,7 +108,7 @@ export async function run(
       changed.stop();
     },
     onReport: (report) => printReport(report, options),
-    onUnusable: (why) => say(name, `a force is not sent: ${why}`),
+    onUnusable: (why) => say(name, `a force was not sent: ${why}`),
   }, callback);
 
   const stop = (): void => guest.stop();

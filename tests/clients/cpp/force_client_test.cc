@@ -308,7 +308,7 @@ TEST(ForceClient, AWayWithoutANameIsLeftOutAndTheForceIsSent) {
   world.run(kSecond);
   ASSERT_FALSE(world.z->forces.empty());
   for (const auto& [at, command] : world.z->forces) EXPECT_EQ(command.way, 0U);
-  EXPECT_EQ(world.a->stats().left_out, "the way of answering: Config::ways has none of its number");
+  EXPECT_EQ(world.a->stats().left_out, "the solver path: its number is not in Config::ways");
 }
 
 TEST(ForceClient, SendsNoStiffnessToAServerWithoutLocalModels) {
@@ -466,7 +466,7 @@ TEST(ForceClient, RefusesAnImpossibleConfigurationByFieldValueAndExpectation) {
   EXPECT_EQ(complaint({.ways = std::vector<std::string>(9, "x")}), "ways.size = 9: expected at most 8 names");
   EXPECT_EQ(complaint({.ways = {"near", ""}}), "ways[1].size = 0: expected at least 1 byte");
   EXPECT_EQ(complaint({.ways = {std::string(25, 'x')}}), "ways[0].size = 25: expected at most 24 bytes");
-  EXPECT_EQ(complaint({.ways = {"near", "linear", "near"}}), "ways[2] = \"near\": expected no name twice");
+  EXPECT_EQ(complaint({.ways = {"near", "linear", "near"}}), "ways[2] = \"near\": expected unique names");
   EXPECT_EQ(complaint({.rate_hz = -1}), "rate_hz = -1: expected 0, or 0.001 to 100000");
   EXPECT_EQ(complaint({.rate_hz = 1e-300}), "rate_hz = 1e-300: expected 0, or 0.001 to 100000");
   EXPECT_EQ(complaint({.rate_hz = std::nan("")}), "rate_hz = nan: expected 0, or 0.001 to 100000");

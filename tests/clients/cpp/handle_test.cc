@@ -66,7 +66,7 @@ TEST(ForceClientHandle, SaysWhatItCannotSendAndSendsTheForce) {
       EXPECT_EQ(command.grip_force.has_value(), knows);
     }
     EXPECT_EQ(world.a->stats().left_out, knows ? "angular stiffness: the device does not measure its orientation"
-                                               : "torque and grip force: the server does not know them");
+                                               : "torque and grip force: the server does not support them");
   }
 }
 

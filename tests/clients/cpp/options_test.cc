@@ -80,7 +80,7 @@ TEST(CommandLine, TakesOneOfTheChoicesAndNumbersFromTheLeastOn) {
   EXPECT_EQ(parse_shape({}, shape, reach, err), 2);
   for (const char* const wrong : {"0", "0.9", "-1", "inf", "nan", "1x"}) {
     EXPECT_EQ(parse_shape({"line", "--reach-mm", wrong}, shape, reach, err), 2) << wrong;
-    EXPECT_NE(err.find("expected a number from 1 on, got \"" + std::string(wrong)), std::string::npos) << err;
+    EXPECT_NE(err.find("expected a number of 1 or more, got \"" + std::string(wrong)), std::string::npos) << err;
   }
 }
 

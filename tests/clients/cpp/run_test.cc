@@ -50,7 +50,7 @@ TEST(Run, WithSeveralDevicesSaysOfWhichOneItSpeaks) {
   const std::string said = testing::internal::GetCapturedStderr();
   for (const std::string device : {"left", "right"}) {
     EXPECT_NE(said.find("rod at " + device + ": no answer from 127.0.0.1:9"), std::string::npos) << said;
-    EXPECT_NE(said.find("rod at " + device + ": was not connected"), std::string::npos) << said;
+    EXPECT_NE(said.find("rod at " + device + ": was never connected"), std::string::npos) << said;
   }
 }
 
@@ -64,7 +64,7 @@ TEST(Run, WithSeveralDevicesTakesNoOtherNameOfOne) {
   options.client.device = "middle";
   EXPECT_EQ(run(options, {{"left", nothing}, {"right", nothing}}), 1);
   const std::string said = testing::internal::GetCapturedStderr();
-  const std::string refusal = "rod: this program names its devices itself\n";
+  const std::string refusal = "rod: this program selects its devices itself: expected no --device\n";
   EXPECT_EQ(said, refusal + refusal + refusal);
 }
 
@@ -83,7 +83,7 @@ TEST(Run, WithHandsTogetherEachHasItsDeviceAndItsServer) {
   const std::string said = testing::internal::GetCapturedStderr();
   for (const std::string line :
        {"grasp at left: no answer from 127.0.0.1:9", "grasp at right: no answer from 127.0.0.1:19",
-        "grasp: this program names its devices itself"}) {
+        "grasp: this program selects its devices itself: expected no --device"}) {
     EXPECT_NE(said.find(line), std::string::npos) << said;
   }
 }

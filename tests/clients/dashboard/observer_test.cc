@@ -238,7 +238,7 @@ TEST_F(ObserverTest, SaysWhyItIsRefused) {
   loop_ = std::make_unique<NetworkLoop>(config, server_, now_);
   run(seconds(1));
   EXPECT_EQ(board_.contact(), Contact::kRefused);
-  EXPECT_EQ(board_.words(), "127.0.0.1:47100 refuses: there are 0 observers already");
+  EXPECT_EQ(board_.words(), "127.0.0.1:47100 refused the connection: there are 0 observers already");
 }
 
 TEST_F(ObserverTest, IsToldTheEndsOfACoupling) {

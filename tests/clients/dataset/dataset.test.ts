@@ -108,7 +108,7 @@ describe("writeDataset", () => {
 
   it("overwrites nothing, and makes no dataset of nothing", (test) => {
     const out = scratch(test);
-    assert.throws(() => writeDataset([], { out, ...config }), /no episode/);
+    assert.throws(() => writeDataset([], { out, ...config }), /at least one episode/);
     writeFileSync(join(out, "mine"), "x");
     assert.throws(() => writeDataset(episodesOf(coupling(), 10), { out, ...config }), /expected an empty folder/);
   });
@@ -200,7 +200,7 @@ describe("readDemonstration", () => {
 
   it("names file and line of what it does not understand", async (test) => {
     const refuses = (text: string, why: RegExp) => assert.rejects(readDemonstration(file(test, text)), why);
-    await refuses("", /press\.jsonl: expected a demonstration, and it is empty/);
+    await refuses("", /press\.jsonl: expected a demonstration, found an empty file/);
     await refuses(kLine, /line 1: expected \{"kind":"tendon demonstration","version":1\}/);
     await refuses(`${kHead}${kLine.replace("[1,0,0]", "[1,0]")}`, /line 2: position_m: expected three numbers/);
     await refuses(`${kHead}{"tick":\n${kLine}`, /line 2: /);

@@ -45,7 +45,7 @@ TEST(Desk, SaysOnceThatNobodyAnswersHoweverOftenItTries) {
     for (LocalTime now = kStart; now < kStart + seconds(20); now += milliseconds(10)) desk.turn(now);
   }
   EXPECT_EQ(testing::internal::GetCapturedStderr(),
-            "tendon-plug: right: no answer from 127.0.0.1:9; is tendond running there? Trying on\n");
+            "tendon-plug: right: no answer from 127.0.0.1:9; is tendond running there? Retrying\n");
 }
 
 TEST(Desk, WritesALineForEachDeviceOnceASecondWithTheBridgesCounts) {

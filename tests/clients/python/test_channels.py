@@ -139,7 +139,7 @@ def test_a_server_that_does_not_grant_what_was_named_is_left(grants):
     stage.run(50 * MS)
     stats = stage.client.stats
     assert (stats.phase, stats.code, stats.sessions) == (Phase.REFUSED, Code.UNSUPPORTED, 0)
-    assert stats.reason == "that server has one device, with one channel: name none"
+    assert stats.reason == "this server has one device with one channel: omit their names"
     assert stage.seen == []
 
 
@@ -285,7 +285,7 @@ def test_what_a_server_cannot_ask_is_answered_so():
     stage.server.session.request(Rearm())
     stage.run(100 * MS)
     (answer,) = stage.answers
-    assert (answer.code, answer.detail) == (Code.UNSUPPORTED, "that is a client's to ask")
+    assert (answer.code, answer.detail) == (Code.UNSUPPORTED, "only a client can send this request")
 
 
 def test_a_lease_given_up_does_not_come_back_by_an_older_answer():

@@ -314,8 +314,8 @@ def test_all_that_the_engine_knows_travels():
         (2, True, 2, ""),
         (0, True, 0, ""),
         (2, False, 0, ""),
-        (3, True, 0, "the way of answering: Config.ways has none of its number"),
-        (-1, True, 0, "the way of answering: Config.ways has none of its number"),
+        (3, True, 0, "the solver path: its number is not in Config.ways"),
+        (-1, True, 0, "the solver path: its number is not in Config.ways"),
     ],
 )
 def test_a_force_says_which_of_its_engines_ways_it_was(way, agreed, sent, left_out):
@@ -335,7 +335,7 @@ def test_a_force_says_which_of_its_engines_ways_it_was(way, agreed, sent, left_o
         (9 * ("x",), "ways.size = 9: expected at most 8 names"),
         (("near", ""), "ways[1].size = 0: expected at least 1 byte"),
         ((25 * "x",), "ways[0].size = 25: expected at most 24 bytes"),
-        (("near", "near"), "ways[1] = near: expected no name twice"),
+        (("near", "near"), "ways[1] = near: expected unique names"),
     ],
 )
 def test_impossible_names_of_ways_are_refused(ways, words):
@@ -383,7 +383,7 @@ def test_an_answer_to_a_state_that_did_not_come_is_not_sent():
     sent = len(stage.forces)
     hand = replace(stage.seen[-1], tick=stage.seen[-1].tick + 1000)
     stage.client.send(hand, Touch((1, 0, 0)))
-    assert stage.client.stats.unusable == f"it answers tick {hand.tick}, which has not come"
+    assert stage.client.stats.unusable == f"it answers tick {hand.tick}, which was not received"
     stage.client.send(stage.seen[-1], Touch((0, -2e12, 0)))
     assert stage.client.stats.unusable == "the force exceeds 1e12 N"
     assert stage.client.stats.forces_unusable == 2
@@ -424,7 +424,7 @@ def test_diagnostics_are_the_newest_reports_of_the_session():
 
 
 def test_a_controller_does_not_ask_for_diagnostics():
-    with pytest.raises(ValueError, match="they are for observers only"):
+    with pytest.raises(ValueError, match="only observers can use diagnostics"):
         Config(diagnostics=True)
 
 

@@ -203,7 +203,7 @@ def test_an_engine_that_only_returns_none_is_told_so_once(caplog):
         assert caplog.messages == []
         answered(client, [None] * 300)
     assert caplog.messages == [
-        "the engine has returned None for 1 s, so no force is sent: is its `return` missing?"
+        "the engine has returned None for 1 s, so no force is sent; check for a missing `return`"
     ]
 
 
@@ -229,7 +229,7 @@ def test_the_event_loop_watches_the_socket_of_the_new_address():
 
 
 def test_the_words_of_a_peer_cannot_forge_a_line_or_move_the_cursor(caplog):
-    log.warning("the server says: %s", "fine\n12:00 tendond: no limits\x1b[2J\x7f\x9b1A")
-    assert caplog.messages == ["the server says: fine\\n12:00 tendond: no limits\\x1b[2J\\x7f\\x9b1A"]
-    refused = RefusedForGood("127.0.0.1:47100 refuses: \x1b]0;owned\x07\tä", Code.UNSUPPORTED)
-    assert str(refused) == "127.0.0.1:47100 refuses: \\x1b]0;owned\\x07\\tä"
+    log.warning("report of the server: %s", "fine\n12:00 tendond: no limits\x1b[2J\x7f\x9b1A")
+    assert caplog.messages == ["report of the server: fine\\n12:00 tendond: no limits\\x1b[2J\\x7f\\x9b1A"]
+    refused = RefusedForGood("127.0.0.1:47100 refused the connection: \x1b]0;owned\x07\tä", Code.UNSUPPORTED)
+    assert str(refused) == "127.0.0.1:47100 refused the connection: \\x1b]0;owned\\x07\\tä"

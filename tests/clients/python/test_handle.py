@@ -50,7 +50,7 @@ def test_what_cannot_be_sent_is_said_and_the_force_is_sent(knows):
     assert shown.client.stats.left_out == (
         "angular stiffness: the device does not measure its orientation"
         if knows
-        else "torque and grip force: the server does not know them"
+        else "torque and grip force: the server does not support them"
     )
 
 

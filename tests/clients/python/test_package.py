@@ -65,7 +65,7 @@ def test_a_python_without_the_packages_is_told_both_remedies(tmp_path):
     done = subprocess.run([str(example)], env=environment, capture_output=True, text=True, check=False)
     assert done.returncode == 1
     said = done.stderr.splitlines()[-1]
-    assert said.startswith(f"ImportError: tendon needs the packages protobuf and PyNaCl, and this Python ({other}/python3)")
+    assert said.startswith(f"ImportError: tendon requires the packages protobuf and PyNaCl, which this Python ({other}/python3)")
     assert "apt install python3-protobuf python3-nacl" in said and "/usr/bin/python3" in said
     assert f"venv/bin/pip install {PACKAGE}" in said
 

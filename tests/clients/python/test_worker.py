@@ -178,8 +178,8 @@ def test_an_exception_of_the_answer_passes_through(front):
     [
         ((7).to_bytes(4, "little"), "a record of 7 bytes: expected 8 to 1208"),
         ((1209).to_bytes(4, "little"), "a record of 1209 bytes: expected 8 to 1208"),
-        ((8).to_bytes(4, "little") + (1).to_bytes(8, "little"), "what is no state"),
-        ((10).to_bytes(4, "little") + (1).to_bytes(8, "little") + b"\xff\xff", "what is no state"),
+        ((8).to_bytes(4, "little") + (1).to_bytes(8, "little"), "expected a state from the front"),
+        ((10).to_bytes(4, "little") + (1).to_bytes(8, "little") + b"\xff\xff", "expected a state from the front"),
     ],
 )
 def test_a_front_that_sends_no_state_is_an_error_with_a_sentence(front, bytes_, sentence):
@@ -193,7 +193,7 @@ def test_a_front_that_sends_no_state_is_an_error_with_a_sentence(front, bytes_, 
 @pytest.mark.parametrize("missing", ["TENDON_WORKER_ADDRESS", "TENDON_WORKER_SECRET"])
 def test_without_a_front_the_error_names_the_variable(front, monkeypatch, missing):
     monkeypatch.delenv(missing)
-    with pytest.raises(RuntimeError, match=f"{missing}: expected in the environment of a worker"):
+    with pytest.raises(RuntimeError, match=f"{missing}: expected in the environment of the worker"):
         worker.run(lambda hand: None)
 
 
@@ -207,7 +207,7 @@ def test_an_address_of_another_form_is_told_what_is_expected(front, monkeypatch,
 def test_where_no_front_listens_the_error_names_the_place(front):
     front.close()
     Path(front.address.removeprefix("unix:")).unlink(missing_ok=True)
-    with pytest.raises(ConnectionError, match=f"TENDON_WORKER_ADDRESS: no front listens at {front.address}: "):
+    with pytest.raises(ConnectionError, match=f"TENDON_WORKER_ADDRESS: no front is listening at {front.address}: "):
         worker.run(lambda hand: None)
 
 

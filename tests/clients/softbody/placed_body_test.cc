@@ -332,7 +332,7 @@ TEST(PlacedBody, TheShippedOrgansPassTheSelfTest) {
 TEST(PlacedBody, AnswersOfTheNearLiverWithoutAStepHaveTheirStiffness) {
   const SelfTest result = expect_passed(read_scene(TENDON_SCENES "/liver_near.toml"), 200);
   const auto judged = std::ranges::find_if(result.findings, [](const SelfTest::Finding& finding) {
-    return finding.what.starts_with("its stiffness is that of its force, 0.006 m");
+    return finding.what.starts_with("its stiffness matches its force, 0.006 m");
   });
   ASSERT_NE(judged, result.findings.end());
   EXPECT_EQ(judged->verdict, SelfTest::Verdict::kPassed) << judged->text();

@@ -159,7 +159,7 @@ describe("devices and channels", () => {
       assert.ok(world.runUntil(() => world.client.phase === "refused", 200));
       const { code, reason, sessions } = world.client.stats();
       assert.deepEqual([code, sessions], [Code.UNSUPPORTED, 0]);
-      assert.equal(reason, "that server has one device, with one channel: name none");
+      assert.equal(reason, "this server has one device with one channel: omit their names");
     }
   });
 
@@ -287,7 +287,7 @@ describe("devices and channels", () => {
     assert.deepEqual([world.client.holds, world.client.stats().leaseLostTo], [true, ""]);
     world.server.session!.request({ kind: "rearm", device: 1 });
     world.runMs(50);
-    const no = { code: Code.UNSUPPORTED, detail: "that is a client's to ask" };
+    const no = { code: Code.UNSUPPORTED, detail: "only a client can send this request" };
     assert.deepEqual(world.server.answers, [ok, ok, no]);
     assert.equal(world.client.phase, "open");
   });

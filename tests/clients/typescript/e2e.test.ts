@@ -89,7 +89,7 @@ describe("of several", () => {
     assert.equal(await push.end("SIGINT"), 0);
     const nowhere = startNode(test, "examples/virtual_wall", "--server", tendond.address, "--device", "middle");
     assert.equal(await nowhere.end(), 1);
-    assert.match(nowhere.lines.join("\n"), /refuses: there is no device "middle", only "left", "right"/);
+    assert.match(nowhere.lines.join("\n"), /refused the connection: there is no device "middle", only "left", "right"/);
   });
 
   it("a lease goes from a silent engine to a waiting one, then to the next", async (test) => {
@@ -257,7 +257,7 @@ describe("the programs", () => {
   it("leave with exit code 1 when nobody has answered", async (test) => {
     const program = startNode(test, "examples/echo_motion", "--server", "127.0.0.1:9", "--duration-s", "0.2");
     assert.equal(await program.end(), 1);
-    assert.match(program.lines.join("\n"), /was not connected/);
+    assert.match(program.lines.join("\n"), /was never connected/);
   });
 });
 

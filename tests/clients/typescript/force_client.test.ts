@@ -392,7 +392,7 @@ describe("the callback", () => {
       world.runMs(100);
       assert.equal(world.server.forces.at(-1)!.command.way, sent);
       const hasName = way === undefined || way === 2;
-      assert.equal(world.client.stats().leftOut, hasName ? "" : "the way of answering: the config's ways have none of its number");
+      assert.equal(world.client.stats().leftOut, hasName ? "" : "the solver path: its number is not in the ways of the config");
     }
   });
 
@@ -450,7 +450,7 @@ describe("an impossible configuration", () => {
       [{ ways: new Array<string>(9).fill("x") }, /^RangeError: ways.size = 9: expected at most 8 names$/],
       [{ ways: ["near", ""] }, /^RangeError: ways\[1\].size = 0: expected at least 1 byte$/],
       [{ ways: ["x".repeat(25)] }, /^RangeError: ways\[0\].size = 25: expected at most 24 bytes$/],
-      [{ ways: ["near", "near"] }, /^RangeError: ways\[1\] = near: expected no name twice$/],
+      [{ ways: ["near", "near"] }, /^RangeError: ways\[1\] = near: expected unique names$/],
       [{ key: new Uint8Array(31) }, /^RangeError: key.size = 31: expected 32 bytes$/],
       [{ suites: [0] }, /^RangeError: suites = \[0\]: expected numbers of some of /],
       [{ suites: [] }, /^RangeError: suites = \[\]: expected/],

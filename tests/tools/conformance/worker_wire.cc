@@ -58,11 +58,12 @@ LocalTime WorkerProgram::now() { return LocalTime(std::chrono::steady_clock::now
 std::string WorkerProgram::listen(Road road) {
   if (road == Road::kUnix) {
     folder_ = (std::filesystem::temp_directory_path() / "tendon-conformance-XXXXXX").string();
-    if (::mkdtemp(folder_.data()) == nullptr) fail_with("cannot make a folder " + std::exchange(folder_, ""));
+    if (::mkdtemp(folder_.data()) == nullptr) fail_with("cannot create the folder " + std::exchange(folder_, ""));
     const std::string path = folder_ + "/worker";
     sockaddr_un at{};
     at.sun_family = AF_UNIX;
-    if (path.size() >= sizeof at.sun_path) throw std::runtime_error(path + " is too long for a socket: set TMPDIR");
+    if (path.size() >= sizeof at.sun_path)
+      throw std::runtime_error(path + " is too long for a socket: set TMPDIR to a shorter path");
     std::ranges::copy(path, std::begin(at.sun_path));
     listen_at(listener_ = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0), at, path);
     return "unix:" + path;

@@ -86,17 +86,16 @@ TEST(UnicastDiscovery, ACutAnswerIsAskedForAgainByTcp) {
 
 TEST(UnicastDiscovery, ANameThatIsNotThereIsSaidAndWhereToLook) {
   EXPECT_EQ(problem_with([](const Question& question, bool) { return answer(question, {}, 0x8183); }),
-            "cannot find dns-sd:falcon v1\\.2.example.org: the name servers have no SRV record of "
-            "falcon v1\\.2._tendon._udp.example.org. --server dns-sd:.example.org lists what is there");
+            "cannot find dns-sd:falcon v1\\.2.example.org: the name servers have no SRV record of falcon "
+            "v1\\.2._tendon._udp.example.org. --server dns-sd:.example.org lists all devices");
   const FakeDns server([](const Question& question, bool) { return answer(question, {}, 0x8183); });
   EXPECT_TRUE(browse_by_dns("example.org", server.address()).empty());
 }
 
 TEST(UnicastDiscovery, SilenceEndsWithASentence) {
-  EXPECT_EQ(
-      problem_with([](const Question&, bool) { return ""; }),
-      "cannot look for falcon v1\\.2._tendon._udp.example.org: no name server answers. Expected records of DNS-SD "
-      "in that domain, or HOST:PORT in place of a name");
+  EXPECT_EQ(problem_with([](const Question&, bool) { return ""; }),
+            "cannot search for falcon v1\\.2._tendon._udp.example.org: no name server replies. Expected DNS-SD records "
+            "in this domain, or HOST:PORT instead of a name");
 }
 
 TEST(UnicastDiscovery, AnAnswerToAnotherQuestionIsNone) {
@@ -104,7 +103,7 @@ TEST(UnicastDiscovery, AnAnswerToAnotherQuestionIsNone) {
               Question other = question;
               other.id[0] = static_cast<char>(other.id[0] ^ 1);
               return sound(other, tcp);
-            }).find("no name server answers"),
+            }).find("no name server replies"),
             std::string::npos);
 }
 

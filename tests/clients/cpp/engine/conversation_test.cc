@@ -118,7 +118,7 @@ TEST(Conversation, NoticesAStiffnessThatDiffersOrIsGone) {
   });
   EXPECT_EQ(found.differing, 5u);
   EXPECT_EQ(found.largest_n, 0);
-  EXPECT_NE(found.text().find("what comes with the force differs"), std::string::npos);
+  EXPECT_NE(found.text().find("only the rest of the answer differs"), std::string::npos);
 }
 
 TEST(Conversation, KeepsAllThatAnAnswerMayBringAndNoticesEachThatDiffers) {
@@ -192,14 +192,14 @@ TEST(Conversation, ThatIsNoneIsRefusedWithItsLine) {
             "line 1: expected \"tendon conversation 1\", got \"tendon conversation 2\"");
   EXPECT_EQ(says(good + "1 2 3\n"), "line 5: it ends after 3 words");
   const std::string whole = good.substr(0, good.size() - 1);
-  EXPECT_EQ(says(whole + " cut stiffness\n"), "line 4: \"stiffness\" is no part of an answer here");
+  EXPECT_EQ(says(whole + " cut stiffness\n"), "line 4: \"stiffness\" is not expected in an answer here");
   EXPECT_EQ(says(whole + " error\n"), "line 4: it ends after 23 words");
   EXPECT_EQ(says(whole + " contact 1p+0 0p+0 0p+0 0p+0 table 0p+0 1p+0 17\n"),
             "line 4: expected a table of at most 16 entries, got 17");
-  EXPECT_EQ(says(good.substr(0, good.size() - 1)), "line 4: it is cut off");
+  EXPECT_EQ(says(good.substr(0, good.size() - 1)), "line 4: truncated");
   std::string wrong = good;
   wrong.replace(wrong.find('\n') + 1, 1, "x");
-  EXPECT_EQ(says(wrong), "line 2: \"x\" is no number of its kind");
+  EXPECT_EQ(says(wrong), "line 2: \"x\" is not a valid number");
 }
 
 }  // namespace

@@ -74,7 +74,7 @@ TEST(SelfTest, MeasuresWhatAPressCosts) {
   EXPECT_NE(press.what.find("press and release"), std::string::npos);
   EXPECT_NEAR(press.bound, 0.01 * 0.5 * kK * 0.01 * 0.01, 2e-6);
   EXPECT_LT(press.value, 1e-6);
-  EXPECT_EQ(count(result, kNotJudged, "stiffness"), 4) << "it gives none";
+  EXPECT_EQ(count(result, kNotJudged, "stiffness"), 4) << "it provides no stiffness";
   EXPECT_TRUE(result.passed()) << result.text();
 }
 
@@ -84,14 +84,14 @@ TEST(SelfTest, OfAnElasticBodyWantsBackWhatAWayHasCost) {
   const SelfTest spring = self_test(
       [](const DeviceState& hand) -> Touch { return Vec3(-kK * std::max(hand.position.x(), 0.0), 0, 0); }, script);
   EXPECT_TRUE(spring.passed()) << spring.text();
-  EXPECT_EQ(count(spring, kPassed, "gives back what it took"), 14) << spring.text();
+  EXPECT_EQ(count(spring, kPassed, "returns the stored energy"), 14) << spring.text();
   // The damper dissipates energy: the engine is passive but not elastic.
   const SelfTest damped = self_test(wall, script);
-  EXPECT_EQ(count(damped, kFailed, "gives out"), 0) << damped.text();
-  EXPECT_EQ(count(damped, kFailed, "gives back what it took"), 14) << damped.text();
+  EXPECT_EQ(count(damped, kFailed, "generates"), 0) << damped.text();
+  EXPECT_EQ(count(damped, kFailed, "returns the stored energy"), 14) << damped.text();
   EXPECT_FALSE(damped.passed());
   const auto& press = damped.findings.at(1);
-  EXPECT_EQ(press.what, "gives back what it took: press and release, 0.025 m/s");
+  EXPECT_EQ(press.what, "returns the stored energy: press and release, 0.025 m/s");
   EXPECT_GT(press.value, press.bound);
   // The body snaps to a different equilibrium at the end of the slide. Only the check on the sideways motion fails.
   const SelfTest snaps = self_test(
@@ -102,8 +102,8 @@ TEST(SelfTest, OfAnElasticBodyWantsBackWhatAWayHasCost) {
         return Vec3(snapped ? -kK / 2 * depth : -kK * depth, 0, 0);
       },
       script);
-  EXPECT_GT(count(snaps, kFailed, "gives back what it took: press, slide, release"), 0) << snaps.text();
-  EXPECT_EQ(count(snaps, kFailed, "gives back what it took: press and release"), 0) << snaps.text();
+  EXPECT_GT(count(snaps, kFailed, "returns the stored energy: press, slide, release"), 0) << snaps.text();
+  EXPECT_EQ(count(snaps, kFailed, "returns the stored energy: press and release"), 0) << snaps.text();
 }
 
 TEST(SelfTest, AllowsForWhatFewStatesASecondMakeOfAForceThatBends) {
@@ -118,7 +118,7 @@ TEST(SelfTest, AllowsForWhatFewStatesASecondMakeOfAForceThatBends) {
         return Vec3(1e7 * depth * depth * depth * out.normalized());
       },
       script);
-  EXPECT_EQ(count(result, kFailed, "gives out"), 0) << result.text();
+  EXPECT_EQ(count(result, kFailed, "generates"), 0) << result.text();
 }
 
 TEST(SelfTest, IsFailedByAForceThatPushesOnWithTheHand) {
@@ -155,7 +155,7 @@ TEST(SelfTest, IsFailedByAForceWithACurlInWhicheverPlane) {
             return touch;
           },
           script);
-      EXPECT_GT(count(result, kFailed, "gives out"), 0) << axis << result.text();
+      EXPECT_GT(count(result, kFailed, "generates"), 0) << axis << result.text();
       EXPECT_GT(count(result, kPassed, "press and release"), 0) << "there it cannot be seen";
     }
   }
@@ -210,7 +210,7 @@ TEST(SelfTest, JudgesTheStiffnessOfAnEngineThatGoesOnOnlyWithSaveAndRestore) {
   script.work_tolerance = 1;  // the energy stored before the path begins is released on it
   const SelfTest without = self_test(physics, script);
   EXPECT_EQ(count(without, kNotJudged, "stiffness"), 4) << without.text();
-  EXPECT_NE(without.text().find("give save and restore"), std::string::npos) << without.text();
+  EXPECT_NE(without.text().find("provide save and restore"), std::string::npos) << without.text();
   engine = {};
   script.state = {[&] { engine.saved = engine.rest; }, [&] { engine.rest = engine.saved; }};
   const SelfTest with = self_test(physics, script);
@@ -231,7 +231,7 @@ TEST(SelfTest, IsFailedByAnEngineThatThrowsOrDividesByTheTime) {
     return wall(hand);
   });
   EXPECT_GE(count(throws, kFailed, "1 km away"), 2) << throws.text();
-  EXPECT_NE(throws.text().find("it threw \"no cell there\""), std::string::npos);
+  EXPECT_NE(throws.text().find("exception \"no cell there\""), std::string::npos);
 
   std::optional<PeerTime> last;
   const SelfTest divides = self_test([&](const DeviceState& hand) {
@@ -267,12 +267,12 @@ TEST(SelfTest, PressesWhereTheScriptSays) {
 
 TEST(SelfTest, SaysItAsTextAndAsJson) {
   SelfTest result;
-  result.findings = {{kPassed, "is well", "all of it", 0.5, 1}, {kFailed, "is felt", "it threw \"no\"\n", 0, 0}};
-  EXPECT_EQ(result.text(), "passed   is well: all of it\nFAILED   is felt: it threw \"no\"\n\n");
+  result.findings = {{kPassed, "is well", "all of it", 0.5, 1}, {kFailed, "is felt", "exception \"no\"\n", 0, 0}};
+  EXPECT_EQ(result.text(), "passed   is well: all of it\nFAILED   is felt: exception \"no\"\n\n");
   EXPECT_EQ(
       result.json(),
       "{\"finding\":{\"verdict\":\"passed\",\"what\":\"is well\",\"why\":\"all of it\",\"value\":0.5,\"bound\":1.0}}\n"
-      "{\"finding\":{\"verdict\":\"failed\",\"what\":\"is felt\",\"why\":\"it threw \\\"no\\\"\\n\",\"value\":0.0,"
+      "{\"finding\":{\"verdict\":\"failed\",\"what\":\"is felt\",\"why\":\"exception \\\"no\\\"\\n\",\"value\":0.0,"
       "\"bound\":0.0}}\n");
 }
 

@@ -97,8 +97,8 @@ TEST_P(CrewTest, WhatEndsAWorkerIsSaid) {
     const char* way;
     const char* why;
   };
-  for (const Case& one : {Case{"dies 0", "it was ended by signal 9"}, Case{"exits 0", "it ended with exit status 7"},
-                          Case{"ends-at-once", "it ended with exit status 3"}}) {
+  for (const Case& one : {Case{"dies 0", "it was terminated by signal 9"}, Case{"exits 0", "it exited with status 7"},
+                          Case{"ends-at-once", "it exited with status 3"}}) {
     Crew crew(config(one.way));
     crew.launch(kSecret);
     if (std::string(one.way) != "ends-at-once") {
@@ -107,7 +107,7 @@ TEST_P(CrewTest, WhatEndsAWorkerIsSaid) {
       crew.send(codec.state(1, DeviceState{}));
     }
     const std::string why = ended(crew);
-    EXPECT_TRUE(why == one.why || why == "its stream has ended") << one.way << ": " << why;
+    EXPECT_TRUE(why == one.why || why == "it has closed the connection") << one.way << ": " << why;
     EXPECT_FALSE(next(crew, 100).has_value()) << "once";
   }
 }
@@ -118,7 +118,7 @@ INSTANTIATE_TEST_SUITE_P(Streams, CrewTest, ::testing::Values("", "127.0.0.1:0")
 TEST(Crew, ACommandThatIsNotThereIsSaid) {
   Crew crew({.command = "/nonexistent/tendon-fem-worker scene.toml"});
   crew.launch(kSecret);
-  EXPECT_EQ(ended(crew), "it ended with exit status 127");
+  EXPECT_EQ(ended(crew), "it exited with status 127");
 }
 
 TEST(Crew, EndsEvenWhatHasLeftItsProcessGroupAndWhatIsStopped) {

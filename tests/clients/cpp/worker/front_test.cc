@@ -55,7 +55,7 @@ class Played {
     turn();
   }
   void die() {
-    front.ended(now, "it was ended by signal 9");
+    front.ended(now, "it was terminated by signal 9");
     turn();
   }
   /// Returns the orders since the last call.
@@ -216,7 +216,7 @@ TEST(Front, AWorkerThatDoesNotAnswerIsReplaced) {
   EXPECT_EQ(played.front.next_turn(), played.now + Duration(1));
   played.after(Duration(1));
   EXPECT_EQ(played.news(), "give up");
-  EXPECT_EQ(played.front.stats().why_given_up, "it has not answered for 500 ms");
+  EXPECT_EQ(played.front.stats().why_given_up, "it has not replied for 500 ms");
   played.after(milliseconds(499));
   EXPECT_EQ(played.news(), "");
   played.see(7);
@@ -308,10 +308,10 @@ TEST(Front, AnUnusableAnswerIsCountedAndDoesNotKeepTheWorkerAlive) {
   played.news();
   for (int i = 0; i < 5; ++i) {
     played.after(milliseconds(100));
-    played.front.refused("a number of it is not finite");
+    played.front.refused("it contains a number that is not finite");
   }
   EXPECT_EQ(played.front.stats().refused, 5U);
-  EXPECT_EQ(played.front.stats().why_refused, "a number of it is not finite");
+  EXPECT_EQ(played.front.stats().why_refused, "it contains a number that is not finite");
   played.after(milliseconds(1));
   EXPECT_EQ(played.news(), "give up");
 }

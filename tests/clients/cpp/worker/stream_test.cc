@@ -76,18 +76,18 @@ TEST(WorkerStream, AnswersOfAnotherStateAndOfNonsenseAreRefused) {
   DeviceState other = hand;
   ++other.tick;
   Record right = codec.answer(7, hand, full_touch());
-  EXPECT_EQ(codec.read_answer(right, 8, hand).refused, "it answers a state that it was not asked for");
-  EXPECT_EQ(codec.read_answer(right, 7, other).refused, "its force is of another state");
+  EXPECT_EQ(codec.read_answer(right, 8, hand).refused, "it answers a state that was not requested");
+  EXPECT_EQ(codec.read_answer(right, 7, other).refused, "its force answers another state");
   right.sequence = 8;  // the record's number, but not that of the force in it
-  EXPECT_EQ(codec.read_answer(right, 8, hand).refused, "its force is of another state");
-  EXPECT_EQ(codec.read_answer(codec.state(7, hand), 7, hand).refused, "it is not one force");
+  EXPECT_EQ(codec.read_answer(right, 8, hand).refused, "its force answers another state");
+  EXPECT_EQ(codec.read_answer(codec.state(7, hand), 7, hand).refused, "it does not contain exactly one force");
   EXPECT_EQ(codec.read_answer({.sequence = 7, .body = {std::byte{0xff}, std::byte{0xff}}}, 7, hand).refused,
-            "it is no Datagram");
+            "it is not a Datagram");
   Touch nan = full_touch();
   nan.force.x() = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_EQ(codec.read_answer(codec.answer(7, hand, nan), 7, hand).refused, "a number of it is not finite");
+  EXPECT_EQ(codec.read_answer(codec.answer(7, hand, nan), 7, hand).refused, "it contains a number that is not finite");
   EXPECT_EQ(codec.read_answer(codec.answer(7, hand, Vec3(1e13, 0, 0)), 7, hand).refused,
-            "a value of it is out of bounds");
+            "it contains a value that is out of bounds");
 }
 
 TEST(WorkerStream, RecordsSurviveAnyCutOfTheStream) {

@@ -99,7 +99,8 @@ TEST(RosMessages, ACommandOfAnotherFrameOrNoNumberIsRefusedWithTheReason) {
   const auto other_device = view.wish(command({0, 0, 1}, "left_base"), false);
   EXPECT_TRUE(std::holds_alternative<std::string>(other_device));
   const double nan = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_EQ(std::get<std::string>(view.wish(command({0, nan, 1}, ""), false)), "a number of it is not finite");
+  EXPECT_EQ(std::get<std::string>(view.wish(command({0, nan, 1}, ""), false)),
+            "it contains a number that is not finite");
 }
 
 TEST(RosMessages, JoyHasTheButtonsInOrderAndTheGripperFromClosedToOpen) {
