@@ -115,7 +115,7 @@ int Desk::stop(LocalTime now) {
   for (Place& place : places_) {
     place.plug.stop(now);
     if (place.plug.states() > 0) continue;
-    say(place.name + ": no state has come from " + config_.server.text());
+    say(place.name + ": no state was received from " + config_.server.text());
     exit_code = 1;
   }
   return exit_code;

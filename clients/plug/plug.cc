@@ -75,8 +75,7 @@ void Plug::learn_from(const ForceClient& client) {
   if (!handle_ && client.handle()) {
     handle_ = client.handle();
     if (!handle_->operator_from_device) {
-      note(said_of_axes_,
-           "does not say how it lies before the operator; x is taken as right, y as up, z as to the user");
+      note(said_of_axes_, "has an unknown orientation in front of the operator; assuming x right, y up, z to the user");
     }
   }
 }
@@ -191,13 +190,13 @@ std::string Plug::connection_in_words() const {
 }
 
 std::string Plug::force_in_words() const {
-  if (pushes()) return "takes the forces of a program";
-  if (!controller_) return said_of_force_.empty() ? "" : "takes no forces any more: no program asks for one";
+  if (pushes()) return "uses the forces of a program";
+  if (!controller_) return said_of_force_.empty() ? "" : "uses no forces any more: no program requests one";
   const ForceClient::Stats stats = controller_->stats();
-  if (is_between_attempts(stats.phase)) return "takes no forces: " + stats.reason;
+  if (is_between_attempts(stats.phase)) return "uses no forces: " + stats.reason;
   if (stats.phase != Phase::kOpen) return {};
-  return "takes no forces: " + (stats.lease_lost_to.empty() ? "another engine" : stats.lease_lost_to) +
-         " has the channel" + (config_.client.take_lease ? "; asking for it" : "; --take-lease asks for it");
+  return "uses no forces: " + (stats.lease_lost_to.empty() ? "another engine" : stats.lease_lost_to) +
+         " has the channel" + (config_.client.take_lease ? "; requesting it" : "; use --take-lease to request it");
 }
 
 void Plug::note(std::string& said, std::string words) {
@@ -209,7 +208,7 @@ void Plug::note(std::string& said, std::string words) {
 
 void Plug::note_changes() {
   if (controller_ && !controller_->stats().unusable.empty()) {
-    note(said_of_unusable_, "is not sent a force: " + std::string(controller_->stats().unusable));
+    note(said_of_unusable_, "a force was not sent: " + std::string(controller_->stats().unusable));
   }
   const Shown shown{.watcher = watcher_ ? watcher_->phase() : Phase::kStopped,
                     .controller = controller_ ? controller_->phase() : Phase::kStopped,

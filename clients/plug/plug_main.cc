@@ -14,7 +14,7 @@ void add_common(CLI::App& app, DeskConfig& desk) {
   desk.client.name = "tendon-plug " + app.get_name();
   app.add_option_function<std::string>(
          "--server", [&](const std::string& text) { desk.server = text; },
-         "Address of tendond: a host name or an IP address; or dns-sd:NAME, which --key has to go with")
+         "Address of tendond: a host name or an IP address; or dns-sd:NAME, which requires --key")
       ->type_name("HOST:PORT")
       ->default_str(desk.server.text())
       ->check(usage::accepted_by([](const std::string& text) { ServerName{text}; }));
@@ -22,11 +22,11 @@ void add_common(CLI::App& app, DeskConfig& desk) {
          "--key", [&](const std::string& file) { desk.client.key = read_client_key(file).key; },
          "Key file from `tendond keygen`. Not required for a server on this machine without keys")
       ->type_name("FILE");
-  app.add_option("--device", desk.devices, "A device's name; several times for several. None: the server's first one")
+  app.add_option("--device", desk.devices, "Name of a device, repeatable. Default: the first device of the server")
       ->allow_extra_args(false)
       ->type_name("NAME");
   app.add_option("--channel", desk.client.channel, "Name of the channel of the device")->type_name("NAME");
-  app.add_flag("--take-lease", desk.client.take_lease, "Ask for the channel until it is ours");
+  app.add_flag("--take-lease", desk.client.take_lease, "Request the channel until it is free");
   app.add_flag("--observe", desk.observe, "Send no forces");
   app.add_flag("--json", desk.json, "Print JSON on stdout, one object per line, once a second for each device");
 }
@@ -34,17 +34,18 @@ void add_common(CLI::App& app, DeskConfig& desk) {
 namespace {
 
 constexpr const char* kExitCodes =
-    "\n\nExit: 0 done; 1 something failed, or with --duration-s no server has answered; 2 wrong usage.\n"
-    "chai3d exits with the code of its program.";
+    "\n\n"
+    "Exit: 0 success; 1 failed, or with --duration-s no server replied; 2 wrong usage.\n"
+    "chai3d exits with the exit code of its program.";
 
 int run(int argc, char** argv) {
   CLI::App app(
-      "Programs that exist already use a Tendon device without new code. tendon-plug runs beside the old program; "
-      "Tendon's sealed and limited wire crosses the network.",
+      "Let existing programs use a Tendon device without new code. tendon-plug runs on the machine of the program, "
+      "and\nconnects to the server over the network with Tendon's encryption and limits.",
       "tendon-plug");
   usage::dress(app);
   app.footer(std::string("Example: tendon-plug vrpn --server lab:47100 --name Phantom0=right\n\n"
-                         "tendon-plug COMMAND --help tells more.") +
+                         "Run `tendon-plug COMMAND --help` for the options of a command.") +
              kExitCodes);
   app.set_help_flag("-h,--help", "Print this help and exit");
   app.set_version_flag("--version", TENDON_VERSION);

@@ -35,7 +35,7 @@ PreciceEngine::~PreciceEngine() = default;
 Touch PreciceEngine::answer(const DeviceState& hand) {
   precice::Participant& participant = coupling_->participant;
   if (!participant.isCouplingOngoing()) {
-    throw std::runtime_error("the coupling has come to its end: max-time or max-time-windows of " + config_.file);
+    throw std::runtime_error("the coupling has ended because of max-time or max-time-windows in " + config_.file);
   }
   participant.writeData(config_.mesh, config_.displacement, coupling_->nodes, patch_.displacements(hand));
   participant.advance(participant.getMaxTimeStepSize());

@@ -16,31 +16,33 @@ using tendon::precice_worker::PreciceEngine;
 
 int run(int argc, char** argv) {
   CLI::App app(
-      "A worker that hands each state to a solver coupled by preCICE: participant Hand, whose mesh is a round patch of "
-      "the body's surface. It writes the displacement of the patch and reads the force that holds it there.",
+      "Run a worker for a solver that is coupled by preCICE. Its participant Hand has a mesh of a round patch on the "
+      "surface\nof the body. It writes the displacement of the patch and reads the force that is required for it.",
       "tendon-precice-worker");
   tendon::usage::dress(app);
   app.footer(
-      "Example: tendon-fem serve SCENE --worker \"tendon-precice-worker --config precice-config.xml\"\n"
-      "Exit: 0 the front has ended the stream; 1 failed; 2 wrong usage.");
+      "Example: tendon-fem serve SCENE --worker \"tendon-precice-worker --config precice-config.xml\"\nExit: 0 the "
+      "front has closed the stream; 1 failed; 2 wrong usage.");
   app.set_version_flag("--version", TENDON_VERSION);
   PreciceEngine::Config config;
   std::string scene;
   std::vector<double> middle_mm = {0, 0, 0};
   std::vector<double> normal = {-1, 0, 0};
   double radius_mm = 1e3 * config.patch.radius;
-  app.add_option("SCENE", scene, "A front hands its scene on; the body is the solver's");
-  app.add_option("--config", config.file, "preCICE's configuration")->type_name("FILE")->required();
-  app.add_option("--participant", config.participant, "Its name of this program")->capture_default_str();
-  app.add_option("--mesh", config.mesh, "… of the patch's mesh")->capture_default_str();
-  app.add_option("--displacement", config.displacement, "… of the data that is written, m")->capture_default_str();
-  app.add_option("--force", config.force, "… of the data that is read, N")->capture_default_str();
-  app.add_option("--middle-mm", middle_mm, "Of the patch on the surface at rest, in the hand's frame")
+  app.add_option("SCENE", scene, "Scene file from the front; not used, because the solver defines the body");
+  app.add_option("--config", config.file, "Configuration file of preCICE")->type_name("FILE")->required();
+  app.add_option("--participant", config.participant, "Name of this participant in the configuration")
+      ->capture_default_str();
+  app.add_option("--mesh", config.mesh, "Name of the mesh of the patch")->capture_default_str();
+  app.add_option("--displacement", config.displacement, "Name of the written data, displacements in m")
+      ->capture_default_str();
+  app.add_option("--force", config.force, "Name of the read data, forces in N")->capture_default_str();
+  app.add_option("--middle-mm", middle_mm, "Centre of the patch on the undeformed surface, in the frame of the hand")
       ->expected(3)
       ->capture_default_str();
-  app.add_option("--normal", normal, "Out of the body, to the hand")->expected(3)->capture_default_str();
-  app.add_option("--radius-mm", radius_mm, "Of the patch")->capture_default_str();
-  app.add_option("--rings", config.patch.rings, "Of nodes around its middle")->capture_default_str();
+  app.add_option("--normal", normal, "Normal of the patch, out of the body")->expected(3)->capture_default_str();
+  app.add_option("--radius-mm", radius_mm, "Radius of the patch")->capture_default_str();
+  app.add_option("--rings", config.patch.rings, "Number of rings of nodes around the centre")->capture_default_str();
   try {
     tendon::usage::parse(app, argc, argv);
   } catch (const CLI::ParseError& error) {

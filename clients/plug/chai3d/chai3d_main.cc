@@ -61,9 +61,9 @@ struct Options {
 class Memory {
  public:
   Memory() : file_(::memfd_create("tendon-chai3d", MFD_CLOEXEC)) {
-    if (file_ < 0 || ::ftruncate(file_, sizeof(SharedHands)) != 0) fail("no shared memory");
+    if (file_ < 0 || ::ftruncate(file_, sizeof(SharedHands)) != 0) fail("cannot create shared memory");
     void* const memory = ::mmap(nullptr, sizeof(SharedHands), PROT_READ | PROT_WRITE, MAP_SHARED, file_, 0);
-    if (memory == MAP_FAILED) fail("no shared memory");
+    if (memory == MAP_FAILED) fail("cannot create shared memory");
     hands_ = new (memory) SharedHands;
   }
   ~Memory() {
@@ -89,9 +89,10 @@ class Waker {
     sockaddr_un address{};
     address.sun_family = AF_UNIX;
     socklen_t size = sizeof address.sun_family;  // no name: the kernel chooses one
-    if (socket_ < 0 || ::bind(socket_, reinterpret_cast<sockaddr*>(&address), size) != 0) fail("no socket");
+    if (socket_ < 0 || ::bind(socket_, reinterpret_cast<sockaddr*>(&address), size) != 0)
+      fail("cannot create a socket");
     size = sizeof address;
-    if (::getsockname(socket_, reinterpret_cast<sockaddr*>(&address), &size) != 0) fail("no socket");
+    if (::getsockname(socket_, reinterpret_cast<sockaddr*>(&address), &size) != 0) fail("cannot create a socket");
     name_.assign(&address.sun_path[1], size - offsetof(sockaddr_un, sun_path) - 1);
   }
   ~Waker() { ::close(socket_); }
@@ -116,7 +117,7 @@ std::filesystem::path library_folder() {
   const std::filesystem::path folder = self.parent_path() / "lib" / "tendon" / "chai3d";
   if (!std::filesystem::exists(folder / "libhdPhantom.so")) {
     throw std::runtime_error("there is no " + (folder / "libhdPhantom.so").string() +
-                             ": it belongs to the package tendon-plug");
+                             ": install the package tendon-plug");
   }
   return folder;
 }
@@ -136,7 +137,7 @@ std::filesystem::path find_program(const std::string& name) {
       begin = end + 1;
     }
   }
-  throw std::runtime_error(name + " is no program that can be started");
+  throw std::runtime_error(name + ": expected an executable program");
 }
 
 /// A program linked to OpenHaptics would load our empty libHD.so instead of the original.
@@ -145,8 +146,9 @@ void refuse_openhaptics(const std::filesystem::path& program) {
   const std::vector<char> bytes{std::istreambuf_iterator<char>(file), {}};
   for (const std::string& library : chai3d::needed_libraries(std::as_bytes(std::span(bytes)))) {
     if (library.starts_with("libHD.so")) {
-      throw std::runtime_error(program.string() + " is linked to OpenHaptics itself (" + library +
-                               "), which tendon-plug does not replace; only CHAI3D's own way in is served");
+      throw std::runtime_error(
+          program.string() + " is linked to OpenHaptics (" + library +
+          "), which tendon-plug does not replace; expected a program that uses the devices of CHAI3D");
     }
   }
 }
@@ -195,7 +197,8 @@ int serve(const Options& options) {
     if (host.announce()) ::syscall(SYS_futex, &hands.news, FUTEX_WAKE, INT_MAX, nullptr, nullptr, 0);
     if (asked) next = std::min(next, desk.turn(read_clock()));
     if (!child && (hands.ready.load() != 0 || now - start >= kBeforeTheProgram)) {
-      if (hands.ready.load() == 0) desk.say("no device has told where it is; starting the program without");
+      if (hands.ready.load() == 0)
+        desk.say("no state was received from any device; starting the program without a device");
       const std::string path = memory.path();
       child = ::fork();
       if (*child < 0) fail("cannot start the program");
@@ -220,24 +223,23 @@ int serve(const Options& options) {
 void add_chai3d(CLI::App& app, Chosen& chosen) {
   static Options options;  // written by CLI11 while parsing
   CLI::App& command = *app.add_subcommand(
-      "chai3d", "Starts a program that is built with CHAI3D, as it is; the devices are its Phantoms");
+      "chai3d", "Start an existing program that is built with CHAI3D. It sees the devices as Phantoms");
   command.footer("Example: tendon-plug chai3d --server lab:47100 --key wall.key -- ./01-mydevice");
   add_common(command, options.desk);
   command
-      .add_option(
-          "--model", options.model,
-          "The model's name, for programs that look for one, such as \"PHANTOM Omni\". Empty: the device's own. "
-          "CHAI3D takes limits from the names it knows")
+      .add_option("--model", options.model,
+                  "Name of the model, such as \"PHANTOM Omni\", for programs that require one. Empty: the name of the "
+                  "device. CHAI3D sets its limits by the names that it knows")
       ->type_name("NAME")
       ->check(CLI::Validator(
           [](const std::string& text) { return text.size() < 255 ? "" : "expected at most 254 bytes"; }, ""));
   command
       .add_option("--pace", options.pace,
-                  "on: each force that the program sets waits for the next state, at most 2 ms; off: for programs that "
-                  "sleep by themselves")
+                  "on: setting a force waits for the next state, at most 2 ms. off: do not wait, for programs that "
+                  "sleep themselves")
       ->check(usage::one_of({"on", "off"}))
       ->capture_default_str();
-  command.add_option("PROGRAM", options.program, "The program and its arguments, after --")->required();
+  command.add_option("PROGRAM", options.program, "Program and its arguments, after --")->required();
   command.positionals_at_end();
   command.callback([&chosen] { chosen = [] { return serve(options); }; });
 }

@@ -108,7 +108,7 @@ class Attached {
     const char* const wake = std::getenv(kWakeVariable);
     // NOLINTEND(concurrency-mt-unsafe)
     if (memory == nullptr || wake == nullptr || !map(memory)) {
-      constexpr char kSaid[] = "libhdPhantom: no device: start this program with `tendon-plug chai3d -- PROGRAM`\n";
+      constexpr char kSaid[] = "libhdPhantom: no device; start this program with `tendon-plug chai3d -- PROGRAM`\n";
       if (::write(STDERR_FILENO, kSaid, sizeof kSaid - 1) < 0) return;  // stderr is closed
       return;
     }

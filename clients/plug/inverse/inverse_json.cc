@@ -78,7 +78,7 @@ std::optional<std::string> permutation_in(const json& holder, Wish& wish) {
     return {};
   }
   if (text->is_string() && basis_of(text->get_ref<const std::string&>())) return text->get<std::string>();
-  refuse(wish, "basis.permutation: expected X, Y and Z once each, with signs or without: \"XZY\", \"X-YZ\"");
+  refuse(wish, "basis.permutation: expected X, Y and Z once each, with optional signs, like \"XZY\" or \"X-YZ\"");
   return {};
 }
 
@@ -88,7 +88,8 @@ void read_commands(const json& commands, DeviceWish& device, Wish& wish) {
       const json* const newer = member(value, "vector");
       device.force = vector(newer != nullptr ? newer : member(value, "values"));
       if (!device.force) {
-        refuse(wish, "set_cursor_force: expected \"vector\" or \"values\" with the numbers x, y and z, N on the hand");
+        refuse(wish,
+               "set_cursor_force: expected \"vector\" or \"values\" with the numbers x, y and z, in N on the hand");
       }
     } else if (name == "tendon") {
       device.torque = vector(member(value, "torque_nm"));
@@ -98,8 +99,8 @@ void read_commands(const json& commands, DeviceWish& device, Wish& wish) {
       }
     } else if (name == "set_cursor_position") {
       refuse(wish,
-             "set_cursor_position: no position servo over a late link; send set_cursor_force, which the limiter "
-             "bounds");
+             "set_cursor_position: not supported, because the network is too slow for a position servo; use "
+             "set_cursor_force");
     } else if (name != "probe_position") {
       ++wish.ignored;
     }
@@ -108,7 +109,7 @@ void read_commands(const json& commands, DeviceWish& device, Wish& wish) {
 
 void read_device(const json& entry, Wish& wish) {
   const json* const id = member(entry, "device_id");
-  if (id == nullptr || !id->is_string()) return refuse(wish, "inverse3: expected a \"device_id\", a text");
+  if (id == nullptr || !id->is_string()) return refuse(wish, "inverse3: expected a \"device_id\" with a string");
   DeviceWish& device = wish.devices.emplace_back();
   device.device_id = id->get<std::string>();
   device.permutation = permutation_in(entry, wish);
@@ -254,9 +255,9 @@ Wish read_wish(std::string_view text) {
     return wish;
   };
   if (text.size() > kLongestMessage) return unread("longer than " + std::to_string(kLongestMessage) + " bytes");
-  if (depth_of(text) > kDeepest) return unread("deeper than " + std::to_string(kDeepest) + " objects");
+  if (depth_of(text) > kDeepest) return unread("nested deeper than " + std::to_string(kDeepest) + " objects");
   const json message = json::parse(text, nullptr, false);
-  if (message.is_discarded()) return unread("no JSON, or a number that no double holds");
+  if (message.is_discarded()) return unread("not JSON, or a number out of range");
   if (!message.is_object()) return unread("expected an object");
   wish.read = true;
   for (const auto& [name, value] : message.items()) {

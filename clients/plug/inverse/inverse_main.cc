@@ -18,11 +18,11 @@ namespace tendon::plug {
 #ifdef TENDON_MISSING
 
 void add_inverse(CLI::App& app, Chosen& chosen) {
-  CLI::App* const command = app.add_subcommand("inverse", "Not in this build: " TENDON_MISSING " was missing");
+  CLI::App* const command = app.add_subcommand("inverse", "Not included in this build: " TENDON_MISSING " was missing");
   command->allow_extras();
   command->callback([&chosen] {
     chosen = []() -> int {
-      throw std::runtime_error("inverse is not in this build: " TENDON_MISSING
+      throw std::runtime_error("inverse is not included in this build: " TENDON_MISSING
                                " was missing; install it and build again");
     };
   });
@@ -46,19 +46,19 @@ int run_inverse(const InverseOptions& options) {
   const bool local = is_loopback(config.listen);
   if (!local && !options.anybody) {
     std::cerr << "--listen " << options.listen
-              << ": beyond this machine only with --anybody, for whoever reaches the port moves a motor\n";
+              << ": expected a loopback address, or --anybody: anyone who can reach this port can move the motors\n";
     return 2;
   }
   DeskConfig desk_config = options.desk;
   desk_config.client.valid_for = InverseSession::kFresh;
   Desk desk(std::move(desk_config), read_clock());
   InverseServer server(config, desk, read_clock);
-  if (!local) desk.say("whoever reaches " + to_string(server.address()) + " moves a motor");
+  if (!local) desk.say("anyone who can reach " + to_string(server.address()) + " can move the motors");
   const std::string at = to_string(server.address());
   if (options.desk.json) {
     std::cout << nlohmann::ordered_json{{"event", "listening"}, {"address", at}} << std::endl;
   } else {
-    desk.say("clients find the device at ws://" + at);
+    desk.say("listening at ws://" + at);
   }
   server.run(from_seconds(options.duration_s));
   return desk.stop(read_clock());
@@ -67,23 +67,25 @@ int run_inverse(const InverseOptions& options) {
 }  // namespace
 
 void add_inverse(CLI::App& app, Chosen& chosen) {
-  CLI::App* const command = app.add_subcommand(
-      "inverse",
-      "A WebSocket that answers JSON as Haply's Inverse service does: for Isaac Lab, for pages, for any language");
+  CLI::App* const command = app.add_subcommand("inverse",
+                                               "Serve the JSON protocol of Haply's Inverse service over a WebSocket, "
+                                               "for Isaac Lab, web pages and all languages");
   command->footer("Example: tendon-plug inverse --server lab:47100 --device right");
   static InverseOptions options;  // the parser writes to it until `chosen` is called
   add_common(*command, options.desk);
   command
       ->add_option("--listen", options.listen,
-                   "Where clients find it; port 0 lets the system choose. Beyond this machine only with --anybody")
+                   "Address of the WebSocket. Port 0: a free port. Other machines are only accepted with --anybody")
       ->type_name("HOST:PORT")
       ->capture_default_str()
       ->check(usage::accepted_by([](const std::string& text) { parse_address(text); }));
   command
-      ->add_option("--origin", options.server.origins,
-                   "Pages from there may come in, beside those of this machine: https://lab.example")
+      ->add_option(
+          "--origin", options.server.origins,
+          "Also accept web pages from this origin, such as https://lab.example; otherwise only from this machine")
       ->type_name("URL");
-  command->add_flag("--anybody", options.anybody, "Listen beyond this machine: whoever reaches the port moves a motor");
+  command->add_flag("--anybody", options.anybody,
+                    "Accept other machines. Anyone who can reach the port can move the motors");
   command->add_option("--duration-s", options.duration_s, "Stop after this time, s. 0: run until Ctrl-C")
       ->capture_default_str()
       ->check(CLI::Range(0.0, 1e9));

@@ -160,7 +160,7 @@ class InverseConnection {
     }
     if (!stuck_since_) stuck_since_ = now;
     if (now - *stuck_since_ < shared_.config.patience) return;
-    why_ = "it read no reply for " + std::to_string(shared_.config.patience / std::chrono::seconds(1)) + " s";
+    why_ = "no reply was read for " + std::to_string(shared_.config.patience / std::chrono::seconds(1)) + " s";
     close();
   }
 
@@ -191,22 +191,23 @@ class InverseConnection {
         error == asio::error::connection_reset) {
       return close();
     }
-    if (error) return refuse("400 Bad Request", "that is no request for a WebSocket");
+    if (error) return refuse("400 Bad Request", "expected a WebSocket request");
     const auto& message = parser_->get();
     if (!websocket::is_upgrade(message)) {
-      return refuse("404 Not Found",
-                    "There is nothing here but a WebSocket: tendon-plug inverse answers JSON at this address, ws:// "
-                    "instead of http://");
+      return refuse(
+          "404 Not Found",
+          "This address only serves a WebSocket with JSON for tendon-plug inverse: use ws:// instead of http://");
     }
     const auto origin = message.find(http::field::origin);
     if (origin != message.end() &&
         (message.count(http::field::origin) > 1 ||
          !may_come_from({origin->value().data(), origin->value().size()}, shared_.config.origins))) {
-      return refuse("403 Forbidden", "not for pages from elsewhere; see --origin of tendon-plug inverse");
+      return refuse("403 Forbidden", "pages from this origin are not accepted; see --origin of tendon-plug inverse");
     }
     if (shared_.clients >= shared_.config.max_clients) {
-      const std::string words = std::to_string(shared_.clients) + " clients are here already";
-      if (!std::exchange(shared_.full_said, true)) shared_.desk.say("one more from " + peer_ + " is refused: " + words);
+      const std::string words = std::to_string(shared_.clients) + " clients are already connected";
+      if (!std::exchange(shared_.full_said, true))
+        shared_.desk.say("another client from " + peer_ + " was refused: " + words);
       return refuse("503 Service Unavailable", words);
     }
     accept();
@@ -233,7 +234,7 @@ class InverseConnection {
     program_ = ++shared_.newest;
     session_.emplace(program_, shared_.devices, shared_.counts, shared_.clock());
     ++shared_.clients;
-    shared_.desk.say("client " + std::to_string(program_) + " came from " + peer_);
+    shared_.desk.say("client " + std::to_string(program_) + " connected from " + peer_);
     stream_.expires_never();
     web_socket_.emplace(std::move(stream_));
     websocket::stream_base::timeout timeout{};
@@ -259,7 +260,8 @@ class InverseConnection {
     web_socket_->async_read(message_, with([this](error_code error, std::size_t) {
                               reading_ = false;
                               if (error) {
-                                if (error == websocket::error::message_too_big) why_ = "a message above 64 kB";
+                                if (error == websocket::error::message_too_big)
+                                  why_ = "a message was longer than 64 kB";
                                 return close();
                               }
                               inbox_.emplace_back(static_cast<const char*>(message_.data().data()), message_.size());
@@ -408,9 +410,9 @@ struct InverseServer::State {
     for (std::size_t i = 0; i < owners.size(); ++i) {
       const Plug::Program owner = shared.desk.plug(i).owner();
       if (std::exchange(owners[i], owner) == owner) continue;
-      shared.desk.say(
-          shared.desk.name(i) + ": " +
-          (owner == 0 ? "no client asks for a force any more" : "client " + std::to_string(owner) + " owns the force"));
+      shared.desk.say(shared.desk.name(i) + ": " +
+                      (owner == 0 ? "no client requests a force any more"
+                                  : "client " + std::to_string(owner) + " controls the force"));
     }
   }
 

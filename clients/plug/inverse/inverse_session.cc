@@ -142,12 +142,13 @@ void InverseSession::take(LocalTime now, const DeviceWish& asked, Wish& wish) {
     if (wish.refused.size() < kMostRefusals) wish.refused.push_back(std::move(sentence));
   };
   const auto found = std::ranges::find(devices_, asked.device_id, &InverseDevice::id);
-  if (found == devices_.end()) return refuse("device_id: none of the devices that the replies list");
+  if (found == devices_.end()) return refuse("device_id: expected one of the devices in the replies");
   Eye& eye = eyes_[static_cast<std::size_t>(found - devices_.begin())];
   if (asked.permutation) set_basis(*asked.permutation, eye.permutation, eye.frame);
   if (!asked.force && !asked.torque && !asked.grip_force) return;
   Plug& plug = *found->plug;
-  if (asked.torque && plug.handle() && plug.handle()->max_torque == 0) refuse(found->name + ": no motors that turn it");
+  if (asked.torque && plug.handle() && plug.handle()->max_torque == 0)
+    refuse(found->name + ": the device has no motors for rotation");
   const bool nothing = asked.force.value_or(Vec3::Zero()).isZero(0) && asked.torque.value_or(Vec3::Zero()).isZero(0) &&
                        asked.grip_force.value_or(0) == 0;
   if (nothing && plug.owner() != program_) return;
@@ -160,9 +161,9 @@ void InverseSession::take(LocalTime now, const DeviceWish& asked, Wish& wish) {
     case Plug::Answer::kTaken:
       return;
     case Plug::Answer::kOwned:
-      return refuse(found->name + ": another client's forces are taken, and this one was dropped");
+      return refuse(found->name + ": another client controls the force, so this one was ignored");
     case Plug::Answer::kObserving:
-      return refuse(found->name + ": --observe was said, and no force is taken");
+      return refuse(found->name + ": forces are disabled by --observe");
   }
 }
 

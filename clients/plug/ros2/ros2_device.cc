@@ -29,13 +29,13 @@ double ms(Duration d) { return std::chrono::duration<double, std::milli>(d).coun
 std::string_view words(Mode mode) {
   switch (mode) {
     case Mode::kIdle:
-      return "no force has come yet";
+      return "no force received yet";
     case Mode::kActive:
       return "a fresh force";
     case Mode::kHolding:
-      return "an old force, held";
+      return "an old force, which is held";
     case Mode::kDecaying:
-      return "an old force, fading";
+      return "an old force, which decays";
     case Mode::kSafeStop:
       return "none: the newest force is too old";
     case Mode::kFault:
@@ -53,13 +53,13 @@ std::string_view words(Safety safety) {
     case Safety::kFirmware:
       return "the device has no firmware yet";
     case Safety::kUnhomed:
-      return "the device does not know where it is: home it";
+      return "the device must be homed";
     case Safety::kHomed:
-      return "the device waits to be armed";
+      return "the device is ready to be armed";
     case Safety::kArmed:
       return "armed";
     case Safety::kFault:
-      return "the device gives no force until it is armed again";
+      return "the device exerts no force until it is armed again";
     case Safety::kUnguarded:
       return "ready, without a safety layer";
   }
@@ -103,8 +103,7 @@ void RosDevice::learn() {
   if (knows_ || !plug_.handle()) return;
   knows_ = true;
   if (!plug_.handle()->operator_from_device) {
-    say("the scene does not say how the device lies (axes = …): its x is taken for right, its y for up, its z for the "
-        "user");
+    say("the scene does not specify the orientation of the device (axes = …): assuming x right, y up, z to the user");
   }
   if (!config_.servo) return;
   const auto& names = plug_.handle()->buttons;
@@ -117,8 +116,7 @@ void RosDevice::learn() {
   } else {
     std::string known;
     for (const std::string& name : names) known += (known.empty() ? "" : ", ") + name;
-    say("--clutch " + printable(config_.clutch) +
-        ": the device has no such button, so that nothing is sent to servo_…; " +
+    say("--clutch " + printable(config_.clutch) + ": the device has no such button, so nothing is sent to servo_…; " +
         (known.empty() ? "expected its number, 0 to 9" : "it has " + known));
   }
 }
@@ -155,7 +153,7 @@ RosDevice::Program* RosDevice::program_of(std::uint64_t writer, std::string_view
 }
 
 void RosDevice::drop(Program& program, const std::string& why, LocalTime now) {
-  const std::string sentence = "a wrench_command of " + program.called + " is dropped: " + why;
+  const std::string sentence = "a wrench_command of " + program.called + " was dropped: " + why;
   refusal_ = sentence;
   if (sentence == program.said || (!program.said.empty() && now < program.said_at + kSayEvery)) return;
   program.said = sentence;
@@ -167,7 +165,7 @@ void RosDevice::take(std::uint64_t writer, std::string_view called, const RosWre
   Program* program = program_of(writer, called);
   if (program == nullptr) {
     ++refused_;
-    refusal_ = "a wrench_command is dropped: " + std::to_string(kMostPrograms) + " programs publish it already";
+    refusal_ = "a wrench_command was dropped: " + std::to_string(kMostPrograms) + " programs already publish it";
     return;
   }
   const auto& handle = plug_.handle();
@@ -185,14 +183,14 @@ void RosDevice::take(std::uint64_t writer, std::string_view called, const RosWre
   const auto answer = plug_.push(program->number, now, now + *touch.valid_for, touch);
   switch (answer) {
     case Plug::Answer::kTaken: {
-      const std::string sentence = program->called + " owns the device: the hand feels its wrench_command";
+      const std::string sentence = program->called + " controls the device: the hand feels its wrench_command";
       if (program->said != sentence) say(sentence);
       program->said = sentence;
       program->said_at = now;
       break;
     }
     case Plug::Answer::kOwned:
-      drop(*program, "another program owns the device, until it leaves or is silent for a second", now);
+      drop(*program, "another program controls the device until it leaves or is silent for 1 s", now);
       break;
     case Plug::Answer::kObserving:
       drop(*program, "--observe", now);
@@ -225,7 +223,7 @@ RosDiagnosis RosDevice::diagnosis() {
   if (plug_.description()) d.hardware_id = plug_.description()->model;
   add("states", std::to_string(plug_.states() - std::exchange(states_told_, plug_.states())));
   add("forces sent", std::to_string(plug_.forces() - std::exchange(forces_told_, plug_.forces())));
-  add("commands of others than the owner", std::to_string(plug_.forces_dropped()));
+  add("commands of other programs", std::to_string(plug_.forces_dropped()));
   add("commands refused", std::to_string(refused_));
   if (plug_.lost() || !plug_.state()) {
     complain(Level::kError, "no session with the server");
@@ -238,8 +236,8 @@ RosDiagnosis RosDevice::diagnosis() {
     add("limited by", reasons.empty() ? "nothing" : to_string(reasons));
     add("permitted force N", number(state.permitted_force));
     add("energy J", number(state.energy));
-    if (reasons.has(Reason::kFault)) complain(Level::kError, "a fault holds the force at zero");
-    if (reasons.has(Reason::kDisarmed)) complain(Level::kWarn, "the operator has disarmed the device");
+    if (reasons.has(Reason::kFault)) complain(Level::kError, "the force is zero because of a fault");
+    if (reasons.has(Reason::kDisarmed)) complain(Level::kWarn, "the device was disarmed by the operator");
     if (const auto device = plug_.device_report()) {
       add("safety", std::string(words(device->safety)));
       if (device->safety != Safety::kArmed && device->safety != Safety::kUnguarded) {

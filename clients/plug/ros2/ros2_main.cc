@@ -51,7 +51,7 @@ std::string host_or_interface(const std::string& text) {
   };
   return !text.empty() && text.size() <= 255 && std::ranges::all_of(text, fits)
              ? std::string()
-             : "expected the name of an interface or a host, or an address, got \"" + text + "\"";
+             : "expected the name of an interface, a host name or an IP address, got \"" + text + "\"";
 }
 
 Duration since_1970() {
@@ -126,8 +126,8 @@ class Ros2Bridge {
       const std::string name = ros_name(desk.name(i));
       const auto [other, fresh] = taken.emplace(name, desk.name(i));
       if (!fresh) {
-        throw std::runtime_error("--device " + desk.name(i) + ": ROS would call it " + name + ", as it calls " +
-                                 other->second);
+        throw std::runtime_error("--device " + desk.name(i) + ": its ROS name would be " + name +
+                                 ", which is already used for " + other->second);
       }
       config.devices.push_back(name);
     }
@@ -137,12 +137,12 @@ class Ros2Bridge {
   void say_what_it_is() {
     std::string sentence = "wrench_command is the force on the hand";
     if (options_.negate) {
-      sentence = "--negate: wrench_command is what a robot feels or the hand exerts, and the hand gets its opposite";
+      sentence = "--negate: wrench_command is the force on a robot or of the hand, and its opposite acts on the hand";
     }
-    desk_.say(sentence + "; the topic wrench always is what the device exerts on the hand");
+    desk_.say(sentence + "; the topic wrench is always the force of the device on the hand");
     if (!options_.interface.empty()) {
-      desk_.say("--interface " + options_.interface + ": whoever reaches DDS domain " +
-                std::to_string(options_.domain) + " on it moves a motor");
+      desk_.say("--interface " + options_.interface + ": anyone who can reach DDS domain " +
+                std::to_string(options_.domain) + " on this interface can move the motors");
     }
     if (options_.desk.json) {
       const nlohmann::ordered_json line = {{"event", "listening"},
@@ -192,7 +192,7 @@ class Ros2Bridge {
 
 void add_ros2(CLI::App& app, Chosen& chosen) {
   static Ros2Options o;  // must exist until the chosen subcommand has run
-  CLI::App& ros2 = *app.add_subcommand("ros2", "A device as topics of ROS 2, by plain DDS: /tendon/NAME/pose, …");
+  CLI::App& ros2 = *app.add_subcommand("ros2", "Publish a device as ROS 2 topics with DDS: /tendon/NAME/pose, …");
   ros2.footer(
       "Example: tendon-plug ros2 --server lab:47100 --device right\n"
       "Example: tendon-plug ros2 --server lab:47100 --device right --servo twist --clutch 0");
@@ -204,27 +204,26 @@ void add_ros2(CLI::App& app, Chosen& chosen) {
       ->check(CLI::Range(0U, Ros2Node::kMaxDomain))
       ->capture_default_str();
   const CLI::Validator host(host_or_interface, "");
-  ros2.add_option("--interface", o.interface, "The network interface; none: only this machine")
+  ros2.add_option("--interface", o.interface, "Network interface. Default: only this machine")
       ->type_name("NAME")
       ->check(host);
-  ros2.add_option("--peer", o.peers, "With --interface: a machine that multicast does not reach; several times")
+  ros2.add_option("--peer", o.peers, "With --interface: a machine that cannot be reached by multicast, repeatable")
       ->type_name("HOST")
       ->check(host)
       ->needs("--interface");
-  ros2.add_option("--rate", o.rate_hz, "States per second at most; 0: all")
+  ros2.add_option("--rate", o.rate_hz, "Maximum number of states per second. 0: all")
       ->type_name("HZ")
       ->check(CLI::Range(0.0, 10000.0));
-  ros2.add_flag("--negate", o.negate, "wrench_command is what a robot feels, or what the hand exerts");
+  ros2.add_flag("--negate", o.negate, "Negate wrench_command, if it is the force on a robot or the force of the hand");
   const std::map<std::string, RosServo::Kind> kinds = {{"twist", RosServo::Kind::kTwist},
                                                        {"pose", RosServo::Kind::kPose}};
-  ros2.add_option("--servo", o.servo, "Send the hand's motion to a robot arm too, while the clutch is held")
+  ros2.add_option("--servo", o.servo, "Also send the motion of the hand to a robot arm while the clutch is held")
       ->transform(usage::one_of(kinds))
-      ->needs(ros2.add_option("--clutch", o.clutch, "The button that is the clutch: its name or number")
-                  ->type_name("BUTTON"));
-  ros2.add_option("--servo-scale", o.servo_scale, "The robot's motion over the hand's")
+      ->needs(ros2.add_option("--clutch", o.clutch, "Name or number of the clutch button")->type_name("BUTTON"));
+  ros2.add_option("--servo-scale", o.servo_scale, "Motion of the robot divided by that of the hand")
       ->check(CLI::Range(0.001, 1000.0))
       ->capture_default_str();
-  ros2.add_option("--servo-frame", o.servo_frame, "frame_id of what is sent to the arm; none: NAME_servo")
+  ros2.add_option("--servo-frame", o.servo_frame, "frame_id of the messages to the arm. Default: NAME_servo")
       ->type_name("FRAME");
   ros2.add_option("--duration-s", o.duration_s, "End after this time")->check(CLI::PositiveNumber);
   ros2.callback([&chosen] { chosen = [] { return Ros2Bridge(o).run(); }; });

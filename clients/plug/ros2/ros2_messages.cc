@@ -63,7 +63,7 @@ std::variant<RosView::Wish, std::string> RosView::wish(const RosWrench& command,
   const std::string& frame = command.header.frame_id;
   const bool of_operator = frame == operator_id_;
   if (!of_operator && !frame.empty() && frame != base_id_) {
-    return "the frame_id \"" + printable(frame) + "\" is not known here: expected none, " + base_id_ + " or " +
+    return "the frame_id \"" + printable(frame) + "\" is unknown: expected no frame_id, " + base_id_ + " or " +
            operator_id_;
   }
   if (!command.force.allFinite() || !command.torque.allFinite()) return "it contains a number that is not finite";

@@ -46,7 +46,7 @@ std::string configuration(const Ros2Node::Config& config) {
 }
 
 dds_entity_t made(dds_entity_t entity, const std::string& what) {
-  if (entity < 0) throw std::runtime_error("DDS makes no " + what + ": " + dds_strretcode(entity));
+  if (entity < 0) throw std::runtime_error("DDS cannot create a " + what + ": " + dds_strretcode(entity));
   return entity;
 }
 

@@ -48,12 +48,13 @@ vrpn::Server::Alias alias_of(const std::string& text, std::vector<std::string>& 
 
 vrpn::Server::Config config_of(VrpnOptions& options) {
   vrpn::Server::Config config{.listen = parse_address(options.listen), .names = {}};
-  if (!is_ipv4(config.listen)) throw std::runtime_error("--listen " + options.listen + ": VRPN has IPv4 only");
+  if (!is_ipv4(config.listen))
+    throw std::runtime_error("--listen " + options.listen +
+                             ": expected an IPv4 address, because VRPN only supports IPv4");
   if (!is_loopback(config.listen) && !options.anybody) {
-    throw std::runtime_error(
-        "--listen " + options.listen +
-        ": whoever reaches this port moves a motor, for VRPN asks nobody who he is; --anybody says "
-        "that this is meant");
+    throw std::runtime_error("--listen " + options.listen +
+                             ": expected a loopback address, or --anybody: anyone who can reach this port can move the "
+                             "motors, because VRPN has no authentication");
   }
   for (const std::string& text : options.names) config.names.push_back(alias_of(text, options.desk.devices));
   if (config.names.empty() && options.desk.devices.empty())
@@ -66,7 +67,7 @@ vrpn::Server::Config config_of(VrpnOptions& options) {
   for (std::size_t i = 0; i < config.names.size(); ++i) {
     for (std::size_t k = 0; k < i; ++k) {
       if (config.names[i].name == config.names[k].name) {
-        throw std::runtime_error("--name " + config.names[i].name + ": it occurs twice");
+        throw std::runtime_error("--name " + config.names[i].name + ": expected unique names");
       }
     }
   }
@@ -87,7 +88,8 @@ int run_vrpn(VrpnOptions& options) {
   for (const auto& alias : config.names)
     names += (names.empty() ? "" : ", ") + alias.name + " (" + desk.name(alias.place) + ")";
   desk.say("VRPN at " + to_string(server.address()) + ": " + names);
-  if (!is_loopback(config.listen)) desk.say("whoever reaches this port moves a motor: VRPN asks nobody who he is");
+  if (!is_loopback(config.listen))
+    desk.say("anyone who can reach this port can move the motors: VRPN has no authentication");
   // Messages contain the time of day, and the system clock may be adjusted while running.
   Duration to_1970{};
   LocalTime look_again = start;
@@ -110,21 +112,21 @@ int run_vrpn(VrpnOptions& options) {
 }  // namespace
 
 void add_vrpn(CLI::App& app, Chosen& chosen) {
-  CLI::App* vrpn = app.add_subcommand("vrpn", "A VRPN server: programs find NAME@localhost");
+  CLI::App* vrpn = app.add_subcommand("vrpn", "Run a VRPN server; programs connect to NAME@localhost");
   static VrpnOptions options;  // written by CLI11 while parsing
   vrpn->footer("Example: tendon-plug vrpn --server lab:47100 --name Phantom0=right");
   add_common(*vrpn, options.desk);
-  vrpn->add_option(
-          "--name", options.names,
-          "A name that VRPN programs ask for, and its device (the first one without it); several times for several. "
-          "None: each --device under its own name, or else Phantom0")
+  vrpn->add_option("--name", options.names,
+                   "VRPN name, and its device (default: the first device), repeatable. Default: the name of each "
+                   "--device, or Phantom0")
       ->type_name("NAME=DEVICE");
-  vrpn->add_option("--listen", options.listen, "Where programs connect, TCP and UDP; port 0: any")
+  vrpn->add_option("--listen", options.listen, "Address for programs, TCP and UDP. Port 0: a free port")
       ->type_name("HOST:PORT")
       ->capture_default_str();
-  vrpn->add_flag("--anybody", options.anybody,
-                 "Listen beyond this machine: whoever reaches the port moves a motor, for VRPN asks nobody who he is");
-  vrpn->add_option("--duration-s", options.duration_s, "End after so long; 0: at Ctrl-C")
+  vrpn->add_flag(
+      "--anybody", options.anybody,
+      "Accept other machines. Anyone who can reach the port can move the motors, because VRPN has no authentication");
+  vrpn->add_option("--duration-s", options.duration_s, "Stop after this time, s. 0: run until Ctrl-C")
       ->check(CLI::NonNegativeNumber);
   vrpn->callback([&chosen] { chosen = [] { return run_vrpn(options); }; });
 }

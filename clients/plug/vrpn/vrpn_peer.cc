@@ -45,7 +45,7 @@ void Peer::send(const Moment& now, std::int32_t sender, std::int32_t type, bool 
     append(datagrams_.back(), message, sequence_++);
   } else {
     append(out_, message, sequence_++);
-    if (out_.size() - sent_ > kMaxUnread && end_.empty()) end_ = "it does not read what it is sent";
+    if (out_.size() - sent_ > kMaxUnread && end_.empty()) end_ = "it does not read its data";
   }
   payload_.clear();
 }
@@ -84,10 +84,10 @@ void Peer::take_stream(const Moment& now, Bytes bytes) {
     used = kCookieSize;
     switch (kinship(theirs)) {
       case Kinship::kOtherMajor:
-        end_ = "its first bytes are not those of VRPN 07";
+        end_ = "it does not use VRPN version 07";
         return;
       case Kinship::kOtherMinor:
-        say("it speaks another minor version of VRPN than 07.38; going on");
+        say("it uses another minor version of VRPN than 07.38; continuing");
         break;
       case Kinship::kSame:
         break;
@@ -98,7 +98,7 @@ void Peer::take_stream(const Moment& now, Bytes bytes) {
   while (end_.empty()) {
     const First first = first_message(std::span(in_).subspan(used));
     if (first.broken) {
-      end_ = "it sends a message of an impossible length";
+      end_ = "it sent a message with an invalid length";
       return;
     }
     if (!first.message) break;
@@ -197,7 +197,7 @@ void Peer::take_system(const Message& message) {
       std::string printable(*name);
       std::ranges::replace_if(
           printable, [](char one) { return one < ' ' || one > '~'; }, '?');
-      say("it asks for \"" + printable + "\", which nobody has here; there is " + names + " (see --name)");
+      say("it asks for \"" + printable + "\", which does not exist; expected one of " + names + " (see --name)");
       return;
     }
     case kUdpDescription:
@@ -316,7 +316,7 @@ void Peer::report(const Moment& now, std::size_t station, const DeviceState& sta
   if (stopped && !told.stopped) {
     append_error(payload_, kForceError);
     send(now, station, Type::kForceError, false);
-    tell(now, station, Severity::kError, "the device gives no force: " + to_string(reasons));
+    tell(now, station, Severity::kError, "the device exerts no force: " + to_string(reasons));
   }
   told.stopped = stopped;
 

@@ -168,7 +168,8 @@ void Server::serve_states(const Moment& now) {
       seen_[i].lost = plug.lost();
       for (const auto& client : clients_) {
         client->peer.tell(now, i, seen_[i].lost ? Severity::kWarning : Severity::kNormal,
-                          seen_[i].lost ? "the haptic server is lost; retrying" : "the haptic server is looked for");
+                          seen_[i].lost ? "the connection to the haptic server is lost; retrying"
+                                        : "connecting to the haptic server");
       }
     }
     if (!plug.state() || plug.states() == seen_[i].states) continue;
@@ -184,7 +185,7 @@ void Server::serve_states(const Moment& now) {
 bool Server::has_place(const std::string& whom) {
   if (clients_.size() < kMaxClients) return true;
   if (!std::exchange(full_said_, true)) {
-    desk_.say(whom + " finds no place: " + std::to_string(kMaxClients) + " clients are the most");
+    desk_.say(whom + " was refused: " + std::to_string(kMaxClients) + " is the maximum number of clients");
   }
   return false;
 }
@@ -337,7 +338,7 @@ LocalTime Server::turn(const Moment& now) {
       read(now, client, ready, polled_[2 + kEach * c + 1].revents);
     }
     while (const auto sentence = client.peer.next_sentence()) desk_.say(client.name + ": " + *sentence);
-    if (!was_open && client.peer.open()) desk_.say(client.name + " is here");
+    if (!was_open && client.peer.open()) desk_.say(client.name + " has connected");
     for (std::size_t i = 0; i < stations_.size(); ++i) {
       Asker& asker = client.askers[i];
       asked =
@@ -346,7 +347,7 @@ LocalTime Server::turn(const Moment& now) {
     }
     write(client);
     if (!client.peer.open() && now.at >= client.until && client.over.empty()) {
-      client.over = client.dialling ? "does not answer" : "does not say that it speaks VRPN";
+      client.over = client.dialling ? "does not answer" : "did not send the VRPN handshake";
     }
     if (!client.peer.end().empty()) client.over = "is dropped: " + client.peer.end();
     if (!client.peer.open()) next = std::min(next, client.until);

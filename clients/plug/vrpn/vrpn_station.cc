@@ -34,7 +34,7 @@ std::optional<std::string> Station::learn(const Plug& plug) {
   buttons = static_cast<int>(plug.handle()->buttons.size());
   view = View(*find_frame("openhaptics"), plug.handle()->operator_from_device);
   if (plug.handle()->operator_from_device || std::exchange(axes_said, true)) return {};
-  return name + ": the scene does not say which way is up (axes); the device's own axes are taken for VRPN's";
+  return name + ": the scene does not specify the orientation of the device (axes); assuming the axes of VRPN";
 }
 
 bool Asker::turn(LocalTime now, Duration since_1970, Plug& plug, const Station& station, Peer& peer) {
@@ -47,14 +47,14 @@ bool Asker::turn(LocalTime now, Duration since_1970, Plug& plug, const Station& 
     asks_ = is_stale_ = for_long_ = false;
   } else if (now >= until) {
     if (!std::exchange(is_stale_, true)) {
-      sentence_ = station.name + ": " + who_ + " is silent and has not ended its force; it fades";
+      sentence_ = station.name + ": " + who_ + " is silent and has not stopped its force, which now decays";
     }
     return false;
   } else if (!changed && now - at_ < kAskAgain) {
     return false;
   } else {
     asks_ = true;
-    if (std::exchange(is_stale_, false)) sentence_ = station.name + ": " + who_ + " draws again";
+    if (std::exchange(is_stale_, false)) sentence_ = station.name + ": " + who_ + " sends effects again";
   }
   at_ = now;
   const Physics physics = [&drawing, &station](const DeviceState& state) {
@@ -64,17 +64,17 @@ bool Asker::turn(LocalTime now, Duration since_1970, Plug& plug, const Station& 
   const Moment moment{now, since_1970};
   if (answer != Plug::Answer::kTaken) {
     if (std::exchange(is_refused_, true)) return false;
-    const std::string why =
-        answer == Plug::Answer::kOwned ? "another program has this device's force" : "tendon-plug only observes";
-    peer.tell(moment, i_, Severity::kWarning, "your force is not felt: " + why);
-    sentence_ = station.name + ": the force of " + who_ + " is not felt: " + why;
+    const std::string why = answer == Plug::Answer::kOwned ? "another program controls the force of this device"
+                                                           : "forces are disabled by --observe";
+    peer.tell(moment, i_, Severity::kWarning, "your force is not rendered: " + why);
+    sentence_ = station.name + ": the force of " + who_ + " is not rendered: " + why;
     return false;
   }
   if (std::exchange(is_refused_, false)) {
-    peer.tell(moment, i_, Severity::kNormal, "your force is felt now");
-    sentence_ = station.name + ": the force of " + who_ + " is felt now";
+    peer.tell(moment, i_, Severity::kNormal, "your force is rendered now");
+    sentence_ = station.name + ": the force of " + who_ + " is rendered now";
   } else if (asks_ && !changed && until == LocalTime::max() && !std::exchange(for_long_, true)) {
-    sentence_ = station.name + ": what " + who_ + " has drawn lives as long as its connection";
+    sentence_ = station.name + ": what " + who_ + " has set stays until it disconnects";
   }
   return true;
 }

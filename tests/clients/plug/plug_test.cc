@@ -158,14 +158,14 @@ TEST(Plug, GivesTheChannelBackWhenNoProgramAsksForASecond) {
     other.ask(kOld, world.now, world.now + milliseconds(50), pushes_by(-0.5));
   });
   EXPECT_TRUE(plug.pushes());
-  EXPECT_TRUE(one_has(sentences_of(plug), "takes the forces of a program"));
+  EXPECT_TRUE(one_has(sentences_of(plug), "uses the forces of a program"));
   EXPECT_FALSE(other.pushes());
   EXPECT_TRUE(other.state()) << "it looks on meanwhile";
-  EXPECT_TRUE(one_has(sentences_of(other), "takes no forces: "));
+  EXPECT_TRUE(one_has(sentences_of(other), "uses no forces: "));
   world.run(4000, [&] { other.ask(kOld, world.now, world.now + milliseconds(50), pushes_by(-0.5)); });
   EXPECT_FALSE(plug.pushes());
   EXPECT_TRUE(plug.state());
-  EXPECT_TRUE(one_has(sentences_of(plug), "no program asks for one"));
+  EXPECT_TRUE(one_has(sentences_of(plug), "no program requests one"));
   EXPECT_TRUE(other.pushes());
   EXPECT_LT(world.step.applied.y(), 0);
 }
@@ -236,9 +236,9 @@ TEST(Plug, SaysOnceWhenItDoesNotKnowHowTheDeviceLies) {
   World unknown("demo_parts.toml");
   Plug& plug = unknown.add_plug();
   unknown.run(200);
-  EXPECT_TRUE(one_has(sentences_of(plug), "does not say how it lies"));
+  EXPECT_TRUE(one_has(sentences_of(plug), "has an unknown orientation"));
   unknown.run(200, [&] { plug.push(kOld, unknown.now, unknown.now + milliseconds(50), Vec3(0, 0, 0)); });
-  EXPECT_FALSE(one_has(sentences_of(plug), "does not say how it lies"));
+  EXPECT_FALSE(one_has(sentences_of(plug), "has an unknown orientation"));
 
   World known("demo_parts.toml");
   known.handle.operator_from_device = Quat{};
@@ -246,7 +246,7 @@ TEST(Plug, SaysOnceWhenItDoesNotKnowHowTheDeviceLies) {
   known.open_server();
   Plug& told = known.add_plug();
   known.run(200);
-  EXPECT_FALSE(one_has(sentences_of(told), "does not say how it lies"));
+  EXPECT_FALSE(one_has(sentences_of(told), "has an unknown orientation"));
 }
 
 TEST(Plug, SaysByeToTheServerAndIsSilentAfterwards) {

@@ -45,7 +45,7 @@ TEST_F(PreciceEngineWithAPartner, TheEndOfTheCouplingIsAnErrorThatNamesTheFile) 
   engine.answer(at(0.001));
   engine.answer(at(0.002));
   EXPECT_EQ(thrown_by<std::runtime_error>([&] { engine.answer(at(0.003)); }),
-            "the coupling has come to its end: max-time or max-time-windows of coupling.xml");
+            "the coupling has ended because of max-time or max-time-windows in coupling.xml");
 }
 
 TEST_F(PreciceEngineWithAPartner, AMeshOfTwoDimensionsIsRefused) {

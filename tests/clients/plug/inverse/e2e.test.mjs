@@ -92,8 +92,8 @@ test("the seventeenth client is refused, and comes in when another has left", as
   const { bridge } = await startBoth(t);
   const clients = [];
   for (let i = 0; i < 16; ++i) clients.push(await come(t, bridge.url));
-  assert.deepEqual(await refusal(bridge.url), { status: 503, text: "16 clients are here already\n" });
-  await bridge.program.line("is refused: 16 clients are here already");
+  assert.deepEqual(await refusal(bridge.url), { status: 503, text: "16 clients are already connected\n" });
+  await bridge.program.line("was refused: 16 clients are already connected");
   for (const client of clients) await client.ask("{}");
   clients[3].socket.close();
   await bridge.program.line("client 4 left");
@@ -108,7 +108,7 @@ test("a client that never reads is dropped, and the others are served", async (t
   const deaf = await come(t, bridge.url);
   deaf.socket._socket.pause();
   let left = false;
-  bridge.program.line("client 2 left: it read no reply for 1 s").then(() => (left = true));
+  bridge.program.line("client 2 left: no reply was read for 1 s").then(() => (left = true));
   for (let i = 0; i < 3000 && !left; ++i) {
     if (deaf.socket.bufferedAmount < 1e6) for (let k = 0; k < 50; ++k) deaf.socket.send(deaf.push(0.1));
     await other.ask("{}");
@@ -130,7 +130,7 @@ test("pages from elsewhere, plain HTTP and long messages are refused", async (t)
 
   const response = await fetch(`http://${bridge.address}/inverse3/0/config`);
   assert.equal(response.status, 404);
-  assert.match(await response.text(), /nothing here but a WebSocket/);
+  assert.match(await response.text(), /only serves a WebSocket/);
   assert.match(await raw(bridge.address, "hello\r\n\r\n"), /^HTTP\/1.1 400 /);
   assert.match(await raw(bridge.address, `GET / HTTP/1.1\r\nX: ${"x".repeat(20000)}\r\n\r\n`), /^HTTP\/1.1 400 /);
 
@@ -139,7 +139,7 @@ test("pages from elsewhere, plain HTTP and long messages are refused", async (t)
   assert.deepEqual(longest.tendon.refused, []);
   client.socket.send("x".repeat(65537));
   assert.equal(await client.ended, 1009);
-  await bridge.program.line("left: a message above 64 kB");
+  await bridge.program.line("left: a message was longer than 64 kB");
 });
 
 test("broken frames and half requests end nobody else's connection", async (t) => {
@@ -172,18 +172,18 @@ test("broken frames and half requests end nobody else's connection", async (t) =
     await other.ask("{}");
   }
   const said = (what) => bridge.program.lines.filter((line) => what.test(line)).length;
-  await until("all have left", () => said(/client \d+ left/) === said(/client \d+ came/) - 1);
+  await until("all have left", () => said(/client \d+ left/) === said(/client \d+ connected/) - 1);
 });
 
 test("beyond this machine only with --anybody", async (t) => {
   const refused = new Program(t, "tendon-plug", ["inverse", "--listen", "0.0.0.0:0"]);
   assert.equal(await refused.ended, 2);
-  assert.match(refused.lines.join("\n"), /only with --anybody, for whoever reaches the port moves a motor/);
+  assert.match(refused.lines.join("\n"), /or --anybody: anyone who can reach this port can move the motors/);
   const server = await startServer(t, scratch(t), ["demo"], "--record", "/dev/null");
   const anybody = ["--server", server.address, "--listen", "0.0.0.0:0", "--anybody", "--json"];
   const open = new Program(t, "tendon-plug", ["inverse", ...anybody]);
   await open.line('"listening"');
-  await open.line("moves a motor");
+  await open.line("can move the motors");
 });
 
 test("two devices are two arms with forces of their own", async (t) => {

@@ -248,7 +248,7 @@ TEST(InverseSession, ATorqueForADeviceThatCannotTurnIsRefusedInASentence) {
   const auto client = bridge.client();
   const json reply = bridge.say(*client, bridge.command(R"({"tendon":{"torque_nm":{"x":0,"y":0,"z":1}}})"));
   ASSERT_EQ(refused(reply).size(), 1U);
-  EXPECT_EQ(refused(reply)[0], "right: no motors that turn it");
+  EXPECT_EQ(refused(reply)[0], "right: the device has no motors for rotation");
 }
 
 TEST(InverseSession, ASilenceOf150MsFadesTheForceAndOneOf400MsEndsIt) {
@@ -294,7 +294,7 @@ TEST(InverseSession, ASecondClientThatAsksForAForceIsToldAndTheFirstKeepsIt) {
     told = bridge.say(*second, bridge.force(Vec3(0, 0, -0.5)));
     ASSERT_EQ(refused(told).size(), 1U);
   });
-  EXPECT_NE(refused(told)[0].get<std::string>().find("another client's forces are taken"), std::string::npos);
+  EXPECT_NE(refused(told)[0].get<std::string>().find("another client controls the force"), std::string::npos);
   EXPECT_EQ(ours(told).at("tick"), bridge.plug->state()->tick) << "it is answered all the same";
   EXPECT_GT(bridge.world.step.applied.y(), 0);
   // The first client stops sending, so the device is free after a second.

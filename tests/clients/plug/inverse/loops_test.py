@@ -193,9 +193,9 @@ def test_the_second_program_that_asks_for_a_force_is_told(tmp_path):
 
     with Server(tmp_path) as server, Bridge(tmp_path, server.address) as bridge:
         with Process(tmp_path, ["/usr/bin/python3", HERE / "old_program.py", bridge.uri, "0.5", "200"]) as program:
-            bridge.wait_for_line("client 1 owns the force")
+            bridge.wait_for_line("client 1 controls the force")
             told = asyncio.run(second(bridge.uri))
-            assert told == ["device: another client's forces are taken, and this one was dropped"]
+            assert told == ["device: another client controls the force, so this one was ignored"]
             assert program._process.poll() is None
 
 

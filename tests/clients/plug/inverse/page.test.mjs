@@ -32,7 +32,7 @@ test("a page of this machine pushes the hand, one from elsewhere may not", async
 
   const near = await visit(t, `http://127.0.0.1:${port}/`);
   await near.locator("#said", { hasText: "pushed up" }).waitFor();
-  assert.ok(bridge.lines.some((line) => line.includes("client 1 owns the force")));
+  assert.ok(bridge.lines.some((line) => line.includes("client 1 controls the force")));
 
   // The same page under the name of another host.
   const url = "http://evil.example/";

@@ -205,7 +205,7 @@ class Peer {
       factory->load_XML_profiles_string(xml.data(), xml.size());
       participant_ = factory->create_participant_with_profile(options.domain, "loopback");
     }
-    if (participant_ == nullptr) throw std::runtime_error("Fast DDS makes no participant");
+    if (participant_ == nullptr) throw std::runtime_error("Fast DDS cannot create a participant");
     subscriber_ = participant_->create_subscriber(dds::SUBSCRIBER_QOS_DEFAULT);
     publisher_ = participant_->create_publisher(dds::PUBLISHER_QOS_DEFAULT);
     for (const std::string& topic : options.read) {
@@ -298,7 +298,7 @@ class Peer {
     qos.history().depth = 10;  // the default of rclcpp
     auto listener = std::make_unique<ReaderOf<Message>>(topic, awaited_);
     if (subscriber_->create_datareader(topic_of<Message>(path), qos, listener.get()) == nullptr) {
-      throw std::runtime_error("Fast DDS makes no reader of " + path);
+      throw std::runtime_error("Fast DDS cannot create a reader of " + path);
     }
     readers_.push_back(std::move(listener));
   }

@@ -210,7 +210,7 @@ TEST(RosDevice, ASecondPublisherIsDroppedAndTold) {
   const auto said = sentences_of(stage.device);
   EXPECT_EQ(std::ranges::count_if(said, [](const auto& s) { return s.find("publisher 72") != std::string::npos; }), 1)
       << "once";
-  EXPECT_TRUE(has(said, "a wrench_command of publisher 72 is dropped: another program owns the device"));
+  EXPECT_TRUE(has(said, "a wrench_command of publisher 72 was dropped: another program controls the device"));
   const RosDiagnosis diagnosis = stage.device.diagnosis();
   EXPECT_EQ(diagnosis.level, RosDiagnosis::Level::kWarn);
   EXPECT_NE(diagnosis.message.find("publisher 72"), std::string::npos) << diagnosis.message;
@@ -238,7 +238,7 @@ TEST(RosDevice, AForeignFrameIsRefusedAndSaidOnce) {
   EXPECT_EQ(stage.device.refused(), 500U);
   const auto said = sentences_of(stage.device);
   ASSERT_EQ(said.size(), 1U);
-  EXPECT_TRUE(has(said, "\"tool0\" is not known here"));
+  EXPECT_TRUE(has(said, "\"tool0\" is unknown"));
 }
 
 TEST(RosDevice, TheSeventeenthPublisherIsRefused) {
@@ -312,7 +312,7 @@ TEST(RosDevice, ADeviceOfUnknownAxesIsSaidOnce) {
   stage.run(1000);
   const auto said = sentences_of(stage.device);
   ASSERT_EQ(said.size(), 1U);
-  EXPECT_TRUE(has(said, "the scene does not say how the device lies"));
+  EXPECT_TRUE(has(said, "the scene does not specify the orientation of the device"));
 }
 
 TEST(RosDevice, TheServerDiesAndComesBackAndTheForceWithIt) {

@@ -299,7 +299,7 @@ TEST(Ros2, AWrenchIsFeltAndItsEndLeavesTheHandToTheLadder) {
             {"--read", "wrench", "--wrench", "0,0.3,0,0.01,0,0", "--frame", "device_base", "--wrench-for-s", "2.5"});
   const std::string pushed = peer.until_pushed(0.3);
   EXPECT_NEAR(number(pushed, "wrench_rx"), 0.01, 1e-3) << "the stylus has motors that turn it";
-  room.plug.wait_for_line("owns the device: the hand feels its wrench_command");
+  room.plug.wait_for_line("controls the device: the hand feels its wrench_command");
   const std::string let_go =
       peer.until([](const std::string& line) { return line.find("let_go_us") != std::string::npos; });
   std::cout << "0 N " << number(let_go, "let_go_us") / 1000 << " ms after the last command\n";
@@ -322,7 +322,7 @@ TEST(Ros2, NegateIsNamedInTheFirstSentence) {
 TEST(Ros2, AForeignFrameIsRefusedAndDiagnosticsSayIt) {
   Room room;
   Peer peer(room.folder, room.domain, {"--read", "wrench,diagnostics", "--wrench", "0,0.3,0", "--frame", "tool0"});
-  room.plug.wait_for_line("the frame_id \"tool0\" is not known here: expected none, device_base or device_operator");
+  room.plug.wait_for_line("the frame_id \"tool0\" is unknown: expected no frame_id, device_base or device_operator");
   const std::string line = peer.until([](const std::string& all) { return number(all, "diagnostics_level") == 1; });
   EXPECT_EQ(number(line, "wrench_y"), 0);
 }
@@ -333,9 +333,9 @@ TEST(Ros2, ASecondPublisherIsDroppedAndTold) {
   owner.until_pushed(0.3);
   {
     Peer second(room.folder, room.domain, {"--read", "wrench,diagnostics", "--wrench", "0,-0.3,0"});
-    room.plug.wait_for_line("is dropped: another program owns the device");
+    room.plug.wait_for_line("was dropped: another program controls the device");
     const std::string line = second.until(
-        [](const std::string& all) { return all.find("another program owns the device") != std::string::npos; });
+        [](const std::string& all) { return all.find("another program controls the device") != std::string::npos; });
     EXPECT_EQ(number(line, "diagnostics_level"), 1);
     EXPECT_GE(number(line, "wrench_y"), 0);
     owner.signal(SIGTERM);
@@ -461,10 +461,11 @@ TEST(Ros2, WhatTheCommandLineCannotMeanIsSaid) {
   EXPECT_NE(said({"--servo", "twist"}).find("--clutch"), std::string::npos);
   EXPECT_NE(said({"--interface", "eth0\"/><X"}).find("expected the name of an interface"), std::string::npos);
   EXPECT_NE(said({"--device", "a-b", "--device", "a_b"})
-                .find("1 tendon-plug: --device a_b: ROS would call it a_b, as it calls a-b"),
+                .find("1 tendon-plug: --device a_b: its ROS name would be a_b, which is already used for a-b"),
             std::string::npos);
-  EXPECT_NE(said({"--interface", "nosuch0", "--domain", "3"}).find("DDS makes no participant in domain 3 on nosuch0"),
-            std::string::npos);
+  EXPECT_NE(
+      said({"--interface", "nosuch0", "--domain", "3"}).find("DDS cannot create a participant in domain 3 on nosuch0"),
+      std::string::npos);
 }
 
 }  // namespace

@@ -95,7 +95,7 @@ TEST(RosMessages, ACommandOfAnotherFrameOrNoNumberIsRefusedWithTheReason) {
   const RosView view("right", kFalcon);
   const auto foreign = view.wish(command({0, 0, 1}, "tool\n0"), false);
   EXPECT_EQ(std::get<std::string>(foreign),
-            "the frame_id \"tool?0\" is not known here: expected none, right_base or right_operator");
+            "the frame_id \"tool?0\" is unknown: expected no frame_id, right_base or right_operator");
   const auto other_device = view.wish(command({0, 0, 1}, "left_base"), false);
   EXPECT_TRUE(std::holds_alternative<std::string>(other_device));
   const double nan = std::numeric_limits<double>::quiet_NaN();

@@ -329,7 +329,7 @@ TEST_F(VrpnPeer, ALengthOfTwoToThe31EndsIt) {
   put(bytes, 0x80000000U, 4);
   bytes.resize(kHeaderSize);
   comes(bytes);
-  EXPECT_NE(peer_.end().find("impossible length"), std::string::npos);
+  EXPECT_NE(peer_.end().find("invalid length"), std::string::npos);
 }
 
 TEST_F(VrpnPeer, DescriptionsByDatagramAndPortsOfOthersAreNonsense) {

@@ -223,9 +223,9 @@ TEST_F(VrpnOnAStillHand, AFrozenProgramIsNotFeltAfterItsStaleTimeAndTheLadder) {
   EXPECT_GT(result.zero_after, 100) << "ten gaps, at least 100 ms";
   EXPECT_LE(result.zero_after, 100 + 300);
   EXPECT_LT(result.largest_step, 0.05);
-  EXPECT_TRUE(old_.said("is silent and has not ended its force"));
+  EXPECT_TRUE(old_.said("is silent and has not stopped its force"));
   push(300);
-  EXPECT_TRUE(old_.said("draws again"));
+  EXPECT_TRUE(old_.said("sends effects again"));
   EXPECT_NEAR(world_.step.applied.y(), 1, 1e-6);
 }
 
@@ -234,7 +234,7 @@ TEST_F(VrpnOnAStillHand, AFieldThatIsSentOnceStaysAndItIsSaid) {
   old_.says(constant(Vec3(0, 1, 0)));
   world_.run(5000, [&] { old_.turn(); });
   EXPECT_NEAR(world_.step.applied.y(), 1, 1e-6);
-  EXPECT_TRUE(old_.said("lives as long as its connection"));
+  EXPECT_TRUE(old_.said("stays until it disconnects"));
   EXPECT_EQ(plug_.owner(), 1U);
 }
 
@@ -260,13 +260,13 @@ TEST_F(VrpnOnAStillHand, ASecondProgramIsToldAndTakesOverWhenTheFirstLeaves) {
   });
   EXPECT_NEAR(world_.step.applied.y(), 1, 1e-6);
   ASSERT_EQ(other.texts.size(), 1U);
-  EXPECT_NE(other.texts[0].find("not felt: another program"), std::string::npos) << other.texts[0];
+  EXPECT_NE(other.texts[0].find("not rendered: another program"), std::string::npos) << other.texts[0];
   EXPECT_TRUE(other.pose) << "it looks on";
   old_.leaves();
   world_.run(1000, [&] { other.turn(); });
   EXPECT_NEAR(world_.step.applied.y(), -1, 1e-6);
   ASSERT_EQ(other.texts.size(), 2U);
-  EXPECT_NE(other.texts[1].find("is felt now"), std::string::npos);
+  EXPECT_NE(other.texts[1].find("is rendered now"), std::string::npos);
 }
 
 TEST_F(VrpnOnAStillHand, AStallOfTheLinkOf200MsEndsByItself) {
