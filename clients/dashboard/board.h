@@ -120,7 +120,7 @@ class Board {
 
  private:
   Contact contact_ = Contact::kGreeting;
-  std::string words_ = "looking for the server";
+  std::string words_ = "connecting to the server";
   std::optional<Press> press_;
   std::optional<Welcome> welcome_;
   LinkStats link_;

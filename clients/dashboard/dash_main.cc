@@ -81,14 +81,14 @@ struct Options {
 
 std::optional<int> parse(int argc, char** argv, Options& options) {
   CLI::App app(
-      "A web page that shows what a Tendon server does, live and recorded; /metrics for Prometheus, and /bridge for "
-      "engines in browsers.",
+      "Serve a web page that shows live and recorded data of a Tendon server, /metrics for Prometheus, and /bridge "
+      "for\nengines in browsers.",
       "tendon-dash");
   usage::dress(app);
   app.footer(
       "Example: tendon-dash --server 127.0.0.1:47100 --recordings . --listen 127.0.0.1:8080\n"
       "then open http://127.0.0.1:8080 in a browser, or ws://127.0.0.1:8080/foxglove in Foxglove or Lichtblick.\n\n"
-      "Exit: 0 done; 1 something failed, or no server has answered; 2 wrong usage.");
+      "Exit: 0 success; 1 failed, or no server replied; 2 wrong usage.");
   app.set_help_flag("-h,--help", "Print this help and exit");
   app.set_version_flag("--version", TENDON_VERSION);
   std::string server = options.server.text();
@@ -96,36 +96,35 @@ std::optional<int> parse(int argc, char** argv, Options& options) {
   const auto address = usage::accepted_by([](const std::string& text) { parse_address(text); });
   const auto name = usage::accepted_by([](const std::string& text) { ServerName{text}; });
   app.add_option("--server", server,
-                 "Where tendond listens: an address, or a host name or dns-sd:NAME, which is looked up "
-                 "once; of several addresses each is tried")
+                 "Address of tendond: an IP address, a host name or dns-sd:NAME. Names are resolved once, and all of "
+                 "their addresses are tried")
       ->type_name("HOST:PORT")
       ->capture_default_str()
       ->check(name);
-  app.add_option(
-         "--device", options.device,
-         "The page shows the devices of this one's bank: a server of more than 16 devices has banks of 16. Left "
-         "out: the first bank")
+  app.add_option("--device", options.device,
+                 "Show the bank of this device, for a server with more than 16 devices, which has banks of 16. "
+                 "Default: the first bank")
       ->type_name("NAME");
-  app.add_option(
-         "--key", options.key_file,
-         "Key file (see `tendond keygen --observer`); needed unless the server is on this machine and has no keys")
+  app.add_option("--key", options.key_file,
+                 "Key file from `tendond keygen --observer`. Not required for a server on this machine without keys")
       ->type_name("FILE");
   app.add_option("--arm", options.arm_channel,
-                 "Anyone who opens the printed address, in a browser on this machine, may arm and disarm through this "
-                 "channel. Give the operator a channel and a controller's key (--key) of their own")
+                 "Let anyone who opens the printed address in a browser on this machine arm and disarm through this "
+                 "channel. Use a separate channel and a controller's key (--key) for the operator")
       ->type_name("CHANNEL");
   app.add_option("--listen", listen,
-                 "Where the page is; port 0 lets the system choose. Beyond this machine only with --host")
+                 "Address of the page. Port 0: a free port. Other machines are only accepted with --host")
       ->type_name("HOST:PORT")
       ->capture_default_str()
       ->check(address);
-  app.add_option("--host", options.routes.hosts,
-                 "A name under which browsers on other machines find this one. Whoever can reach it sees everything")
+  app.add_option(
+         "--host", options.routes.hosts,
+         "Host name that browsers on other machines use for this machine. Anyone who can reach it sees all data")
       ->type_name("NAME");
   app.add_option("--origin", options.routes.origins,
-                 "Pages from there may use /bridge and /foxglove: https://lab.example")
+                 "Also accept web pages from this origin, such as https://lab.example, for /bridge and /foxglove")
       ->type_name("URL");
-  app.add_option("--recordings", options.recordings, "Folder whose recordings (*.mcap) the page may open")
+  app.add_option("--recordings", options.recordings, "Folder of the recordings (*.mcap) that the page can open")
       ->type_name("FOLDER");
   app.add_option("--duration-s", options.duration_s, "Stop after this time, s. 0: run until Ctrl-C")
       ->capture_default_str()
@@ -139,12 +138,13 @@ std::optional<int> parse(int argc, char** argv, Options& options) {
   options.server = server;
   options.web.listen = parse_address(listen);
   if (!is_loopback(options.web.listen) && options.routes.hosts.empty()) {
-    std::cerr << "--listen " << listen
-              << ": beyond this machine only with --host NAME, the name that browsers there use\n";
+    std::cerr
+        << "--listen " << listen
+        << ": expected a loopback address, or --host NAME with the host name that browsers on other machines use\n";
     return 2;
   }
   if (!options.arm_channel.empty() && options.key_file.empty()) {
-    std::cerr << "--arm " << options.arm_channel << ": only with --key FILE, a controller's key\n";
+    std::cerr << "--arm " << options.arm_channel << ": expected --key FILE with a controller's key\n";
     return 2;
   }
   return std::nullopt;
@@ -172,7 +172,7 @@ int run(const Options& options) {
   std::function<std::string(std::uint32_t, Order)> press;
   if (arms) {
     if (key->role != Role::kController) {
-      throw std::runtime_error(options.key_file + ": an observer's key; --arm wants a controller's");
+      throw std::runtime_error(options.key_file + ": expected a controller's key for --arm, found an observer's key");
     }
     operator_link.emplace(web_config.server);
     abilities.arms = true;

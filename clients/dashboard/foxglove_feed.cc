@@ -64,8 +64,8 @@ bool FoxgloveFeed::hear(LocalTime now, ClientId client, std::string_view text) {
       if (!known) {
         object("There is no channel " + std::to_string(channel) + ".");
       } else if (!session.subscribe(subscription, channel)) {
-        object("Subscription " + std::to_string(subscription) + " is there already, or channel " +
-               std::to_string(channel) + " has one: each channel has one of its own.");
+        object("Subscription " + std::to_string(subscription) + " already exists, or channel " +
+               std::to_string(channel) + " already has a subscription: each channel can only have one.");
       }
       if (session.hopeless()) return false;
     }

@@ -41,7 +41,7 @@ const google::protobuf::Descriptor* descriptor_of(FoxgloveKind kind) {
     case FoxgloveKind::kScene:
       return foxglove::SceneUpdate::descriptor();
   }
-  throw std::logic_error("a kind of channel that nobody knows");
+  throw std::logic_error("unknown kind of channel");
 }
 
 void add_file(const google::protobuf::FileDescriptor& file, google::protobuf::FileDescriptorSet& set) {

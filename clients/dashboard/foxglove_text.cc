@@ -43,7 +43,7 @@ std::optional<std::uint32_t> id_of(const nlohmann::json& value) {
 }
 
 FoxgloveOrder subscribe_of(const nlohmann::json& message) {
-  const NotUnderstood expected{"“subscribe” wants a list “subscriptions” of {“id”: N, “channelId”: N}."};
+  const NotUnderstood expected{"Expected “subscribe” with a list “subscriptions” of {“id”: N, “channelId”: N}."};
   const auto list = message.find("subscriptions");
   if (list == message.end() || !list->is_array()) return expected;
   Subscribe order;
@@ -58,7 +58,7 @@ FoxgloveOrder subscribe_of(const nlohmann::json& message) {
 }
 
 FoxgloveOrder unsubscribe_of(const nlohmann::json& message) {
-  const NotUnderstood expected{"“unsubscribe” wants a list “subscriptionIds” of numbers."};
+  const NotUnderstood expected{"Expected “unsubscribe” with a list “subscriptionIds” of numbers."};
   const auto list = message.find("subscriptionIds");
   if (list == message.end() || !list->is_array()) return expected;
   Unsubscribe order;
@@ -117,14 +117,13 @@ std::string message_data(std::uint32_t subscription, UnixTime at, std::string_vi
 FoxgloveOrder parse_foxglove_order(std::string_view text) {
   const auto message = nlohmann::json::parse(text, nullptr, false);
   if (!message.is_object() || !message.contains("op") || !message["op"].is_string()) {
-    return NotUnderstood{"A message is a JSON object with “op”."};
+    return NotUnderstood{"Expected a JSON object with “op”."};
   }
   const std::string op = message["op"];
   if (op == "subscribe") return subscribe_of(message);
   if (op == "unsubscribe") return unsubscribe_of(message);
   constexpr std::size_t kMostEchoed = 40;
-  return NotUnderstood{"tendon-dash only shows: it knows “subscribe” and “unsubscribe”, not “" +
-                       op.substr(0, kMostEchoed) + "”."};
+  return NotUnderstood{"Expected “subscribe” or “unsubscribe”, got “" + op.substr(0, kMostEchoed) + "”."};
 }
 
 }  // namespace tendon::dash

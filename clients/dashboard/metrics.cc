@@ -95,27 +95,28 @@ void add_devices(Exposition& out, const Board& board) {
   newest([&](const Label& label, const DeviceState& state) {
     for (int i = 0; i < 3; ++i) out.add({label, {"axis", kAxes[static_cast<std::size_t>(i)]}}, state.position[i]);
   });
-  out.begin("tendon_device_force_wanted_newtons", MetricType::Gauge, "Norm of the force that the engines ask for.");
+  out.begin("tendon_device_force_wanted_newtons", MetricType::Gauge, "Norm of the force requested by the engines.");
   newest([&](const Label& label, const DeviceState& state) {
     if (state.force_wanted) out.add({label}, state.force_wanted->norm());
   });
   out.begin("tendon_device_force_permitted_newtons", MetricType::Gauge,
             "The limiter's bound on the norm of the force.");
   newest([&](const Label& label, const DeviceState& state) { out.add({label}, state.permitted_force); });
-  out.begin("tendon_device_force_applied_newtons", MetricType::Gauge, "Norm of the force that the device gives out.");
+  out.begin("tendon_device_force_applied_newtons", MetricType::Gauge, "Norm of the force applied by the device.");
   newest([&](const Label& label, const DeviceState& state) { out.add({label}, state.force_applied.norm()); });
-  out.begin("tendon_device_energy_joules", MetricType::Gauge, "Energy ledger: what the device may still give out.");
+  out.begin("tendon_device_energy_joules", MetricType::Gauge,
+            "Energy ledger: energy that the device may still generate.");
   newest([&](const Label& label, const DeviceState& state) { out.add({label}, state.energy); });
-  out.begin("tendon_device_force_age_seconds", MetricType::Gauge, "Age of the rendered force since it arrived.");
+  out.begin("tendon_device_force_age_seconds", MetricType::Gauge, "Time since the rendered force arrived.");
   newest([&](const Label& label, const DeviceState& state) { out.add({label}, seconds(state.force_age)); });
-  out.begin("tendon_device_mode", MetricType::Gauge, "1 for what the force is made of now, 0 for the others.");
+  out.begin("tendon_device_mode", MetricType::Gauge, "1 for the current mode of the force, 0 for the others.");
   newest([&](const Label& label, const DeviceState& state) {
     for (const Mode mode : kModes) out.add({label, {"mode", std::string(name(mode))}}, state.mode == mode ? 1.0 : 0.0);
   });
-  out.begin("tendon_device_states_total", MetricType::Counter, "States that came.");
+  out.begin("tendon_device_states_total", MetricType::Counter, "Received states.");
   each(board, [&](const Label& label, const Device& device) { out.add({label}, device.states); });
   out.begin("tendon_device_states_limited_total", MetricType::Counter,
-            "Of these, those whose force was not the one asked for, by each reason.");
+            "Received states whose force was not the requested one, by reason.");
   each(board, [&](const Label& label, const Device& device) {
     for (std::size_t bit = 0; bit < Board::kReasons; ++bit) {
       const std::string reason = reason_name(bit);
@@ -130,26 +131,28 @@ void add_devices(Exposition& out, const Board& board) {
     });
   };
   using Report = DeviceReport;
-  out.begin("tendon_device_safety_state", MetricType::Gauge, "1 for where the device stands, 0 for the others.");
+  out.begin("tendon_device_safety_state", MetricType::Gauge,
+            "1 for the current safety state of the device, 0 for the others.");
   reported([&](const Label& label, const Device&, const Report& report) {
     for (const Safety safety : kSafeties)
       out.add({label, {"state", std::string(name(safety))}}, report.safety == safety ? 1.0 : 0.0);
   });
-  out.begin("tendon_device_fault", MetricType::Gauge, "1 while a fault holds the force at zero.");
+  out.begin("tendon_device_fault", MetricType::Gauge, "1 while the force is zero because of a fault.");
   reported([&](const Label& label, const Device&, const Report& r) { out.add({label}, r.fault.empty() ? 0.0 : 1.0); });
-  out.begin("tendon_device_degraded", MetricType::Gauge, "1 while the server does less for the device than it should.");
+  out.begin("tendon_device_degraded", MetricType::Gauge, "1 while the operation of the device is degraded.");
   reported(
       [&](const Label& label, const Device&, const Report& r) { out.add({label}, r.degraded.empty() ? 0.0 : 1.0); });
   out.begin("tendon_device_steps_total", MetricType::Counter, "Haptic steps.");
   reported([&](const Label& label, const Device& device, const Report&) { out.add({label}, device.steps); });
   out.begin("tendon_device_steps_missed_total", MetricType::Counter, "Periods without a step.");
   reported([&](const Label& label, const Device& device, const Report&) { out.add({label}, device.missed); });
-  out.begin("tendon_device_steps_overrun_total", MetricType::Counter, "Steps that came so late that it is a reason.");
+  out.begin("tendon_device_steps_overrun_total", MetricType::Counter,
+            "Steps with an overrun, because they were too late.");
   reported([&](const Label& label, const Device& device, const Report&) { out.add({label}, device.overruns); });
-  out.begin("tendon_device_steps_unseen_total", MetricType::Counter, "Steps in which the device gave no position.");
+  out.begin("tendon_device_steps_unseen_total", MetricType::Counter, "Steps without a position of the device.");
   reported([&](const Label& label, const Device& device, const Report&) { out.add({label}, device.unseen); });
   out.begin("tendon_device_wakeup_lateness_seconds", MetricType::Histogram,
-            "How late the haptic loop woke. The sum is not known (NaN): the wire counts buckets.");
+            "Wake-up latency of the haptic loop. The sum is unknown (NaN), because only buckets are transmitted.");
   reported([&](const Label& label, const Device& device, const Report&) { out.add({label}, lateness(device)); });
 }
 
@@ -162,7 +165,8 @@ void add_ports(Exposition& out, const Board& board) {
       if (device.ports->peer) value(Labels{label, {"end", "peer"}}, *device.ports->peer);
     });
   };
-  out.begin("tendon_port_phase", MetricType::Gauge, "1 for the phase of an end of the coupling, 0 for the others.");
+  out.begin("tendon_port_phase", MetricType::Gauge,
+            "1 for the current phase of an end of the coupling, 0 for the others.");
   ends([&](const Labels& labels, const PortFrame& port) {
     for (const PortPhase phase : kPhases) {
       Labels with_phase = labels;
@@ -170,17 +174,19 @@ void add_ports(Exposition& out, const Board& board) {
       out.add(std::move(with_phase), port.phase == phase ? 1.0 : 0.0);
     }
   });
-  out.begin("tendon_port_account_joules", MetricType::Gauge, "What an end may still give out, in its own joules.");
+  out.begin("tendon_port_account_joules", MetricType::Gauge,
+            "Energy that an end may still generate, in its own joules.");
   ends([&](const Labels& labels, const PortFrame& port) {
     if (port.need > 0) out.add(labels, port.account);
   });
   out.begin("tendon_port_pair_joules", MetricType::Gauge,
-            "What both ends may still give out, and what is under way between them, in joules of the leader.");
+            "Energy that both ends may still generate, including the energy in transit, in joules of the leader.");
   each(board, [&](const Label& label, const Board::Device& device) {
     const auto pair = device.ports ? pair_account(*device.ports) : std::nullopt;
     if (pair) out.add({label}, *pair);
   });
-  out.begin("tendon_port_round_trip_seconds", MetricType::Gauge, "Round trip between the ends, as each measures it.");
+  out.begin("tendon_port_round_trip_seconds", MetricType::Gauge,
+            "Round-trip time between the ends, measured by each end.");
   ends([&](const Labels& labels, const PortFrame& port) {
     if (port.round_trip > Duration::zero()) out.add(labels, seconds(port.round_trip));
   });
@@ -213,9 +219,9 @@ void add_engines(Exposition& out, const Board& board) {
     delays(labels, "to_server", engine.newest.link.to_server);
     delays(labels, "to_engine", engine.newest.link.to_client);
   });
-  out.begin("tendon_engine_forces_total", MetricType::Counter, "Forces that came from the engine.");
+  out.begin("tendon_engine_forces_total", MetricType::Counter, "Forces received from the engine.");
   engines([&](const Labels& labels, const Engine& engine) { out.add(labels, engine.forces); });
-  out.begin("tendon_engine_forces_late_total", MetricType::Counter, "Forces that came too late, by whose fault.");
+  out.begin("tendon_engine_forces_late_total", MetricType::Counter, "Forces received too late, by cause.");
   engines([&](const Labels& labels, const Engine& engine) {
     out.add(with(labels, "cause", "server"), engine.late_server);
     out.add(with(labels, "cause", "network"), engine.late_network);
@@ -223,7 +229,7 @@ void add_engines(Exposition& out, const Board& board) {
     out.add(with(labels, "cause", "unknown"), engine.late_unknown);
   });
   out.begin("tendon_engine_forces_unusable_total", MetricType::Counter,
-            "Forces of the engine, on all its channels, that could not be used, by what is wrong with them.");
+            "Unusable forces of the engine on all of its channels, by cause.");
   engines([&](const Labels& labels, const Engine& engine) {
     out.add(with(labels, "cause", "not_finite"), engine.refused.not_finite);
     out.add(with(labels, "cause", "out_of_bounds"), engine.refused.out_of_bounds);
@@ -231,17 +237,18 @@ void add_engines(Exposition& out, const Board& board) {
     out.add(with(labels, "cause", "old_sequence"), engine.refused.old_sequence);
   });
   out.begin("tendon_engine_error_newtons", MetricType::Gauge,
-            "What its engine says of the least sure force of the last second, and how it was answered.");
+            "Largest error of a force in the last second as reported by the engine, and its solver path.");
   engines([&](const Labels& labels, const Engine& engine) {
     const PeerReport& report = engine.newest;
     if (report.error) out.add(with(labels, "answered_by", report.way.c_str()), *report.error);
   });
-  out.begin("tendon_engine_datagrams_received", MetricType::Gauge, "Datagrams of the engine's present session.");
+  out.begin("tendon_engine_datagrams_received", MetricType::Gauge,
+            "Received datagrams in the current session of the engine.");
   engines([&](const Labels& labels, const Engine& engine) { out.add(labels, engine.newest.link.received); });
-  out.begin("tendon_engine_datagrams_lost", MetricType::Gauge, "… and those of it that never came.");
+  out.begin("tendon_engine_datagrams_lost", MetricType::Gauge, "Lost datagrams in the current session of the engine.");
   engines([&](const Labels& labels, const Engine& engine) { out.add(labels, engine.newest.link.lost); });
   out.begin("tendon_engine_forces_refused", MetricType::Gauge,
-            "1 while its forces are not taken: its way loses too much.");
+            "1 while its forces are ignored, because its network loses too many datagrams.");
   engines(
       [&](const Labels& labels, const Engine& engine) { out.add(labels, engine.newest.forces_refused ? 1.0 : 0.0); });
 }
@@ -250,7 +257,7 @@ void add_engines(Exposition& out, const Board& board) {
 
 std::string metrics_text(const Board& board, const WebCounts& web, const BridgeCounts& bridge) {
   Exposition out;
-  out.begin("tendon_up", MetricType::Gauge, "1 while tendond answers.");
+  out.begin("tendon_up", MetricType::Gauge, "1 while tendond responds.");
   out.add({}, board.contact() == Contact::kOpen ? 1.0 : 0.0);
   out.begin("tendon_server_info", MetricType::Gauge, "1, with the name and version of the server.");
   if (board.welcome()) out.add({{"server", board.welcome()->server}}, 1.0);
@@ -259,26 +266,25 @@ std::string metrics_text(const Board& board, const WebCounts& web, const BridgeC
   add_devices(out, board);
   add_engines(out, board);
   add_ports(out, board);
-  out.begin("tendon_dash_pages", MetricType::Gauge, "Pages that look on.");
+  out.begin("tendon_dash_pages", MetricType::Gauge, "Connected pages.");
   out.add({}, web.pages);
   out.begin("tendon_dash_requests_total", MetricType::Counter, "HTTP requests.");
   out.add({}, web.requests);
   out.begin("tendon_dash_requests_refused_total", MetricType::Counter, "HTTP requests refused.");
   out.add({}, web.refused);
-  out.begin("tendon_dash_states_skipped_total", MetricType::Counter, "States not told to a page that did not keep up.");
+  out.begin("tendon_dash_states_skipped_total", MetricType::Counter, "States skipped because a page was too slow.");
   out.add({}, web.states_skipped);
   out.begin("tendon_bridge_pages", MetricType::Gauge, "WebSockets on the bridge.");
   out.add({}, bridge.pages);
-  out.begin("tendon_bridge_datagrams_total", MetricType::Counter, "Datagrams that crossed the bridge.");
+  out.begin("tendon_bridge_datagrams_total", MetricType::Counter, "Datagrams forwarded by the bridge.");
   out.add({{"way", "to_server"}}, bridge.to_server);
   out.add({{"way", "to_page"}}, bridge.to_page);
-  out.begin("tendon_bridge_dropped_total", MetricType::Counter, "Datagrams that did not, by cause.");
+  out.begin("tendon_bridge_dropped_total", MetricType::Counter, "Datagrams dropped by the bridge, by cause.");
   out.add({{"cause", "malformed"}}, bridge.malformed);
   out.add({{"cause", "plain"}}, bridge.plain);
   out.add({{"cause", "too_fast"}}, bridge.too_fast);
   out.add({{"cause", "too_slow"}}, bridge.too_slow);
-  out.begin("tendon_bridge_refused_total", MetricType::Counter,
-            "WebSockets that were not let onto the bridge, by cause.");
+  out.begin("tendon_bridge_refused_total", MetricType::Counter, "WebSockets refused by the bridge, by cause.");
   out.add({{"cause", "origin"}}, bridge.refused_origin);
   out.add({{"cause", "full"}}, bridge.refused_full);
   return out.text();

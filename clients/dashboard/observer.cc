@@ -117,7 +117,7 @@ void Observer::take_event(LocalTime now, const Session::Event& event) {
   } else if (const auto* answered = std::get_if<Session::RequestAnswered>(&event)) {
     take_answer(now, *answered);
   } else if (const auto* asked = std::get_if<Session::RequestArrived>(&event)) {
-    connection_.session()->answer(asked->id, Code::kUnsupported, "an observer does nothing");
+    connection_.session()->answer(asked->id, Code::kUnsupported, "an observer does not support requests");
   }
 }
 
@@ -139,7 +139,7 @@ void Observer::take_answer(LocalTime now, const Session::RequestAnswered& answer
   describe_at_ = now + config_.describe_every;
   if (!counted_) board_.counted(static_cast<std::uint32_t>(names_.size()));
   if (std::exchange(counted_, true) || names_.size() < 2 || claims_) return;
-  connection_.close(now, config_.name + " comes back for all devices");
+  connection_.close(now, config_.name + " reconnects for all devices");
   greet(now);
 }
 

@@ -25,7 +25,7 @@ std::string names_of(const std::vector<ChannelDescription>& channels) {
 }
 
 std::string because(const std::string& detail, Code code) {
-  return detail.empty() ? "the server refuses (code " + std::to_string(static_cast<int>(code)) + ")" : detail;
+  return detail.empty() ? "the server refused it (code " + std::to_string(static_cast<int>(code)) + ")" : detail;
 }
 
 /// An order cancels pending orders of lower rank.
@@ -56,8 +56,8 @@ Operator::Operator(Link& link, const Address& server, const Config& config, Boar
 std::string Operator::held_by(const ChannelDescription& channel) const {
   const auto ms = std::chrono::duration_cast<std::chrono::milliseconds>(channel.lease).count();
   return "\"" + channel.holder + "\" holds the channel \"" + channel.name + "\", " +
-         (ms > 0 ? "and for " + std::to_string(ms) + " ms after its last force" : "until it leaves") +
-         ". Nothing is taken from it.";
+         (ms > 0 ? "until " + std::to_string(ms) + " ms after its last force" : "until it leaves") +
+         ". It is not taken over.";
 }
 
 std::string Operator::objection(std::uint32_t number) const {
@@ -66,7 +66,7 @@ std::string Operator::objection(std::uint32_t number) const {
   if (device == board_.devices().end() || !device->second.about) return "The server has no such device.";
   const ChannelDescription* const channel = channel_of(device->second, config_.channel);
   if (channel == nullptr) {
-    return "This device has no channel \"" + config_.channel + "\", which --arm names, but " +
+    return "This device has no channel \"" + config_.channel + "\", which is set by --arm; it has " +
            names_of(device->second.about->channels) + ".";
   }
   // The operator may still be in the list after the end of its session.
@@ -77,8 +77,8 @@ std::string Operator::objection(std::uint32_t number) const {
 std::string Operator::press(LocalTime now, std::uint32_t device, Order order) {
   if (under_way_) {
     if (device == device_ && order == order_) return {};
-    if (rank(order) <= rank(order_)) return "Another order is under way.";
-    finish(now, false, order == Order::kDisarm ? "Ended by a disarming." : "Ended by a disengaging.");
+    if (rank(order) <= rank(order_)) return "Another order is in progress.";
+    finish(now, false, order == Order::kDisarm ? "Cancelled by disarming." : "Cancelled by disengaging.");
   }
   if (std::string words = objection(device); !words.empty()) return words;
   if (std::string words = coupling_objection(board_.devices().at(device), order); !words.empty()) return words;
@@ -97,7 +97,7 @@ std::string Operator::press(LocalTime now, std::uint32_t device, Order order) {
   under_way_ = true;
   asked_ = false;
   give_up_ = now + config_.patience;
-  tell(Press::State::kUnderWay, "Asking the server to " + std::string(name(order)) + " …");
+  tell(Press::State::kUnderWay, "Requesting the server to " + std::string(name(order)) + " …");
   return {};
 }
 
@@ -107,19 +107,21 @@ std::string Operator::coupling_objection(const Board::Device& device, Order orde
   if (order == Order::kDisengage) return {};
   switch (device.ports->own.phase) {
     case PortPhase::kAlone:
-      return "There is no other end.";
+      return "The other end is not connected.";
     case PortPhase::kLost:
-      return "The other end is silent.";
+      return "The other end does not respond.";
     case PortPhase::kFault:
-      return "This device gives no force now.";
+      return "This device exerts no force at the moment.";
     case PortPhase::kAligning:
     case PortPhase::kEngaged:
     case PortPhase::kClutched:
-      return "The two ends are engaged already.";
+      return "The coupling is already engaged.";
     case PortPhase::kCoupled:
       break;
   }
-  return role_of(*device.ports) == PortRole::kFollower ? "The other end leads: only there the two are engaged." : "";
+  return role_of(*device.ports) == PortRole::kFollower
+             ? "The other end is the leader: the coupling can only be engaged there."
+             : "";
 }
 
 void Operator::tell(Press::State state, std::string words) {
@@ -152,13 +154,12 @@ void Operator::ask(LocalTime now) {
     answered_ = seen ? device->second.newest->sampled : PeerTime{};
     give_up_ = now + config_.granted_within;
     return tell(Press::State::kUnderWay, order_ == Order::kArm
-                                             ? "The server has asked the safety layer: the handle has to rest …"
-                                             : "The server has passed it on …");
+                                             ? "The server has requested arming: the handle must be at rest …"
+                                             : "The server has accepted the order …");
   }
   if (now >= give_up_) {
     return finish(now, false,
-                  "Not done, as far as is known: the server at " + to_string(server_) +
-                      " has not answered. Does it have this key?");
+                  "Not confirmed: the server at " + to_string(server_) + " has not replied. Does it have this key?");
   }
   if (asked_ || phase != ForceClient::Phase::kOpen) return;
   if (client_->holds()) {
@@ -167,7 +168,8 @@ void Operator::ask(LocalTime now) {
   } else if (const auto& about = client_->description()) {
     // Another client has taken the channel since the last update of the Board.
     const auto channel = std::ranges::find(about->channels, config_.channel, &ChannelDescription::name);
-    finish(now, false, "Not done: " + (channel != about->channels.end() ? held_by(*channel) : "the channel is gone."));
+    finish(now, false,
+           "Not done: " + (channel != about->channels.end() ? held_by(*channel) : "the channel no longer exists."));
   }
 }
 
@@ -199,12 +201,12 @@ void Operator::look_at_coupling(LocalTime now, const Board::Device* device) {
   if (order_ == Order::kEngage && engaged) {
     finish(now, true, "Engaged: the two handles are coupled.");
   } else if (order_ == Order::kDisengage && known && !engaged) {
-    finish(now, true, "Disengaged: the handles are free of each other.");
+    finish(now, true, "Disengaged: the handles are not coupled.");
   } else if (now >= give_up_) {
     finish(now, false,
            order_ == Order::kEngage
-               ? "Not engaged. Both devices have to be armed, and the network has to carry both ways."
-               : "The server has taken the order, but the device does not show it.");
+               ? "Not engaged. Both devices must be armed, and the network must work in both directions."
+               : "The server has accepted the order, but the device does not show it.");
   }
 }
 
@@ -216,23 +218,23 @@ void Operator::look_at_safety(LocalTime now, const Board::Device* device) {
   const bool disarmed = state != nullptr && Reasons::from_bits(state->reasons).has(Reason::kDisarmed);
   if (order_ == Order::kDisarm) {
     if (disarmed && state->force_applied.isZero(0)) {
-      finish(now, true, "Disarmed: no force until it is armed again.");
+      finish(now, true, "Disarmed: no force until the device is armed again.");
     } else if (now >= give_up_) {
-      finish(now, false, "The server has taken the order, but the device does not show it. Take its power away.");
+      finish(now, false, "The server has accepted the order, but the device does not show it. Switch off its power.");
     }
     return;
   }
   const bool ready = state != nullptr && !disarmed && report != nullptr;
   if (ready && report->safety == Safety::kArmed) {
-    finish(now, true, "Armed: it gives forces.");
+    finish(now, true, "Armed: the device exerts forces.");
   } else if (ready && report->safety == Safety::kUnguarded) {
-    finish(now, true, "It gives forces again; it has no safety layer that would have to grant it.");
+    finish(now, true, "The device exerts forces again; it has no safety layer, so it does not have to be armed.");
   } else if (now >= give_up_) {
     const std::string is = report != nullptr ? " It is " + std::string(name(report->safety)) + "." : "";
     finish(now, false,
            "Not armed." + is +
-               " The handle has to rest, next to no force may be asked for, and where the scene lists a dead man's "
-               "button, it has to be pressed.");
+               " The handle must be at rest, the requested force must be almost zero, and the dead man's button must "
+               "be held if the scene has one.");
   }
 }
 

@@ -18,7 +18,7 @@ namespace tendon::dash {
 
 /// Shown by a page that may not arm.
 inline constexpr std::string_view kArmingNeeds =
-    "This page only looks on. To arm and disarm from here start tendon-dash with --key FILE, a controller's key, and "
+    "This page is read-only. To arm and disarm from here, start tendon-dash with --key FILE (a controller's key) and "
     "--arm CHANNEL.";
 
 struct Abilities {

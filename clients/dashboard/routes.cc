@@ -209,17 +209,19 @@ bool Routes::is_foreign(const Request& request, std::string_view path) const {
 Reply Routes::order(const Request& request, std::string_view path, Order order) const {
   if (request.method != "POST") return plain(405, "only POST", "POST");
   if (!request.host || !is_our_host(*request.host)) {
-    return plain(421, "this is not what this machine is called; see --host of tendon-dash");
+    return plain(421, "unknown host name; see --host of tendon-dash");
   }
-  if (!request.local || request.proxied) return plain(403, "Only from the machine that tendon-dash runs on.");
+  if (!request.local || request.proxied)
+    return plain(403, "Only accepted from the machine on which tendon-dash is running.");
   if (!request.origin || !equal_but_for_case(origin_host(*request.origin), *request.host)) {
-    return plain(403, "Only for the page of tendon-dash itself.");
+    return plain(403, "Only accepted from the page of tendon-dash.");
   }
   if (!sources_.press) return plain(403, std::string(kArmingNeeds));
   const auto bytes = [](std::string_view text) { return std::as_bytes(std::span(text)); };
   if (!request.authorization || !crypto::equal(bytes(*request.authorization), bytes("Bearer " + sources_.pass))) {
     return plain(403,
-                 "Only from the address that tendon-dash says when it starts: the pass is of another run, or missing.");
+                 "Only accepted from the address that tendon-dash prints at the start: the token is missing, or from "
+                 "another run.");
   }
   constexpr std::string_view kQuery = "?device=";
   std::string_view rest = request.target.substr(path.size());
@@ -236,15 +238,16 @@ Answer Routes::answer(const Request& request) const {
   const std::string_view path = request.target.substr(0, request.target.find('?'));
   const auto* const ordered = std::ranges::find(kOrders, path, &OrderPath::path);
   if (ordered != std::end(kOrders)) return order(request, path, ordered->order);
-  if (request.method != "GET" && request.method != "HEAD") return plain(405, "only GET and HEAD");
+  if (request.method != "GET" && request.method != "HEAD") return plain(405, "only GET and HEAD are supported");
   if (!request.host || !is_our_host(*request.host)) {
-    return plain(421, "this is not what this machine is called; see --host of tendon-dash");
+    return plain(421, "unknown host name; see --host of tendon-dash");
   }
   if (path == "/live" || path == "/bridge" || path == "/foxglove") {
     if (is_foreign(request, path)) {
-      return plain(403, "not for pages from elsewhere; see --origin of tendon-dash for /bridge and /foxglove");
+      return plain(403,
+                   "pages from this origin are not accepted; see --origin of tendon-dash for /bridge and /foxglove");
     }
-    if (!request.upgrade) return plain(426, "tendon-dash speaks WebSocket here");
+    if (!request.upgrade) return plain(426, "expected a WebSocket request");
     if (path == "/live") return LiveSocket{};
     if (path == "/bridge") return BridgeSocket{request.local && !request.proxied};
     std::string protocol = foxglove_protocol(request.protocols);
@@ -272,7 +275,7 @@ Answer Routes::answer(const Request& request) const {
 
 Reply Routes::file(const Request& request, std::string_view path) const {
   const auto found = std::ranges::find(sources_.page, path, &PageFile::path);
-  if (found == sources_.page.end()) return plain(404, "there is nothing here");
+  if (found == sources_.page.end()) return plain(404, "not found");
   Reply reply = begin(200, found->type);
   // Asset names contain a hash of their content.
   set(reply, "Cache-Control", path.starts_with("/assets/") ? "public, max-age=31536000, immutable" : "no-cache");
@@ -286,11 +289,11 @@ Reply Routes::file(const Request& request, std::string_view path) const {
 Reply Routes::recording(const Request& request, std::string_view name) const {
   const auto decoded = percent_decoded(name);
   auto opened = decoded && sources_.recordings != nullptr ? sources_.recordings->open(*decoded) : std::nullopt;
-  if (!opened) return plain(404, "there is no such recording");
+  if (!opened) return plain(404, "no such recording");
   const std::uint64_t size = opened->size();
   const auto range = request.range ? parse_range(*request.range, size) : WholeFile{};
   if (std::holds_alternative<Unsatisfiable>(range)) {
-    Reply reply = plain(416, "the file is not that long");
+    Reply reply = plain(416, "the range is beyond the end of the file");
     set(reply, "Content-Range", "bytes */" + std::to_string(size));
     return reply;
   }

@@ -185,8 +185,8 @@ class Connection {
     if (error == http::error::header_limit || error == http::error::buffer_overflow) {
       return write_reply(Routes::plain(431, "the request is too long"));
     }
-    if (error == http::error::body_limit) return write_reply(Routes::plain(413, "a request has no content here"));
-    if (error) return write_reply(Routes::plain(400, "that is no HTTP request"));
+    if (error == http::error::body_limit) return write_reply(Routes::plain(413, "expected a request without content"));
+    if (error) return write_reply(Routes::plain(400, "not a valid HTTP request"));
     const auto& message = parser_->get();
     const auto header = [&](http::field field) -> std::optional<std::string_view> {
       const auto found = message.find(field);
@@ -195,7 +195,7 @@ class Connection {
     };
     if (message.count(http::field::host) > 1 || message.count(http::field::origin) > 1 ||
         message.count(http::field::authorization) > 1) {
-      return write_reply(Routes::plain(400, "one Host, one Origin and one Authorization"));
+      return write_reply(Routes::plain(400, "expected at most one Host, one Origin and one Authorization"));
     }
     Request request;
     request.method = {message.method_string().data(), message.method_string().size()};
@@ -219,20 +219,20 @@ class Connection {
       write_reply(std::move(*reply));
     } else if (std::holds_alternative<LiveSocket>(answer)) {
       if (shared_.feed.pages() >= shared_.config.max_pages) {
-        return write_reply(Routes::plain(503, "too many pages look on already"));
+        return write_reply(Routes::plain(503, "too many pages are already connected"));
       }
       page_ = shared_.feed.join(shared_.clock());
       accept(Side::kPage);
     } else if (const auto* viewer = std::get_if<FoxgloveSocket>(&answer)) {
       if (shared_.foxglove.clients() >= shared_.config.max_viewers) {
-        return write_reply(Routes::plain(503, "too many viewers look on already"));
+        return write_reply(Routes::plain(503, "too many viewers are already connected"));
       }
       viewer_ = shared_.foxglove.join(shared_.clock());
       accept(Side::kViewer, viewer->protocol);
     } else {
       if (shared_.bridge.pages >= shared_.config.max_bridges) {
         ++shared_.bridge.refused_full;
-        return write_reply(Routes::plain(503, "too many pages are on the bridge already"));
+        return write_reply(Routes::plain(503, "too many pages are already connected to the bridge"));
       }
       ++shared_.bridge.pages;
       ++shared_.bridge.opened;

@@ -200,7 +200,7 @@ it("says how to listen beyond this machine, and which folder is none", async (te
   const dash = (...args) => new Program(test, "tendon-dash", args);
   const far = dash("--listen", "0.0.0.0:0");
   assert.equal(await far.ended, 2);
-  assert.match(far.lines.join("\n"), /only with --host NAME/);
+  assert.match(far.lines.join("\n"), /or --host NAME/);
   const none = dash("--listen", "127.0.0.1:0", "--recordings", "/nowhere/at/all");
   assert.equal(await none.ended, 1);
   assert.match(none.lines.join("\n"), /\/nowhere\/at\/all: not a folder/);

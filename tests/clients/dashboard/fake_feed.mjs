@@ -24,7 +24,7 @@ export const kDevices = [
 
 export const serverMessage = (devices = kDevices) => ({
   type: "server", address: "127.0.0.1:47100", contact: "open", words: "connected to 127.0.0.1:47100, tendond", version: "tendond", recordings: true, arms: false, press: null,
-  devices: devices.map((device, number) => ({ number, loop_hz: 1000, max_force_n: 8, channels: [], arming_objection: "This page only looks on.", ...device })),
+  devices: devices.map((device, number) => ({ number, loop_hz: 1000, max_force_n: 8, channels: [], arming_objection: "This page is read-only.", ...device })),
 });
 
 function stateOf(number, t) {

@@ -157,7 +157,7 @@ TEST_F(OperatorTest, ArmsAndDisarmsBesideAnEngineAndLeaves) {
   ASSERT_EQ(person.press(now_, 0, Order::kArm), "");
   EXPECT_EQ(board_.press()->state, State::kUnderWay);
   EXPECT_EQ(settle().state, State::kDone) << board_.press()->words;
-  EXPECT_EQ(board_.press()->words, "Armed: it gives forces.");
+  EXPECT_EQ(board_.press()->words, "Armed: the device exerts forces.");
   EXPECT_EQ(safe_->status().state, SafetyState::kArmed);
   run(seconds(1));
   EXPECT_EQ(applied(), Vec3(-2, 0, 0));
@@ -185,7 +185,7 @@ TEST_F(OperatorTest, TakesNothingFromTheHolderAndSaysWhoThatIs) {
   run(seconds(3));
   const std::uint64_t welcomed = loops_->network().stats().welcomed;
   const std::string words =
-      "\"wall\" holds the channel \"main\", and for 500 ms after its last force. Nothing is taken from it.";
+      "\"wall\" holds the channel \"main\", until 500 ms after its last force. It is not taken over.";
   EXPECT_EQ(person.objection(0), words);
   EXPECT_EQ(person.press(now_, 0, Order::kDisarm), words);
   EXPECT_FALSE(board_.press());
@@ -218,7 +218,7 @@ TEST_F(OperatorTest, SaysThatTheSafetyLayerHasNotGrantedIt) {
   run(seconds(3));
   ASSERT_EQ(person.press(now_, 0, Order::kArm), "");
   EXPECT_EQ(settle().state, State::kFailed);
-  EXPECT_NE(board_.press()->words.find("Not armed. It is homed. The handle has to rest"), std::string::npos)
+  EXPECT_NE(board_.press()->words.find("Not armed. It is homed. The handle must be at rest"), std::string::npos)
       << board_.press()->words;
 }
 
@@ -260,7 +260,7 @@ TEST_F(OperatorTest, ADisarmingGoesBeforeAnArmingAndNothingBeforeADisarming) {
   EXPECT_EQ(person.press(now_, 0, Order::kArm), "") << "the same again is the same";
   EXPECT_EQ(person.press(now_, 0, Order::kDisarm), "");
   EXPECT_EQ(board_.press()->order, Order::kDisarm);
-  EXPECT_EQ(person.press(now_, 0, Order::kArm), "Another order is under way.");
+  EXPECT_EQ(person.press(now_, 0, Order::kArm), "Another order is in progress.");
   EXPECT_EQ(settle().state, State::kDone) << board_.press()->words;
   EXPECT_EQ(board_.press()->order, Order::kDisarm);
   run(seconds(3));
@@ -272,7 +272,8 @@ TEST_F(OperatorTest, SaysWhatIsMissing) {
   EXPECT_EQ(person.objection(0), "There is no connection to the server.");
   run(seconds(2));
   EXPECT_EQ(person.objection(7), "The server has no such device.");
-  EXPECT_EQ(person.objection(0), "This device has no channel \"foot\", which --arm names, but \"main\", \"operator\".");
+  EXPECT_EQ(person.objection(0),
+            "This device has no channel \"foot\", which is set by --arm; it has \"main\", \"operator\".");
   EXPECT_EQ(person.press(now_, 0, Order::kArm), person.objection(0));
 }
 
@@ -303,7 +304,7 @@ TEST_F(OperatorTest, AnOrderIsNotDoneBeforeTheDeviceShowsIt) {
   ASSERT_EQ(person.press(now_, 0, Order::kDisarm), "");
   EXPECT_EQ(settle().state, State::kFailed);
   EXPECT_EQ(board_.press()->words,
-            "The server has taken the order, but the device does not show it. Take its power away.");
+            "The server has accepted the order, but the device does not show it. Switch off its power.");
 }
 
 TEST_F(OperatorTest, EngagesAndDisengagesALeader) {
@@ -315,7 +316,7 @@ TEST_F(OperatorTest, EngagesAndDisengagesALeader) {
   EXPECT_EQ(board_.press()->order, Order::kEngage);
   EXPECT_EQ(settle().state, State::kDone) << board_.press()->words;
   EXPECT_EQ(board_.press()->words, "Engaged: the two handles are coupled.");
-  EXPECT_EQ(person.press(now_, 0, Order::kEngage), "The two ends are engaged already.");
+  EXPECT_EQ(person.press(now_, 0, Order::kEngage), "The coupling is already engaged.");
   ASSERT_EQ(person.press(now_, 0, Order::kDisengage), "");
   EXPECT_EQ(settle().state, State::kDone) << board_.press()->words;
   EXPECT_EQ(port_->phase, PortPhase::kCoupled);
@@ -329,9 +330,9 @@ TEST_F(OperatorTest, SaysWhyNothingIsEngaged) {
   EXPECT_EQ(person.press(now_, 0, Order::kEngage), "This device has no coupling.");
   serve_leader();
   run(seconds(8));
-  const std::pair<PortPhase, const char*> cases[] = {{PortPhase::kAlone, "There is no other end."},
-                                                     {PortPhase::kLost, "The other end is silent."},
-                                                     {PortPhase::kFault, "This device gives no force now."}};
+  const std::pair<PortPhase, const char*> cases[] = {{PortPhase::kAlone, "The other end is not connected."},
+                                                     {PortPhase::kLost, "The other end does not respond."},
+                                                     {PortPhase::kFault, "This device exerts no force at the moment."}};
   for (const auto& [phase, words] : cases) {
     port_->phase = phase;
     run(milliseconds(100));
@@ -352,9 +353,9 @@ TEST_F(OperatorTest, DisengagingEndsAnEngagingAndADisarmingBoth) {
   run(seconds(2));
   ASSERT_EQ(person.press(now_, 0, Order::kEngage), "");
   run(milliseconds(2));
-  EXPECT_EQ(person.press(now_, 0, Order::kArm), "Another order is under way.");
+  EXPECT_EQ(person.press(now_, 0, Order::kArm), "Another order is in progress.");
   EXPECT_EQ(person.press(now_, 0, Order::kDisengage), "");
-  EXPECT_EQ(person.press(now_, 0, Order::kEngage), "Another order is under way.");
+  EXPECT_EQ(person.press(now_, 0, Order::kEngage), "Another order is in progress.");
   EXPECT_EQ(person.press(now_, 0, Order::kDisarm), "");
   EXPECT_EQ(settle().state, State::kDone) << board_.press()->words;
   EXPECT_EQ(board_.press()->order, Order::kDisarm);

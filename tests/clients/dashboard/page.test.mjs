@@ -162,12 +162,12 @@ it("two buttons arm and disarm beside a running engine and say the result", asyn
   await says(page, ".arming", "Ready, not armed: gives no force until it is armed.");
   await until("no force is given", async () => (await applied(page)) === 0);
   await page.click("#arm");
-  await result(page, "good", "Armed: it gives forces.");
+  await result(page, "good", "Armed: the device exerts forces.");
   await says(page, "[data-tile=state] .value", "Armed");
   await until("force is given", async () => (await applied(page)) > 0);
 
   await page.click("#disarm");
-  await result(page, "good", "Disarmed: no force until it is armed again.");
+  await result(page, "good", "Disarmed: no force until the device is armed again.");
   await says(page, ".arming", "Disarmed: gives no force until it is armed again.");
   await until("no force is given", async () => (await applied(page)) === 0);
   await says(page, ".reasons", "Disarmed");
@@ -176,7 +176,7 @@ it("two buttons arm and disarm beside a running engine and say the result", asyn
   assert.equal(await applied(page), 0, "though the engine goes on");
 
   await page.click("#arm");
-  await result(page, "good", "Armed: it gives forces.");
+  await result(page, "good", "Armed: the device exerts forces.");
   await until("force is given again", async () => (await applied(page)) > 0);
 
   // When another operator disarms the device, the result of the previous press disappears.
@@ -195,7 +195,7 @@ it("arms nothing by a channel that an engine holds, and says who holds it", asyn
   const { server, key } = await guarded(test);
   const { url, operatorUrl } = await startDash(test, server.address, ...key("operator"), "--arm", "wall");
   const page = await visit(test, url, { at: operatorUrl });
-  await says(page, ".arming .needs", '"virtual_wall" holds the channel "wall", and for 500 ms after its last force. Nothing is taken from it.');
+  await says(page, ".arming .needs", '"virtual_wall" holds the channel "wall", until 500 ms after its last force. It is not taken over.');
   for (const button of ["#arm", "#disarm"]) assert.equal(await page.locator(button).isDisabled(), true, button);
   const authorization = `Bearer ${operatorUrl.split("/").at(-1)}`;
   const answer = await fetch(`${url}/api/disarm?device=0`, { method: "POST", headers: { origin: url, authorization } });
@@ -207,7 +207,7 @@ it("without leave to arm: no button, how to get one, closed to other pages", asy
   const { server, key } = await guarded(test);
   const { url } = await startDash(test, server.address, ...key("screen"));
   const page = await visit(test, url);
-  await says(page, ".arming .needs", "start tendon-dash with --key FILE, a controller's key, and --arm CHANNEL");
+  await says(page, ".arming .needs", "start tendon-dash with --key FILE (a controller's key) and --arm CHANNEL");
   for (const button of ["#arm", "#disarm"]) assert.equal(await page.locator(button).isVisible(), false, button);
   const post = async (where, headers) => (await fetch(`${where}/api/arm?device=0`, { method: "POST", headers })).status;
   assert.equal(await post(url, { origin: url }), 403);
@@ -223,11 +223,11 @@ it("without leave to arm: no button, how to get one, closed to other pages", asy
   for (const button of ["#arm", "#disarm"]) assert.equal(await onlooker.locator(button).isVisible(), false, button);
   const late = await visit(test, open, { at: `${open}/#/operator/${"0".repeat(32)}` });
   await late.click("#arm");
-  await says(late, ".arming .result[data-level=bad]", "the pass is of another run, or missing");
+  await says(late, ".arming .result[data-level=bad]", "the token is missing, or from another run");
   assert.equal((await fetch(`${open}/api/arm?device=0`)).status, 405);
   const observer = new Program(test, "tendon-dash", ["--server", server.address, "--listen", "127.0.0.1:0", ...key("screen"), "--arm", "operator"]);
   assert.equal(await observer.ended, 1);
-  assert.match(observer.lines.join("\n"), /an observer's key; --arm wants a controller's/);
+  assert.match(observer.lines.join("\n"), /expected a controller's key for --arm, found an observer's key/);
   const keyless = new Program(test, "tendon-dash", ["--server", server.address, "--listen", "127.0.0.1:0", "--arm", "operator"]);
   assert.equal(await keyless.ended, 2);
 });

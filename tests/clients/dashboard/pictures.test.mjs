@@ -69,7 +69,7 @@ async function armed(test, name, fastest) {
 
 it("live, paused, on a phone", async (test) => {
   const { page, url, operatorUrl } = await armed(test, "falcon-right", 3);
-  await says(page, ".arming .result[data-level=good]", "Armed: it gives forces.");
+  await says(page, ".arming .result[data-level=good]", "Armed: the device exerts forces.");
   await until("ten seconds are shown", async () => (await shown(page)) > 10_000);
   await shoot(page, "live-light");
   const dark = await visit(test, url, { ...kDark, at: operatorUrl });
