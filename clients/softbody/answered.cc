@@ -19,9 +19,9 @@ std::vector<AnswerCount> counts_of(const Answered& answered) {
     counts.push_back({name, step.answers, "answers were " + name});
   }
   if (const auto& near = answered.near) {
-    counts.push_back({"linear", near->linear, "answers were those of the linear body"});
-    counts.push_back({"fields", near->made - 1 + near->late, "near fields were made by the other thread"});
-    counts.push_back({"fields_late", near->late, "of them came too late"});
+    counts.push_back({"linear", near->linear, "answers were from the linear body"});
+    counts.push_back({"fields", near->made - 1 + near->late, "near fields were computed by the other thread"});
+    counts.push_back({"fields_late", near->late, "of them were too late"});
   }
   return counts;
 }

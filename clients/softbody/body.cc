@@ -65,7 +65,7 @@ struct Made {
 
 Patch middle_patch(const TouchSurface& surface, const Vec3& middle) {
   if (auto found = surface.patch(surface.across(middle))) return *std::move(found);
-  throw std::invalid_argument("the middle of the touched side is not on the body");
+  throw std::invalid_argument("the centre of the touched side is not on the body");
 }
 
 std::unique_ptr<Model> solved_model_of(const BodyConfig& config, const Solid& solid, const TouchSurface& surface,
@@ -74,7 +74,7 @@ std::unique_ptr<Model> solved_model_of(const BodyConfig& config, const Solid& so
   known.add(kFriction);
   if (config.model != ModelKind::kLinear || !effects_of(config).within(known)) {
     throw std::invalid_argument(
-        "on many machines a body has the model \"linear\", and no effects but contact and friction");
+        "on several machines, expected the model \"linear\" and no effects except contact and friction");
   }
   return std::make_unique<SolvedModel>(solid, surface, middle_patch(surface, config.middle), solver(solid));
 }
@@ -103,10 +103,10 @@ std::unique_ptr<CondensedModel> condensed_from(const BodyConfig& config, const S
   SurfaceTable table = read_table(*config.table_file);
   const auto refuse = [&](const std::string& why) { throw std::invalid_argument(config.table_file->string() + why); };
   if (table.body != digest_of(solid, surface.normal())) {
-    refuse(" is the table of another body: make it anew with tendon-softbody condense");
+    refuse(" is the table of another body: create it again with tendon-softbody condense");
   }
   for (const int node : touchable(config, surface)) {
-    if (!std::ranges::binary_search(table.nodes, node)) refuse(" does not reach as far as reach_mm");
+    if (!std::ranges::binary_search(table.nodes, node)) refuse(" does not cover reach_mm");
   }
   linear_up_to = table.linear_up_to;
   const double expected = table.stiffness;
@@ -116,7 +116,7 @@ std::unique_ptr<CondensedModel> condensed_from(const BodyConfig& config, const S
                                                 std::move(table.compliance), wants_glide(config, surface));
   constexpr double kSame = 1e-9;  // summation order differs
   if (!patch || !(std::abs(stiffness_under(*model, *patch) / expected - 1) < kSame)) {
-    refuse(" does not answer as it did when it was made");
+    refuse(" does not reproduce the answers for which it was created");
   }
   return model;
 }
@@ -199,7 +199,7 @@ const BodyConfig& checked(const BodyConfig& config) {
     }
     for (const EffectInfo& other : effects()) {
       if (simulated.has(effect.kind) && simulated.has(other.kind) && effect.not_with.has(other.kind)) {
-        throw std::invalid_argument(std::string(effect.name) + " is not simulated together with " +
+        throw std::invalid_argument(std::string(effect.name) + " cannot be simulated together with " +
                                     std::string(other.name));
       }
     }
@@ -209,10 +209,10 @@ const BodyConfig& checked(const BodyConfig& config) {
   }
   if (config.near.learns()) {
     if (config.model != ModelKind::kNear) {
-      throw std::invalid_argument("only the model \"near\" learns, or tabulates answers");
+      throw std::invalid_argument("only the model \"near\" can learn or tabulate answers");
     }
     expect(config.reach && *config.reach > 0 && *config.reach <= NearConfig::kFarthest * config.patch_radius, "reach",
-           config.reach.value_or(0), "above 0 and at most 1.5 patch radii, where the body learns");
+           config.reach.value_or(0), "above 0 and at most 1.5 patch radii if the body learns");
   }
   const auto* capsule = std::get_if<CapsuleTool>(&config.tool);
   if (!is_patch(config.tool)) {
@@ -220,27 +220,27 @@ const BodyConfig& checked(const BodyConfig& config) {
     if (is_rigid_on_nonlinear(config)) {
       for (const EffectKind effect : {kInertia, kDamping, kViscosity, kCutting, kPlasticity, kSelfCollision}) {
         if (simulated.has(effect)) {
-          throw std::invalid_argument(tool + " presses no body with " + std::string(info(effect).name));
+          throw std::invalid_argument(tool + " cannot press a body with " + std::string(info(effect).name));
         }
       }
     } else if (!is_sphere(config.tool) && capsule == nullptr) {
-      throw std::invalid_argument(tool + " wants the model \"corotational\" or \"neo-hookean\"");
+      throw std::invalid_argument(tool + " requires the model \"corotational\" or \"neo-hookean\"");
     } else if (config.model != ModelKind::kCondensed) {
-      throw std::invalid_argument(tool + " wants the model \"condensed\", \"corotational\" or \"neo-hookean\"");
+      throw std::invalid_argument(tool + " requires the model \"condensed\", \"corotational\" or \"neo-hookean\"");
     } else if (config.friction) {
       throw std::invalid_argument(tool + " has no friction on the model \"condensed\"");
     }
-    if (config.stiffening) throw std::invalid_argument(tool + " wants a body that does not stiffen");
+    if (config.stiffening) throw std::invalid_argument(tool + " cannot be used with stiffening");
     if (config.side == PatchContact::Side::kBilateral) throw std::invalid_argument(tool + " does not stick");
   }
   if (config.hands != 1 && !is_rigid_on_nonlinear(config)) {
-    throw std::invalid_argument("several hands want a rigid tool and the model \"corotational\" or \"neo-hookean\"");
+    throw std::invalid_argument("several hands require a rigid tool and the model \"corotational\" or \"neo-hookean\"");
   }
   if (config.table_file) {
     if (config.model != ModelKind::kCondensed) {
-      throw std::invalid_argument("a table in a file is for the model \"condensed\"");
+      throw std::invalid_argument("a table in a file requires the model \"condensed\"");
     }
-    if (capsule != nullptr) throw std::invalid_argument("a capsule wants more than a table in a file has");
+    if (capsule != nullptr) throw std::invalid_argument("a capsule cannot use a table in a file");
   }
   if (capsule != nullptr) {
     expect(std::abs(capsule->axis.norm() - 1) < 1e-9, "norm of tool_axis", capsule->axis.norm(), "1");
@@ -385,13 +385,13 @@ Body::Parts::Planned::Planned(const BodyConfig& config, const Mesh& mesh, const 
     const std::span<const Cut> done = trial.make_next();
     const std::string which = "cutting: cut " + std::to_string(done.size());
     if (divide(mesh, fixed, done.last(1)).opened == 0) {
-      throw std::invalid_argument(which + " lies between no two elements of the body");
+      throw std::invalid_argument(which + " does not separate any elements of the body");
     }
     body = divide(body.mesh, body.fixed, done);
     try {
       middle_patch(TouchSurface(body.mesh, surface.normal(), surface.radius()), config.middle);
     } catch (const std::invalid_argument& error) {
-      throw std::invalid_argument(which + " leaves nothing to be touched: " + error.what());
+      throw std::invalid_argument(which + " leaves no surface to touch: " + error.what());
     }
   }
 }

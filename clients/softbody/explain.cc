@@ -95,19 +95,19 @@ std::optional<Explanation::Beside> fields_beside(const BodyConfig& config, const
 std::string touched_by(const BodyConfig& body) {
   std::ostringstream text;
   if (const auto* sphere = std::get_if<SphereTool>(&body.tool)) {
-    text << ", a sphere of " << 1e3 * sphere->radius << " mm";
+    text << " with a sphere of " << 1e3 * sphere->radius << " mm";
   } else if (const auto* capsule = std::get_if<CapsuleTool>(&body.tool)) {
-    text << ", a capsule of " << 1e3 * capsule->radius << " mm, " << 2e3 * capsule->half_length
+    text << " with a capsule of " << 1e3 * capsule->radius << " mm, " << 2e3 * capsule->half_length
          << " mm between the centres of its ends";
   } else if (const auto* box = std::get_if<BoxTool>(&body.tool)) {
-    text << ", a box of " << (1e3 * box->size).transpose() << " mm with edges of " << 1e3 * box->edge << " mm";
+    text << " with a box of " << (1e3 * box->size).transpose() << " mm with edges of " << 1e3 * box->edge << " mm";
   } else if (const auto* mesh = std::get_if<MeshTool>(&body.tool)) {
-    text << ", a tool whose surface is " << mesh->file.string();
+    text << " with a tool with the surface " << mesh->file.string();
   } else {
-    text << ", on a patch of " << 1e3 * body.patch_radius << " mm";
+    text << " on a patch of " << 1e3 * body.patch_radius << " mm";
   }
   if (body.tool_offset != Vec3::Zero()) text << ", " << 1e3 * body.tool_offset.norm() << " mm from the handle";
-  if (turns_the_hand(body)) text << "; with a torque";
+  if (turns_the_hand(body)) text << ", with a torque";
   if (body.hands > 1) text << "; " << body.hands << " hands at once";
   return text.str();
 }
@@ -123,7 +123,7 @@ std::string milliseconds(double s, double resolution) {
 
 double off_the_exact_interface(const BodyConfig& config) {
   if (config.model != ModelKind::kNear) {
-    throw std::invalid_argument("only the model \"near\" has an interface, and can be compared with the exact one");
+    throw std::invalid_argument("only the model \"near\" has an interface, which can be compared with the exact one");
   }
   BodyConfig alone = config;
   alone.near.learn = alone.near.tabulate = false;
@@ -233,52 +233,52 @@ std::string in_words(const Scene& scene, const Explanation& explanation) {
   if (explanation.tool) {
     const auto& [facts, made_s] = *explanation.tool;
     text << "tool: " << facts.facets << " facets, " << 1e3 * facts.size.x() << " x " << 1e3 * facts.size.y() << " x "
-         << 1e3 * facts.size.z() << " mm; " << facts.points << " distances on a grid with cells of " << 1e3 * facts.cell
-         << " mm, " << static_cast<double>(facts.bytes) / 1e6 << " MB, made in " << milliseconds(made_s, 0)
-         << " of processor time; its surface is right to " << 1e3 * facts.error << " mm\n";
+         << 1e3 * facts.size.z() << " mm; " << facts.points << " distances on a grid with a cell size of "
+         << 1e3 * facts.cell << " mm, " << static_cast<double>(facts.bytes) / 1e6 << " MB, computed in "
+         << milliseconds(made_s, 0) << " of processor time; accuracy of the surface " << 1e3 * facts.error << " mm\n";
   }
   for (const auto& [rung, answer_s] : explanation.learned) {
-    text << "answers where it is good enough: " << rung.name << ", within "
+    text << "answers, where accurate enough: " << rung.name << ", within "
          << milliseconds(answer_s, explanation.resolution_s) << "; in " << rung.cells << " of " << rung.of_cells
-         << " cells, wrong by " << std::setprecision(2) << 100 * rung.error << std::setprecision(6) << " % at most; ";
+         << " cells, error up to " << std::setprecision(2) << 100 * rung.error << std::setprecision(6) << " %; ";
     if (rung.shapes > 0) text << rung.shapes << " shapes, summed over " << rung.elements << " elements; ";
     text << static_cast<double>(rung.bytes) / 1e6 << " MB\n";
   }
   if (!explanation.learned.empty()) {
-    text << "answers elsewhere: the near field, within " << milliseconds(explanation.near_answer_s, 0) << '\n';
+    text << "answers elsewhere: near field, within " << milliseconds(explanation.near_answer_s, 0) << '\n';
   }
   if (explanation.near && explanation.near->radius > 0) {
     const NearModel::Size& near = *explanation.near;
     const std::string_view law = std::ranges::find(near_laws(), body.near.law, &NearLaw::law)->name;
     text << "near the tool: " << law << ", " << near.elements << " of " << size.elements << " elements, within "
-         << 1e3 * near.radius << " mm or where the tool goes next; " << near.unknowns << " unknowns, of them "
-         << near.modes << " modes in place of the " << near.interface << " that near and far have in common\n";
+         << 1e3 * near.radius << " mm or on the path of the tool; " << near.unknowns << " unknowns, including "
+         << near.modes << " modes instead of the " << near.interface << " unknowns of the interface\n";
     if (explanation.off_exact) {
-      text << "  beside the exact interface: forces differ by " << std::setprecision(2) << 100 * *explanation.off_exact
-           << " % at most, pressed by up to " << 200 * body.patch_radius << " mm\n"
+      text << "  compared with the exact interface: forces differ by up to " << std::setprecision(2)
+           << 100 * *explanation.off_exact << " % for depths up to " << 200 * body.patch_radius << " mm\n"
            << std::setprecision(6);
     }
     if (explanation.beside) {
-      text << "the next near field: by another thread, about the shape there; "
-           << milliseconds(explanation.beside->field_s, 0) << " of its processor time, and it keeps "
+      text << "next near field: in another thread, for the current shape; "
+           << milliseconds(explanation.beside->field_s, 0) << " of processor time, and "
            << static_cast<double>(explanation.beside->bytes) / 1e6 << " MB\n";
     } else {
-      text << "the next near field: about the shape at rest, in pieces by the answers, because this OpenBLAS is built "
-              "for one thread\n";
+      text << "next near field: for the shape at rest, in parts during the answers, because this OpenBLAS only "
+              "supports one thread\n";
     }
   } else if (explanation.near) {
-    text << "near the tool: the whole body, which is not larger\n";
+    text << "near the tool: the whole body, because it is small\n";
   }
   if (explanation.step > 0) {
-    text << "time: every answer is a step of " << 1e3 * explanation.step << " ms\n";
+    text << "time: each answer is a step of " << 1e3 * explanation.step << " ms\n";
   } else {
-    text << "time: at rest at every instant; no velocity is kept\n";
+    text << "time: quasi-static, without velocities\n";
   }
   text << "cost:\n  mesh: " << size.nodes << " nodes, " << size.elements << " elements (" << element.name << ": "
        << element.what << ")\n  unknowns: " << size.free << "\n  touchable nodes: " << size.touchable
        << "\n  model: " << static_cast<double>(size.bytes) / 1e6
        << " MB\n  an answer: " << milliseconds(explanation.all.answer_s, 0)
-       << " of processor time, measured here and now while pressed by " << 1e3 * kWay << " mm, ± "
+       << " of processor time, measured on this machine just now at a depth of " << 1e3 * kWay << " mm, ± "
        << milliseconds(explanation.resolution_s, 0) << "\nat first touch: " << explanation.stiffness << " N/m\n";
   for (const std::string& warning : warnings(body)) text << "warning: " << warning << '\n';
   return text.str();

@@ -133,7 +133,7 @@ class Table {
 
   Vec3 direction(std::string_view key, const Vec3& otherwise) {
     const Vec3 vector = this->vector(key, 1e6, 1, otherwise);
-    if (!(vector.norm() > 1e-6)) fail(*table_.get(key), key, "expected a direction, not [0, 0, 0]");
+    if (!(vector.norm() > 1e-6)) fail(*table_.get(key), key, "expected a direction, found [0, 0, 0]");
     return vector.normalized();
   }
 
@@ -319,7 +319,9 @@ void read_touch(Table table, const std::filesystem::path& directory, Scene& scen
   if (const toml::node* asked = table.find("table_mm")) {
     scene.table = table.length("table_mm");
     if (body.model != ModelKind::kCondensed || body.side != PatchContact::Side::kUnilateral || body.friction) {
-      table.fail(*asked, "table_mm", "only for the model condensed, unilateral and without friction: others remember");
+      table.fail(
+          *asked, "table_mm",
+          "expected the model condensed, unilateral and without friction, because the others depend on the past");
     }
   }
   table.check_unknown();
@@ -376,7 +378,7 @@ ModelKind read_model(Table& model) {
   const std::string name = model.text("kind", "one of " + all);
   if (std::ranges::count(kOfTheLab, name) > 0) {
     model.fail(*model.find("kind"), "kind",
-               '"' + name + "\" is a model of the accuracy experiment now (tests/tools/lab/models); expected " + all);
+               '"' + name + "\" is only a model of the accuracy experiment (tests/tools/lab/models); expected " + all);
   }
   return model.choice("kind", all, model_named);
 }
@@ -390,8 +392,9 @@ void check_law(Table& root, Law law, EffectSet listed) {
   const bool simulates = law == Law::kNeoHookean;
   if (simulates == listed.has(EffectKind::kMaterialNonlinearity)) return;
   root.fail(*root.find("effects"), "effects",
-            simulates ? "the law \"neo-hookean\" simulates \"material-nonlinearity\", which is not listed"
-                      : "the law simulates no \"material-nonlinearity\", which is listed: only \"neo-hookean\" does");
+            simulates
+                ? "the law \"neo-hookean\" simulates \"material-nonlinearity\", which is not listed"
+                : "the law does not simulate \"material-nonlinearity\", which is listed: only \"neo-hookean\" does");
 }
 
 std::vector<Scene::Hand> read_hands(Table& root) {
@@ -405,11 +408,11 @@ std::vector<Scene::Hand> read_hands(Table& root) {
     table.check_unknown();
     for (const Scene::Hand& other : hands) {
       if (&other != &hand && other.device == hand.device && other.server == hand.server) {
-        table.fail("two hands at one device, \"" + hand.device + '"');
+        table.fail("expected a different device for each hand, found twice \"" + hand.device + '"');
       }
     }
   }
-  if (hands.size() < 2) root.fail(*root.find("hands"), "hands", "expected two or more; one hand needs no [[hands]]");
+  if (hands.size() < 2) root.fail(*root.find("hands"), "hands", "expected two or more; omit [[hands]] for one hand");
   return hands;
 }
 
@@ -436,7 +439,7 @@ EffectSet read_effects(Table& root, const ModelInfo& model, BodyConfig& body) {
     for (const EffectInfo& other : effects()) {
       if (listed.has(other.kind) && (found->not_with.has(other.kind) || other.not_with.has(found->kind))) {
         root.fail(each, "effects",
-                  "\"" + **name + "\" is not simulated together with \"" + std::string(other.name) + '"');
+                  "\"" + **name + "\" cannot be simulated together with \"" + std::string(other.name) + '"');
       }
     }
   }
@@ -492,8 +495,7 @@ Scene parse_scene(std::string_view text, const std::string& name, const std::fil
       if (scene.body.near.learns()) {
         scene.body.tolerance = NearConfig::kErrorOfLearned;
         if (model.find("learned_in") != nullptr) {
-          scene.body.near.learned_in =
-              directory / model.text("learned_in", "a folder in which what is learned is kept");
+          scene.body.near.learned_in = directory / model.text("learned_in", "a folder for the learned data");
         }
       }
       scene.body.tolerance = model.number("error_percent", 0, false, kMaxError, 100, scene.body.tolerance);
@@ -508,7 +510,7 @@ Scene parse_scene(std::string_view text, const std::string& name, const std::fil
       break;
     case ModelKind::kCondensed:
       if (model.find("table") != nullptr) {
-        scene.body.table_file = directory / model.text("table", "the path of a table of tendon-softbody condense");
+        scene.body.table_file = directory / model.text("table", "the path of a table from tendon-softbody condense");
       }
       break;
   }

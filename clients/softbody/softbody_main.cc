@@ -81,10 +81,11 @@ int condense(int argc, char** argv) {
   Options options{.client = {.name = "tendon-softbody condense"}};
   std::string scene_file;
   std::string table_file;
-  CommandLine line("Makes the table of a scene's condensed body once, for as many servers and starts as there are.",
-                   options);
+  CommandLine line(
+      "Create the table of the condensed body of a scene. It can be used by any number of servers and starts.",
+      options);
   line.add_argument("SCENE", scene_file, "Scene file, with the model condensed");
-  line.add_argument("FILE", table_file, "The table; a scene names it under [model] table");
+  line.add_argument("FILE", table_file, "File of the table, which is set in [model] table of a scene");
   if (const auto exit_code = line.parse(argc, argv)) return *exit_code;
   const softbody::Scene scene = softbody::read_scene(scene_file);
   softbody::warn(std::cerr, "tendon-softbody", scene.body);
@@ -116,10 +117,10 @@ void prepare_beside(const softbody::Scene& scene, std::optional<softbody::Backgr
     return;
   }
   std::cerr << "tendon-softbody: warning: "
-            << (!near   ? "an answer waits for each cut"
-                : !cuts ? "answers make the near fields themselves"
-                        : "answers wait for cuts, and make the near fields themselves")
-            << ", because this OpenBLAS is built for one thread; with libopenblas0-pthread they go on\n";
+            << (!near   ? "answers are delayed by cuts"
+                : !cuts ? "answers are delayed by new near fields"
+                        : "answers are delayed by cuts and by new near fields")
+            << ", because this OpenBLAS only supports one thread; install libopenblas0-pthread\n";
 }
 
 /// Returns the exit code.
@@ -172,15 +173,15 @@ int main(int argc, char** argv) {
   if (skip == 1) options.client.name += ' ' + std::string(first);
   std::string file;
   CommandLine line(
-      explains ? "Says what a scene simulates, what not, and what each part costs; no server is needed."
-      : tests  ? "Presses a scene by a script and says what of it would be felt as wrong; no server is needed."
-               : "A soft body that the hand can touch; `tendon-softbody explain SCENE` says what it simulates, "
-                 "`tendon-softbody selftest SCENE` whether it is passive, `tendon-softbody condense SCENE FILE` "
-                 "makes a table before.",
+      explains ? "Print what a scene simulates, and the cost of each part. Does not require a server."
+      : tests  ? "Test a scene with scripted motions, and print what would feel wrong. Does not require a server."
+               : "Simulate a soft body that can be touched. `tendon-softbody explain SCENE` prints what it "
+                 "simulates,\n`tendon-softbody selftest SCENE` tests whether it is passive, and `tendon-softbody "
+                 "condense SCENE FILE` creates a table.",
       options);
   bool exact = false;
   if (explains) {
-    line.add("--exact", exact, "Says too by how much the modes of the model near differ from its exact interface");
+    line.add("--exact", exact, "Also print the difference between the modes of the model near and its exact interface");
   }
   line.add_argument("SCENE", file, "Scene file; its keys:\n" + softbody::scene_reference());
   if (const auto exit_code = line.parse(argc - skip, argv + skip)) return *exit_code;

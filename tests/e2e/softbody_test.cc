@@ -87,7 +87,7 @@ towards_hand = [-1, 0, 0]
     EXPECT_GT(count_in(body.out(), "forces"), 50U);
     EXPECT_EQ(count_in(body.out(), "forces_unusable"), 0U);
     const std::string end = server.stop();
-    if (body.err().find("this OpenBLAS is built for one thread") != std::string::npos) continue;
+    if (body.err().find("this OpenBLAS only supports one thread") != std::string::npos) continue;
     if (scene.ends_with("near.toml")) {
       EXPECT_NE(body.out().find(R"({"answers":{"linear":)"), std::string::npos) << body.out();
       // The server's summary counts the solver paths and the largest error estimate.

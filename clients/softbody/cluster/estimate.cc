@@ -70,23 +70,24 @@ std::string in_words(const Estimate& e) {
   const auto way = [&](std::string_view name, double answer, double set_up, double bytes) {
     text << "  " << std::left << std::setw(22) << name << std::right << std::setw(11) << std::setprecision(3)
          << 1000 * answer << " ms";
-    if (set_up > 0) text << std::setw(11) << set_up << " s to make" << std::setw(11) << bytes / 1e6 << " MB";
+    if (set_up > 0) text << std::setw(11) << set_up << " s to create" << std::setw(11) << bytes / 1e6 << " MB";
     text << '\n';
   };
   text << e.size.free << " unknowns, " << e.size.elements << " elements, " << e.size.touchable
-       << " nodes that can be touched\n\nPredicted, to a factor of two or three:\n";
+       << " touchable nodes\n\nPredicted times, within a factor of two or three:\n";
   way("table", e.table.answer_s, e.table.set_up_s, e.table.bytes);
   way("factor", e.factor.answer_s, e.factor.set_up_s, e.factor.bytes);
   for (const auto& each : e.multigrid) {
     way("multigrid, " + std::to_string(each.ranks) + (each.ranks == 1 ? " rank" : " ranks"), each.answer_s, 0, 0);
   }
-  text << "\nTake: ";
+  text << "\nRecommended: ";
   switch (e.take) {
     case Estimate::Take::kTable:
-      text << "the table. tendon-fem condense makes it, tendon-softbody answers from it; no cluster is needed then\n";
+      text << "the table. Create it with tendon-fem condense, and use it with tendon-softbody; this does not require a "
+              "cluster\n";
       break;
     case Estimate::Take::kFactor:
-      text << "the factor, in tendon-softbody with the model linear: the table would be too large\n";
+      text << "the factor, in tendon-softbody with the model linear, because the table is too large\n";
       break;
     case Estimate::Take::kMultigrid:
       text << "multigrid on " << e.ranks << " ranks: tendon-fem serve\n";

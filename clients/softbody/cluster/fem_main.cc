@@ -67,21 +67,24 @@ int serve(int argc, char** argv) {
   double dead_ms = 0;
   double start_s = seconds(config.front.start);
   CommandLine line(
-      "Answers the hand by workers that it starts, asks, and replaces when they die. The session with the server "
-      "lives on meanwhile.",
+      "Compute the forces in worker processes, which are restarted if they fail. The session with the server is not "
+      "interrupted.",
       options);
-  line.add_argument("SCENE", scene, "Scene file, handed to the worker");
-  line.add("--launch", launch, "COMMAND", "What starts the worker: \"mpirun -n 64\", \"srun\"; none: it starts itself");
-  line.add("--worker", program, "COMMAND", "The worker, if not tendon-fem-worker: any program that can be one");
-  line.add("--fallback", fallback, "FILE", "A table (tendon-fem condense) that answers while no worker can");
+  line.add_argument("SCENE", scene, "Scene file for the worker");
+  line.add("--launch", launch, "COMMAND",
+           "Command that starts the worker, such as \"mpirun -n 64\" or \"srun\". Default: start it directly");
+  line.add("--worker", program, "COMMAND", "Program of the worker. Default: tendon-fem-worker");
+  line.add("--fallback", fallback, "FILE",
+           "Table from tendon-fem condense, which is used while no worker is available");
   line.add("--listen", config.crew.listen, "HOST:PORT",
-           "TCP, in the clear, for workers of other machines; else a Unix socket");
+           "Address for workers on other machines (TCP, not encrypted). Default: a Unix socket");
   line.add("--deadline-ms", deadline_ms,
-           "Later answers are not sent; 0 = three times the median with a force, at least 50 ms");
-  line.add(
-      "--dead-ms", dead_ms,
-      "Without an answer for so long a worker is replaced; 0 = ten times that median, at least 500 ms; 10 s at first");
-  line.add("--start-s", start_s, "A worker that is not ready after so long is replaced", 0.1);
+           "Maximum age of an answer, ms; later answers are not sent. 0: three times the median with a force, at least "
+           "50 ms");
+  line.add("--dead-ms", dead_ms,
+           "Time without an answer after which a worker is restarted, ms. 0: ten times this median, at least 500 ms; "
+           "10 s at the start");
+  line.add("--start-s", start_s, "Maximum start time of a worker, s; after that, it is restarted", 0.1);
   if (const auto exit_code = line.parse(argc, argv)) return *exit_code;
 
   config.name = "tendon-fem";
@@ -104,7 +107,7 @@ int serve(int argc, char** argv) {
   } else {
     std::cerr << "tendon-fem: " << stats.launches << " workers, " << stats.asked << " states, " << stats.answers
               << " answers in time (median with a force " << milliseconds(stats.median) << " ms), " << stats.late
-              << " late, " << stats.refused << " refused, " << stats.fallback << " by the fallback\n";
+              << " late, " << stats.refused << " refused, " << stats.fallback << " from the fallback\n";
   }
   return code;
 }
@@ -124,7 +127,7 @@ int condense(const Arguments& arguments) {
                               shell_word(arguments.way) + (arguments.json ? " --json " : " ") +
                               shell_word(arguments.scene) + " " + shell_word(arguments.table);
   ::execl("/bin/sh", "sh", "-c", command.c_str(), nullptr);
-  throw std::runtime_error("/bin/sh cannot be started");
+  throw std::runtime_error("cannot start /bin/sh");
 }
 
 int explain(const Arguments& arguments) {
@@ -139,36 +142,40 @@ int explain(const Arguments& arguments) {
 
 int run_command(int argc, char** argv) {
   CLI::App app(
-      "A soft body whose answers many machines compute. `tendon-fem serve SCENE` answers the hand by workers "
-      "(`tendon-fem serve --help`); the others prepare that.",
+      "Simulate a soft body on several machines. `tendon-fem serve SCENE` computes the forces in worker "
+      "processes\n(`tendon-fem serve --help`); the other commands prepare it.",
       "tendon-fem");
   usage::dress(app);
   app.require_subcommand(1);
   app.set_version_flag("--version", TENDON_VERSION);
   Arguments arguments;
-  app.add_subcommand("serve", "Answers the hand by workers that it starts, asks and replaces when they die");
-  CLI::App* const condenses = app.add_subcommand("condense", "Makes the table of a scene on many machines");
-  CLI::App* const explains =
-      app.add_subcommand("explain", "How large the body is, what each way to answer costs, and which one to take");
+  app.add_subcommand("serve", "Compute the forces in worker processes, which are restarted if they fail");
+  CLI::App* const condenses = app.add_subcommand("condense", "Create the table of a scene on several machines");
+  CLI::App* const explains = app.add_subcommand(
+      "explain", "Print the size of the body, the predicted time of each method, and a recommendation");
   for (CLI::App* const verb : {condenses, explains}) {
     verb->add_option("SCENE", arguments.scene, "Scene file")->required();
-    verb->add_flag("--json", arguments.json, "One JSON object on stdout");
+    verb->add_flag("--json", arguments.json, "Print one JSON object on stdout");
   }
-  condenses->add_option("FILE", arguments.table, "The table; a scene names it under [model] table")->required();
-  condenses->add_option("--launch", arguments.launch, "What starts the worker: \"mpirun -n 64\", \"srun\"")
+  condenses->add_option("FILE", arguments.table, "File of the table, which is set in [model] table of a scene")
+      ->required();
+  condenses
+      ->add_option("--launch", arguments.launch, "Command that starts the worker, such as \"mpirun -n 64\" or \"srun\"")
       ->type_name("COMMAND");
-  condenses->add_option("--way", arguments.way, "How the body is solved")
+  condenses->add_option("--way", arguments.way, "Solver for the body")
       ->capture_default_str()
       ->check(usage::one_of({"chosen", "factor", "multigrid"}));
-  explains->add_option("--ranks", arguments.ranks, "Numbers of ranks to predict for")
+  explains->add_option("--ranks", arguments.ranks, "Numbers of ranks for the prediction")
       ->delimiter(',')
       ->capture_default_str()
       ->check(CLI::Range(1, 1'000'000));
   condenses->footer("\nExample:\n  tendon-fem condense liver.toml liver.table --launch \"mpirun -n 64\"");
   explains->footer("\nExample:\n  tendon-fem explain liver.toml --ranks 1,64,1024");
   app.footer(
-      "\nExample:\n  tendon-fem serve liver.toml --launch \"mpirun -n 64\" --server haptics.lab:47100 --key fem.key\n"
-      "\nExit: 0 done; 1 something failed; 2 wrong usage.");
+      "\n"
+      "Example:\n"
+      "  tendon-fem serve liver.toml --launch \"mpirun -n 64\" --server haptics.lab:47100 --key fem.key\n\n"
+      "Exit: 0 success; 1 failed; 2 wrong usage.");
   try {
     usage::parse(app, argc, argv);
   } catch (const CLI::ParseError& error) {

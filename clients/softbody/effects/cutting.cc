@@ -143,8 +143,8 @@ Cutting::Cutting(std::vector<PlannedCut> plan) : plan_(std::move(plan)) {
       refuse("has no area");
     }
     const bool timed = plan_[i].when == PlannedCut::When::kTime;
-    if (timed && !(plan_[i].value >= 0)) refuse("wants a time of 0 or more");
-    if (!timed && !(plan_[i].value > 0)) refuse("wants a force above 0");
+    if (timed && !(plan_[i].value >= 0)) refuse("expected a time of 0 or more");
+    if (!timed && !(plan_[i].value > 0)) refuse("expected a force above 0");
   }
   made_.reserve(plan_.size());
 }

@@ -9,7 +9,7 @@ namespace tendon::softbody {
 
 Elastic::Elastic(Mesh mesh, const Fixed& fixed) : Elastic(std::move(mesh), fixed, Together{}) {
   if (free_count() == size()) {
-    throw std::invalid_argument("nothing holds the body: some of its nodes must be fixed");
+    throw std::invalid_argument("the body is not fixed: expected some fixed nodes");
   }
 }
 

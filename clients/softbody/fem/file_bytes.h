@@ -28,7 +28,7 @@ class ByteReader {
   /// Throws std::invalid_argument if there are too few bytes.
   template <class Value>
   Value take() {
-    if (left_.size() < sizeof(Value)) throw std::invalid_argument("it breaks off");
+    if (left_.size() < sizeof(Value)) throw std::invalid_argument("it is truncated");
     Value value;
     std::memcpy(&value, left_.data(), sizeof value);
     left_.remove_prefix(sizeof value);

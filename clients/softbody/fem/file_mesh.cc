@@ -107,7 +107,7 @@ void drop_repeated_elements(FileMesh& file, const std::vector<int>& place) {
     }
   }
   if (repeated == 0) return;
-  file.notes.push_back(counted(repeated, "element is", "elements are") + " there again, and left out: " + example);
+  file.notes.push_back(counted(repeated, "element is", "elements are") + " duplicated and ignored: " + example);
   file.mesh.elements = std::move(kept);
   file.numbers = std::move(numbers);
 }
@@ -154,7 +154,7 @@ void find_parts(FileMesh& file, const std::vector<int>& place, std::string_view 
     };
     if (end - first > 2) overlap("more than two elements share a face");
     if (end - first == 2) {
-      if (!face_each_other(all[first], all[first + 1])) overlap("they lie on the same side of a face that they share");
+      if (!face_each_other(all[first], all[first + 1])) overlap("they are on the same side of a shared face");
       if (actual(all[first]) == actual(all[first + 1])) {
         groups.unite(all[first].facet.element, all[first + 1].facet.element);
       }
@@ -198,10 +198,10 @@ FileMesh joined(FileMesh file, bool slits, std::string_view name) {
   if (!doubled.empty()) {
     const std::string nodes = (more == doubled.size() ? " two nodes" : " two nodes or more");
     const std::string where = ", the first at " + in_words(mesh.nodes[at(*doubled.begin())]);
-    file.notes.push_back(slits ? counted(doubled.size(), "place has", "places have") + nodes + ", which stay apart" +
-                                     where
+    file.notes.push_back(slits ? counted(doubled.size(), "place has", "places have") + nodes +
+                                     ", which are not merged" + where
                                : counted(doubled.size(), "place had", "places had") + nodes + ", which are merged" +
-                                     where + "; slits = true under [body] keeps them apart");
+                                     where + "; use slits = true in [body] to keep them separate");
   }
   drop_repeated_elements(file, place);
   if (!slits) {
@@ -212,8 +212,8 @@ FileMesh joined(FileMesh file, bool slits, std::string_view name) {
   if (parts.size() > 1) {
     const MeshPart& least = std::ranges::min(parts, {}, &MeshPart::elements);
     file.notes.push_back(
-        "the mesh has " + std::to_string(parts.size()) + " parts, which share no face; the smallest, of " +
-        counted(least.elements, "element", "elements") + ", begins with " + named_place(file, least.first));
+        "the mesh has " + std::to_string(parts.size()) + " parts without a common face; the smallest, of " +
+        counted(least.elements, "element", "elements") + ", starts with " + named_place(file, least.first));
   }
   drop_unused(mesh);
   return file;
@@ -246,11 +246,12 @@ void expect_held(const FileMesh& file, const Fixed& fixed, std::string_view name
   const auto loose = std::ranges::find(fast, false);
   if (loose == fast.end()) return;
   const MeshPart& part = parts[static_cast<std::size_t>(loose - fast.begin())];
-  refuse_file(name, "nothing holds the part of " + counted(part.elements, "element", "elements") +
-                        " that begins with " + named_element(file, part.first) + " at " +
-                        in_words(kMillimetres * middle(mesh, part.first)) +
-                        " mm: it shares no face with the other elements. Join it to them, hold it (clamped_below_mm), "
-                        "or leave it out");
+  refuse_file(
+      name,
+      "there are no fixed nodes in the part of " + counted(part.elements, "element", "elements") +
+          " that starts with " + named_element(file, part.first) + " at " +
+          in_words(kMillimetres * middle(mesh, part.first)) +
+          " mm: it has no common face with the other elements. Connect it, fix it (clamped_below_mm), or remove it");
 }
 
 }  // namespace tendon::softbody

@@ -14,7 +14,7 @@ std::string read_file(const std::filesystem::path& file, std::uintmax_t most) {
   };
   std::error_code error;
   const auto kind = std::filesystem::status(file, error).type();
-  if (kind == std::filesystem::file_type::not_found) refuse(": there is no such file");
+  if (kind == std::filesystem::file_type::not_found) refuse(": no such file");
   if (kind == std::filesystem::file_type::directory) refuse(": it is a folder");
   if (!error && kind != std::filesystem::file_type::regular) refuse(": it is not a regular file");
   const auto bytes = std::filesystem::file_size(file, error);

@@ -128,7 +128,7 @@ class Reader {
       words_.expect("$ENDELM");
     } else if (first == "$MeshFormat") {
       const double version = words_.number();
-      if (words_.whole() != 0) words_.fail("a binary file; save it as text");
+      if (words_.whole() != 0) words_.fail("expected a text file, found a binary file");
       if (version != 2.2 && version != 4.1) words_.fail("expected format 2.2 or 4.1");
       seek("$Nodes");
       version < 4 ? read_nodes() : read_nodes_of_format_4();
@@ -137,7 +137,7 @@ class Reader {
       version < 4 ? read_elements_of_format_2() : read_elements_of_format_4();
       words_.expect("$EndElements");
     } else {
-      words_.fail("expected $MeshFormat or $NOD: this is not a mesh file of gmsh");
+      words_.fail("expected $MeshFormat or $NOD, found another type of file");
     }
     expect_no_other_mesh();
     return std::move(content_);
@@ -175,7 +175,7 @@ class Reader {
     for (std::int64_t block = 0; block < blocks; ++block) {
       words_.whole();
       words_.whole();
-      if (words_.whole() != 0) words_.fail("parametric nodes are not read");
+      if (words_.whole() != 0) words_.fail("parametric nodes are not supported");
       std::vector<std::int64_t> numbers(static_cast<std::size_t>(words_.count()));
       for (auto& number : numbers) number = words_.whole();
       for (const auto number : numbers) add_node(number);
@@ -193,12 +193,13 @@ class Reader {
     for (auto& node : element.nodes) node = words_.whole();
     if (!type.volume) return;
     const std::string who = "element " + std::to_string(number);
-    if (!type.shape) words_.fail(who + " is neither a tetrahedron of 4 nodes nor a hexahedron of 8, 20 or 27");
-    if (content_.shape && *content_.shape != *type.shape) words_.fail(who + " is not of the shape of those before it");
+    if (!type.shape) words_.fail(who + ": expected a tetrahedron with 4 nodes, or a hexahedron with 8, 20 or 27");
+    if (content_.shape && *content_.shape != *type.shape)
+      words_.fail(who + " does not have the shape of the previous elements");
     content_.shape = type.shape;
     for (const auto node : element.nodes) {
       if (!content_.nodes.contains(node))
-        words_.fail(who + " has the node " + std::to_string(node) + ", which is not there");
+        words_.fail(who + " has the node " + std::to_string(node) + ", which does not exist");
     }
     if (std::set(element.nodes.begin(), element.nodes.end()).size() != element.nodes.size()) {
       words_.fail(who + " has a node twice");
@@ -269,7 +270,7 @@ void check_each(const Mesh& mesh, const std::vector<FileElement>& named, std::st
 
 FileMesh parse_gmsh(std::string_view text, std::string_view name, double scale, bool slits) {
   const Content content = Reader(text, name).read();
-  if (!content.shape) refuse_file(name, "no volume element: this is a surface");
+  if (!content.shape) refuse_file(name, "expected volume elements, found only a surface");
   FileMesh made{.mesh = {.shape = *content.shape, .nodes = {}, .elements = {}}, .numbers = {}};
   std::unordered_map<std::int64_t, int> index;
   for (const FileElement& element : content.elements) {

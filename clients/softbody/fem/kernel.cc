@@ -91,7 +91,7 @@ bool wide() {
 
 Kernel::Kernel(Law law, int nodes, int points) : law_(law), per_element_(nodes), points_(points) {
   if (nodes != 4 && nodes != 8 && nodes != 20 && nodes != 27)
-    throw std::invalid_argument("no element has so many nodes");
+    throw std::invalid_argument("no element type has this number of nodes");
 }
 
 void Kernel::add_element(std::span<const int> nodes) {

@@ -216,7 +216,7 @@ Mesh block(Shape shape, const Vec3& size, const std::array<int, 3>& cells) {
 
 Mesh cylinder(Shape shape, double radius, double height, int across, int up) {
   if (!(radius > 0) || across < 2 || across % 2 != 0) {
-    throw std::invalid_argument("a cylinder has a radius above 0 and an even number of cells across, 2 or more");
+    throw std::invalid_argument("cylinder: expected a radius above 0 and an even number of cells across, at least 2");
   }
   // The factor 0.6 makes the outer cells of the core as wide as the rings.
   const double half = 0.6 * radius * std::numbers::sqrt2 / 2;

@@ -71,7 +71,7 @@ bool has_wide_registers() {
 
 Tall checked(const MatrixXd& matrix) {
   if (matrix.rows() % static_cast<Eigen::Index>(kLanes) != 0) {
-    throw std::invalid_argument("a product wants a multiple of four rows");
+    throw std::invalid_argument("expected a multiple of four rows");
   }
   return {matrix.data(), matrix.rows(), matrix.cols()};
 }

@@ -26,7 +26,7 @@ std::vector<Material> materials_of(const Mesh& mesh, const Material& elsewhere, 
     if (std::ranges::find(region_of, i) != region_of.end()) continue;
     throw std::invalid_argument(
         "region " + std::to_string(i + 1) +
-        " has no element: it is outside the body, smaller than an element, or under a later one");
+        " has no elements: it is outside the body, smaller than an element, or covered by a later region");
   }
   std::vector<Material> all;
   for (const std::size_t region : region_of) {

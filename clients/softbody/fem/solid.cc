@@ -24,7 +24,7 @@ Solid::Solid(Mesh at_rest, Element element, const Material& material, Law law, c
     throw std::invalid_argument("of_elements: expected a material for each element, or none");
   }
   if (info(element).shape != mesh().shape) {
-    throw std::invalid_argument("the mesh has no elements of the kind " + std::string(info(element).name));
+    throw std::invalid_argument("the mesh has no elements of the type " + std::string(info(element).name));
   }
 }
 

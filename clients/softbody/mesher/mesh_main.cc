@@ -66,7 +66,7 @@ std::string json_of(const MeshReport& report, const Arguments& arguments) {
 
 void make(Arguments& arguments) {
   if (std::filesystem::exists(arguments.out)) {
-    throw std::runtime_error(arguments.out.string() + ": is there already, and is not overwritten");
+    throw std::runtime_error(arguments.out.string() + ": the file exists and is not overwritten");
   }
   if (!arguments.at.empty()) arguments.volume.touched = Vec3(arguments.at[0], arguments.at[1], arguments.at[2]);
   arguments.volume.hexahedra = !arguments.tetrahedra;
@@ -76,9 +76,9 @@ void make(Arguments& arguments) {
   const std::string name = arguments.surface.string();
   tell("reading " + name + " …");
   const Triangles surface = read_surface(arguments.surface);
-  tell("looking at " + std::to_string(surface.facets.size()) + " facets …");
+  tell("checking " + std::to_string(surface.facets.size()) + " facets …");
   check(surface, name);
-  tell("gmsh makes the elements …");
+  tell("running gmsh …");
   std::string words;
   Mesh mesh;
   try {
@@ -102,39 +102,40 @@ void make(Arguments& arguments) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app("Makes a volume of a surface, for [body] shape = \"file\" of tendon-softbody", "tendon-mesh");
+  CLI::App app("Create a volume mesh from a surface, for [body] shape = \"file\" of tendon-softbody", "tendon-mesh");
   tendon::usage::dress(app);
   app.set_version_flag("--version", TENDON_VERSION);
   Arguments arguments;
-  app.add_option("SURFACE", arguments.surface, "A closed surface of facets: .stl, .obj or .off")->required();
-  app.add_option("--out", arguments.out, "The mesh, in gmsh's format 2.2")->required()->type_name("FILE.msh");
-  app.add_option("--size", arguments.volume.size, "Edge of an element where the body is touched, in the file's unit")
+  app.add_option("SURFACE", arguments.surface, "Closed surface: .stl, .obj or .off")->required();
+  app.add_option("--out", arguments.out, "Mesh in gmsh's format 2.2")->required()->type_name("FILE.msh");
+  app.add_option("--size", arguments.volume.size,
+                 "Edge length of the elements where the body is touched, in the unit of the file")
       ->required()
       ->check(CLI::PositiveNumber);
-  CLI::Option* const touched =
-      app.add_option("--at", arguments.at, "Where that is; left out: elements are so small everywhere")
-          ->type_name("X,Y,Z")
-          ->delimiter(',')
-          ->expected(3);
+  CLI::Option* const touched = app.add_option("--at", arguments.at, "Position of this region. Default: the whole body")
+                                   ->type_name("X,Y,Z")
+                                   ->delimiter(',')
+                                   ->expected(3);
   CLI::Option* const reach =
-      app.add_option("--reach", arguments.volume.reach, "… and how far from there")->check(CLI::PositiveNumber);
+      app.add_option("--reach", arguments.volume.reach, "Radius of this region")->check(CLI::PositiveNumber);
   touched->needs(reach);
   reach->needs(touched);
-  app.add_option("--coarsest", arguments.volume.coarsest, "Elements elsewhere are so many times as large")
+  app.add_option("--coarsest", arguments.volume.coarsest, "Size of the other elements relative to --size")
       ->check(CLI::Range(1.0, 100.0))
       ->capture_default_str()
       ->needs(touched);
-  app.add_flag(
-      "--tetrahedra", arguments.tetrahedra,
-      "Leave the tetrahedra as they are; else each becomes four hexahedra, which overestimate stiffness far less");
-  app.add_flag("--json", arguments.json, "One JSON object on stdout");
+  app.add_flag("--tetrahedra", arguments.tetrahedra,
+               "Keep the tetrahedra. Otherwise, each of them is split into four hexahedra, which overestimate the "
+               "stiffness far less");
+  app.add_flag("--json", arguments.json, "Print one JSON object on stdout");
   app.footer(
-      "\nExample: elements of 8 mm below the place that is touched, of 24 mm elsewhere\n"
-      "  tendon-mesh liver.stl --size 8 --at 0,0,60 --reach 40 --out liver.msh\n"
-      "\nIt refuses a surface that is not closed, cuts or touches itself, or is turned inside out, also in a part of "
-      "it, and "
-      "names the facet. What it repairs is a warning. Needs gmsh "
-      "(package gmsh), which it runs.\nExit: 0 made; 1 it could not be, with a sentence; 2 wrong usage.");
+      "\n"
+      "Example: elements of 8 mm in the touched region, 24 mm elsewhere\n"
+      "  tendon-mesh liver.stl --size 8 --at 0,0,60 --reach 40 --out liver.msh\n\n"
+      "Surfaces that are not closed, intersect or touch themselves, or have facets turned inside out are refused with "
+      "the\n"
+      "number of a facet. Repairs are reported as warnings. Requires gmsh (package gmsh).\n"
+      "Exit: 0 success; 1 failed; 2 wrong usage.");
   try {
     tendon::usage::parse(app, argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -87,7 +87,7 @@ void run_gmsh(const std::filesystem::path& folder) {
   pid_t child = 0;
   const int refused = ::posix_spawnp(&child, "gmsh", &actions, nullptr, argv.data(), environ);
   posix_spawn_file_actions_destroy(&actions);
-  if (refused == ENOENT) throw std::runtime_error("gmsh is not installed (package gmsh): it makes the elements");
+  if (refused == ENOENT) throw std::runtime_error("gmsh is required, but not installed (package gmsh)");
   if (refused != 0) throw std::system_error(refused, std::generic_category(), "cannot start gmsh");
   int status = 0;
   while (::waitpid(child, &status, 0) < 0 && errno == EINTR) {
@@ -140,7 +140,7 @@ Mesh read_made(const std::string& text) {
     while (std::getline(file, line) && line != section) {
     }
     std::size_t count = 0;
-    if (!(file >> count)) throw std::runtime_error(std::string("gmsh's file has no ") + section);
+    if (!(file >> count)) throw std::runtime_error(std::string("the file of gmsh has no ") + section);
     return count;
   };
   for (std::size_t left = find("$Nodes"); left > 0; --left) {
@@ -164,9 +164,9 @@ Mesh read_made(const std::string& text) {
       words >> id;
       mesh.elements.push_back(number.at(id));
     }
-    if (!words) throw std::runtime_error("gmsh's file ends within an element");
+    if (!words) throw std::runtime_error("the file of gmsh is truncated");
   }
-  if (mesh.elements.empty()) throw std::runtime_error("gmsh has made no elements");
+  if (mesh.elements.empty()) throw std::runtime_error("gmsh has created no elements");
   return mesh;
 }
 
@@ -181,7 +181,7 @@ Mesh made_by_gmsh(const Triangles& body, const VolumeConfig& config, std::string
   words += said;
   const std::filesystem::path made = scratch.path() / "out.msh";
   if (!std::filesystem::exists(made) || said.find("Error ") != std::string::npos) {
-    throw std::runtime_error("gmsh could not fill the surface that begins with " + body.place(0));
+    throw std::runtime_error("gmsh could not mesh the surface that starts with " + body.place(0));
   }
   return read_made(read_file(made, kMaxMeshBytes));
 }
@@ -365,12 +365,12 @@ MeshReport report_on(const Mesh& mesh, const Triangles& surface) {
   report.median = quantile(0.5);
   if (report.worst < kPoorElement) {
     report.warnings.push_back("the worst element has a scaled Jacobian of " + hundredths(report.worst) +
-                              ": answers near it are wrong; other sizes may avoid it");
+                              ": forces near it are inaccurate; try other sizes");
   }
   if (std::abs(report.volume_error) > 0.05) {
     report.warnings.push_back("the mesh has " + hundredths(std::abs(100 * report.volume_error)) + " % " +
                               (report.volume_error < 0 ? "less" : "more") +
-                              " volume than the surface: smaller elements follow it more closely");
+                              " volume than the surface; use smaller elements");
   }
   return report;
 }

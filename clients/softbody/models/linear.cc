@@ -19,7 +19,7 @@ constexpr double kSteepest = 10;
 constexpr Eigen::Index kAtOnce = 64;  // makes CHOLMOD use products of matrices
 
 SymmetricMatrix stiffness_of(const Solid& solid, const Effects& effects) {
-  if (solid.law() != Law::kLinear) throw std::invalid_argument("a linear model wants the linear law");
+  if (solid.law() != Law::kLinear) throw std::invalid_argument("a linear model requires the linear law");
   SymmetricMatrix stiffness = solid.pattern();
   solid.stiffness(VectorXd::Zero(solid.size()), Solid::Curvature::kExact, stiffness);
   for (const auto& effect : effects) effect->add_stiffness(stiffness);
@@ -29,7 +29,7 @@ SymmetricMatrix stiffness_of(const Solid& solid, const Effects& effects) {
 Factor factor_of(const SymmetricMatrix& stiffness) {
   Factor factor(stiffness);
   if (!factor.factorize(stiffness)) {
-    throw std::runtime_error("the body can still move as a whole: more of its nodes must be fixed");
+    throw std::runtime_error("the body can still move as a whole: expected more fixed nodes");
   }
   return factor;
 }
@@ -243,7 +243,7 @@ Solver::Rough Solver::solve_roughly(const VectorXd& load) const {
 SolvedModel::SolvedModel(const Solid& solid, const TouchSurface& surface, const Patch& middle,
                          std::unique_ptr<Solver> solver)
     : solid_(solid), normal_(surface.normal()), solver_(std::move(solver)), slope_factor_(0) {
-  if (solid.law() != Law::kLinear) throw std::invalid_argument("a linear model wants the linear law");
+  if (solid.law() != Law::kLinear) throw std::invalid_argument("a linear model requires the linear law");
   MatrixXd loads(solid.free_count(), 2);
   for (Eigen::Index axis = 0; axis < 2; ++axis) {
     Patch reads = middle;
@@ -282,7 +282,7 @@ Reaction CondensedModel::press(const Patch& patch, Given given, double value) {
   rows_.clear();
   for (const int node : patch.nodes) {
     const int row = row_of_.at(at(node));
-    if (row < 0) throw std::out_of_range("the patch leaves the part of the body that was condensed");
+    if (row < 0) throw std::out_of_range("the patch leaves the condensed part of the body");
     rows_.push_back(row);
   }
   const auto size = patch.weights.size();

@@ -25,11 +25,11 @@ double secant(const Reaction& reaction, double rest) {
 }
 
 void Model::cut(const Division&, const EffectsConfig&) {
-  throw std::logic_error("a model was cut that is not one of those that can be");
+  throw std::logic_error("this model does not support cutting");
 }
 
 void Model::go_on_from(const Model&, std::span<const int>) {
-  throw std::logic_error("a model was cut that is not one of those that can be");
+  throw std::logic_error("this model does not support cutting");
 }
 
 Reaction settle(Model& model, const Patch& patch, Given given, double value, double tolerance, double most) {

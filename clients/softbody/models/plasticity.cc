@@ -67,7 +67,7 @@ PlasticSolid::PlasticSolid(const Solid& solid, const Yield& yield)
     : Solid(solid), yield_(yield), plastic_(at(mesh().element_count() * points_per_element()), Mat3::Zero()) {
   check(yield);
   if (law() != Law::kLinear && law() != Law::kCorotational) {
-    throw std::invalid_argument("plasticity wants the linear or the corotational law");
+    throw std::invalid_argument("plasticity requires the linear or the corotational law");
   }
 }
 

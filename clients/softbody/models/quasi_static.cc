@@ -68,7 +68,7 @@ QuasiStaticModel::QuasiStaticModel(const Elastic& elastic, const TouchSurface& s
   stiffness(Elastic::Curvature::kExact);
   stale_ = !factor_.factorize(stiffness_);
   if (stale_) {
-    throw std::runtime_error("the body can still move as a whole: more of its nodes must be fixed");
+    throw std::runtime_error("the body can still move as a whole: expected more fixed nodes");
   }
   if (!effects_.empty()) release();
   if (effects.has_time()) rest_ = u_;

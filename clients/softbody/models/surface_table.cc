@@ -27,7 +27,7 @@ std::size_t bytes_of(std::size_t nodes) {
 }
 
 SurfaceTable table_of(std::string_view bytes) {
-  if (!bytes.starts_with(kMagic)) throw std::invalid_argument("it does not begin as a table");
+  if (!bytes.starts_with(kMagic)) throw std::invalid_argument("it does not start with the header of a table");
   ByteReader reader(bytes.substr(kMagic.size()));
   const auto version = reader.take<std::uint32_t>();
   if (version != kVersion) {
@@ -40,7 +40,7 @@ SurfaceTable table_of(std::string_view bytes) {
   }
   const std::string_view body = bytes.substr(0, bytes.size() - sizeof(std::uint64_t));
   if (ByteReader(bytes.substr(body.size())).take<std::uint64_t>() != checksum(body)) {
-    throw std::invalid_argument("its checksum is another one: bytes have changed");
+    throw std::invalid_argument("its checksum does not match");
   }
   SurfaceTable table;
   table.body = reader.take<std::uint64_t>();
@@ -61,11 +61,11 @@ SurfaceTable table_of(std::string_view bytes) {
 void expect_passive(const SurfaceTable& table) {
   if (!table.compliance.allFinite()) throw std::invalid_argument("it has numbers that are not finite");
   const double largest = table.compliance.rows() > 0 ? table.compliance.diagonal().maxCoeff() : 0;
-  if (!(largest > 0)) throw std::invalid_argument("nothing in it gives way");
+  if (!(largest > 0)) throw std::invalid_argument("it has no compliance");
   Eigen::MatrixXd raised = table.compliance;
   raised.diagonal().array() += kRounding * largest;
   if (Eigen::LLT<Eigen::MatrixXd>(raised).info() != Eigen::Success) {
-    throw std::invalid_argument("it is not positive semidefinite: a body like this gives out energy");
+    throw std::invalid_argument("it is not positive semidefinite, so it would generate energy");
   }
 }
 
@@ -93,7 +93,8 @@ void write_table(const std::filesystem::path& file, const SurfaceTable& table) {
   if (std::ifstream before(file, std::ios::binary); before) {
     std::string beginning(kMagic.size(), '\0');
     before.read(beginning.data(), static_cast<std::streamsize>(beginning.size()));
-    if (before.gcount() > 0 && beginning != kMagic) throw std::runtime_error(file.string() + " is there, and no table");
+    if (before.gcount() > 0 && beginning != kMagic)
+      throw std::runtime_error(file.string() + " exists and is not a table");
   }
   std::string bytes(kMagic);
   put(bytes, kVersion);
@@ -122,7 +123,7 @@ SurfaceTable read_table(const std::filesystem::path& file) {
     expect_passive(table);
     return table;
   } catch (const std::invalid_argument& error) {
-    throw std::invalid_argument(file.string() + ": no table of a surface that can be used: " + error.what());
+    throw std::invalid_argument(file.string() + ": expected a table of a surface: " + error.what());
   }
 }
 

@@ -93,7 +93,8 @@ class SpreadSolver : public Solver {
         rows_(first_row(rank_of(comm_) + 1) - first_),
         iterates_(method == Method::kMultigrid ||
                   (method == Method::kChosen && size_ >= kMostForFactor && solid.largest_poisson() <= kMostPoisson)) {
-    if (size_ % 3 != 0) throw std::invalid_argument("on many ranks a node is held whole, or not at all");
+    if (size_ % 3 != 0)
+      throw std::invalid_argument("on several ranks, all coordinates of a node must be fixed, or none");
     assemble(solid);
     check(KSPCreate(comm_, krylov_.address()));
     check(KSPSetOperators(krylov_, matrix_, matrix_));
@@ -273,7 +274,7 @@ class SpreadSolver : public Solver {
     PetscReal least = 0;
     check(KSPComputeExtremeSingularValues(krylov_, &most, &least));
     check(KSPSetComputeSingularValues(krylov_, PETSC_FALSE));
-    if (!(least > 0)) throw std::runtime_error("PETSc: the body can still move as a whole: more nodes must be fixed");
+    if (!(least > 0)) throw std::runtime_error("PETSc: the body can still move as a whole: expected more fixed nodes");
     least_ = 0.8 * least;
     check(KSPSetUseFischerGuess(krylov_, 1, kRemembered));
   }

@@ -39,8 +39,8 @@ void expect_right_answers() {
   const SurfaceTable theirs = condense(block, [](const Solid& solid) { return on_ranks(solid, Method::kFactor); });
   const double off = (theirs.compliance - ours.compliance).cwiseAbs().maxCoeff() / ours.compliance.maxCoeff();
   if (!(off < 1e-7)) {
-    throw std::runtime_error("PETSc's answers about a small block are off by " + std::to_string(off) +
-                             " of the largest: nothing is made with it");
+    throw std::runtime_error("the results of PETSc for a small block have a relative error of " + std::to_string(off) +
+                             ", expected less than 1e-7");
   }
 }
 
@@ -57,7 +57,7 @@ class Told : public Solver {
   Eigen::MatrixXd solve(const Eigen::MatrixXd& loads) const override {
     Eigen::MatrixXd solution = solver_->solve(loads);
     columns_ += loads.cols();
-    std::cerr << "\r" << columns_ << " columns are solved " << std::flush;
+    std::cerr << "\r" << columns_ << " columns solved " << std::flush;
     return solution;
   }
 
@@ -89,7 +89,7 @@ int condense_scene(const Arguments& arguments, const Ranks& ranks) {
     std::cout << made.dump() << '\n';
   } else {
     std::cout << arguments.file << ": " << table.nodes.size() << " nodes, " << made["bytes"] << " bytes, "
-              << table.stiffness << " N/m at first touch, by " << ranks.count() << " ranks\n";
+              << table.stiffness << " N/m at first touch, with " << ranks.count() << " ranks\n";
   }
   return 0;
 }
@@ -139,30 +139,34 @@ int answer(const Arguments& arguments, const Ranks& ranks) {
 
 int main(int argc, char** argv) {
   CLI::App app(
-      "A soft body on as many ranks as MPI is started on, as tendon-fem starts them: with SCENE alone it answers the "
-      "front that the environment names.",
+      "Simulate a soft body on all MPI ranks. Started by tendon-fem with only SCENE, it answers the front that is "
+      "specified in\nthe environment.",
       "tendon-fem-worker");
   tendon::usage::dress(app);
   app.set_version_flag("--version", TENDON_VERSION);
   Arguments arguments;
   const auto add_common = [&](CLI::App& to) {
     to.add_option("SCENE", arguments.scene, "Scene file, with the model linear or condensed");
-    to.add_option("--way", arguments.method, "How the body is solved")
+    to.add_option("--way", arguments.method, "Solver for the body")
         ->transform(tendon::usage::one_of(std::map<std::string, Method>{
             {"chosen", Method::kChosen}, {"factor", Method::kFactor}, {"multigrid", Method::kMultigrid}}))
         ->default_str("chosen");
   };
   add_common(app);
-  CLI::App* const verb = app.add_subcommand("condense", "The table of a scene's condensed body, for [model] table");
+  CLI::App* const verb =
+      app.add_subcommand("condense", "Create the table of the condensed body of a scene, for [model] table");
   add_common(*verb);
-  verb->add_option("FILE", arguments.file, "The table")->required();
-  verb->add_flag("--json", arguments.json, "One JSON object on stdout");
+  verb->add_option("FILE", arguments.file, "Output file")->required();
+  verb->add_flag("--json", arguments.json, "Print one JSON object on stdout");
   app.footer(
-      "\nExamples:\n  mpirun -n 64 tendon-fem-worker condense liver.toml liver.table\n"
-      "  tendon-fem serve liver.toml --launch \"mpirun -n 64\"\n"
-      "\n`chosen` is a factor by MUMPS for small bodies, conjugate gradients with multigrid for large ones.\n"
-      "PETSC_OPTIONS chooses another solver: \"-ksp_type cg -pc_type gamg -ksp_rtol 1e-10\".\n"
-      "Exit: 0 done; 1 it failed, with a sentence; 2 wrong usage.");
+      "\n"
+      "Examples:\n"
+      "  mpirun -n 64 tendon-fem-worker condense liver.toml liver.table\n"
+      "  tendon-fem serve liver.toml --launch \"mpirun -n 64\"\n\n"
+      "`chosen` uses a factorization by MUMPS for small bodies, and conjugate gradients with multigrid for large "
+      "ones.\n"
+      "Set PETSC_OPTIONS for another solver, for example \"-ksp_type cg -pc_type gamg -ksp_rtol 1e-10\".\n"
+      "Exit: 0 success; 1 failed; 2 wrong usage.");
   try {
     tendon::usage::parse(app, argc, argv);
     if (arguments.scene.empty()) throw CLI::RequiredError("SCENE");

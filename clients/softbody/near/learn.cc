@@ -99,7 +99,7 @@ class Reads {
   std::size_t count(std::size_t each) {
     const auto size = from_.take<std::uint64_t>();
     if (size > from_.left() / sizeof(double) / std::max<std::size_t>(each, 1)) {
-      throw std::invalid_argument("it breaks off");
+      throw std::invalid_argument("it is truncated");
     }
     return size;
   }
@@ -144,21 +144,21 @@ std::string bytes_of(const typename Kind::Value& value, std::uint64_t digest) {
 template <class Kind>
 typename Kind::Value value_of(std::string_view bytes, std::uint64_t digest, const PressGrid& grid, const Solid& solid,
                               const TouchSurface& surface) {
-  if (!bytes.starts_with(Kind::kBegins)) throw std::invalid_argument("it begins otherwise");
-  if (bytes.size() < Kind::kBegins.size() + sizeof(std::uint64_t)) throw std::invalid_argument("it breaks off");
+  if (!bytes.starts_with(Kind::kBegins)) throw std::invalid_argument("it does not start with the expected header");
+  if (bytes.size() < Kind::kBegins.size() + sizeof(std::uint64_t)) throw std::invalid_argument("it is truncated");
   const std::string_view body = bytes.substr(0, bytes.size() - sizeof(std::uint64_t));
   if (ByteReader(bytes.substr(body.size())).take<std::uint64_t>() != checksum(body)) {
-    throw std::invalid_argument("its checksum is another one: bytes have changed");
+    throw std::invalid_argument("its checksum does not match");
   }
   ByteReader reader(body.substr(Kind::kBegins.size()));
   if (reader.take<std::uint64_t>() != kLearnedVersion || reader.take<std::uint64_t>() != digest) {
-    throw std::invalid_argument("it is of another body than its name says");
+    throw std::invalid_argument("it is for another body than its name");
   }
   typename Kind::Value value{.grid = grid};
   Reads reads(reader);
   Kind::pass(reads, value);
   if (reader.left() > 0 || !Kind::fits(value, solid, surface)) {
-    throw std::invalid_argument("its numbers do not fit the body");
+    throw std::invalid_argument("its data do not match the body");
   }
   return value;
 }
@@ -185,8 +185,8 @@ void read_kept(const std::filesystem::path& file, std::uint64_t digest, const Pr
   try {
     to = value_of<Kind>(read_file(file, kMostLearnedBytes), digest, grid, solid, surface);
   } catch (const std::invalid_argument& error) {
-    warnings.push_back(file.string() + " has not what was learned: " + error.what() +
-                       ". It is learned anew at each start, until that file is removed");
+    warnings.push_back(file.string() + " cannot be used: " + error.what() +
+                       ". The data are learned again at each start until this file is removed");
   }
 }
 

@@ -93,7 +93,7 @@ Factor factor_at_rest(const Solid& solid) {
   solid.stiffness(VectorXd::Zero(solid.size()), Elastic::Curvature::kExact, stiffness);
   Factor factor(stiffness);
   if (!factor.factorize(stiffness)) {
-    throw std::runtime_error("the body can still move as a whole: more of its nodes must be fixed");
+    throw std::runtime_error("the body can still move as a whole: expected more fixed nodes");
   }
   return factor;
 }

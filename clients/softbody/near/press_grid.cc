@@ -288,7 +288,7 @@ SolvedPresses solve_presses(const Solid& solid, const TouchSurface& surface, con
     }
   }
   if (std::ranges::none_of(all.knots, [](const SolvedPress& press) { return press.shape.size() > 0; })) {
-    throw std::invalid_argument("of all places to learn from none is on the body");
+    throw std::invalid_argument("expected at least one place for learning on the body, found none");
   }
   for (int level = PressGrid::kLevels; level-- > 0;) {  // starts at the last knots
     for (int i = 0; i + 1 < side; ++i) {

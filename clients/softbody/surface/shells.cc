@@ -92,25 +92,23 @@ void check_shells(const Triangles& surface, std::string_view name) {
   const std::vector<Shell> all = shells(surface);
   if (all.size() > kMostShells) {
     refuse_file(name, "has " + std::to_string(all.size()) + " parts, expected at most " + std::to_string(kMostShells) +
-                          ": leave out the specks");
+                          ": remove the small parts");
   }
   for (const Shell& shell : all) {
     if (is_cavity(shell) ? shell.volume < 0 : shell.volume > 0) continue;
     if (all.size() == 1) {
-      refuse_file(name, "the surface is turned inside out: its facets must run anticlockwise, seen from outside");
+      refuse_file(name, "the surface is turned inside out: expected facets anticlockwise, seen from outside");
     }
     const std::string part = "the closed part of " + counted(shell.facets.size(), "facet", "facets") +
-                             " that begins with " + surface.place(shell.facets.front());
+                             " that starts with " + surface.place(shell.facets.front());
     if (shell.depth == 0) {
-      refuse_file(name, part + " is turned inside out: its facets must run anticlockwise, seen from outside");
+      refuse_file(name, part + " is turned inside out: expected facets anticlockwise, seen from outside");
     }
     const std::string around = surface.place(all[at(shell.within)].facets.front());
-    refuse_file(name,
-                part + " lies within the one that begins with " + around +
-                    (is_cavity(shell) ? ", and looks outwards like it: turn its facets round where it is a cavity, "
-                                        "or leave it out"
-                                      : ", a cavity, and looks inwards like it: turn its facets round, or leave "
-                                        "it out"));
+    refuse_file(name, part + " is inside the one that starts with " + around +
+                          (is_cavity(shell)
+                               ? ", and has the same orientation: reverse its facets if it is a cavity, or remove it"
+                               : ", a cavity, and has the same orientation: reverse its facets, or remove it"));
   }
 }
 
@@ -152,9 +150,9 @@ std::vector<std::string> notes_on(const Triangles& surface) {
     if (those.size() < (cavities ? 1U : 2U)) return;
     const Shell& least = **std::ranges::min_element(those, {}, [](const Shell* s) { return std::abs(s->volume); });
     notes.push_back("the surface has " + counted(those.size(), cavities ? "cavity" : "body", what) +
-                    "; the smallest begins with " + surface.place(least.facets.front()));
+                    "; the smallest starts with " + surface.place(least.facets.front()));
   };
-  say(false, "bodies apart from each other");
+  say(false, "separate bodies");
   say(true, "cavities");
   return notes;
 }

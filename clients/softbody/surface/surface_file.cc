@@ -152,9 +152,9 @@ Facets read_text_stl(std::string_view text, std::string_view name) {
     if (is_first) break;
   }
   if (is_first) {
-    refuse_file(name, "expected an STL file: text that begins with \"solid\", or 84 bytes and 50 for each facet");
+    refuse_file(name, "expected an STL file: text that starts with \"solid\", or 84 bytes and 50 for each facet");
   }
-  if (in_facet || !corners.empty()) refuse_file(name, "ends within a facet");
+  if (in_facet || !corners.empty()) refuse_file(name, "truncated within a facet");
   return made;
 }
 
@@ -167,7 +167,7 @@ Facets read_stl(std::string_view bytes, std::string_view name) {
   without_mark(bytes, name);  // UTF-16 also contains zero bytes
   const bool more = bytes.size() > expected;
   const std::uint64_t off = more ? bytes.size() - expected : expected - bytes.size();
-  refuse_file(name, "the head of this binary STL file says " + std::to_string(count) + " facets, which take " +
+  refuse_file(name, "the header of this binary STL file has " + std::to_string(count) + " facets, which require " +
                         std::to_string(expected) + " bytes; it has " + std::to_string(off) +
                         (more ? " too many" : " too few") +
                         (off % kStlFacet == 0 ? ", as many as " + std::to_string(off / kStlFacet) + " facets" : ""));
@@ -199,7 +199,7 @@ void take_off_head(std::vector<std::string_view>& line, const SurfaceWords& word
   const std::size_t off = word.find("OFF");
   const std::string_view extra = word.substr(0, std::min(off, word.size()));
   if (off == std::string_view::npos || (extra.find_first_not_of("STCN4n") != std::string_view::npos)) {
-    words.fail("expected an OFF file, which begins with \"OFF\"");
+    words.fail("expected an OFF file, which starts with \"OFF\"");
   }
   if (extra.find_first_of("4n") != std::string_view::npos) {
     words.fail("expected points of three coordinates, found \"" + std::string(word) + '"');
@@ -210,14 +210,14 @@ void take_off_head(std::vector<std::string_view>& line, const SurfaceWords& word
   } else {
     line.front() = word;
   }
-  if (!line.empty() && line.front() == "BINARY") words.fail("a binary OFF file; save it as text");
+  if (!line.empty() && line.front() == "BINARY") words.fail("expected a text OFF file, found a binary file");
 }
 
 Facets read_off(std::string_view text, std::string_view name) {
   Facets made;
   SurfaceWords words(text, name);
   std::vector<std::string_view> head = words.next();
-  if (head.empty()) refuse_file(name, "expected an OFF file, which begins with \"OFF\"");
+  if (head.empty()) refuse_file(name, "expected an OFF file, which starts with \"OFF\"");
   take_off_head(head, words);
   if (head.empty()) head = words.next();
   if (head.size() < 2) words.fail("expected the numbers of points and facets");
@@ -226,14 +226,14 @@ Facets read_off(std::string_view text, std::string_view name) {
   if (points < 0 || facets < 0) words.fail("expected numbers of points and facets that are not below 0");
   for (long i = 0; i < points; ++i) {
     if (words.next().empty()) {
-      refuse_file(name, "ends after " + std::to_string(i) + " points of " + std::to_string(points));
+      refuse_file(name, "truncated after " + std::to_string(i) + " points of " + std::to_string(points));
     }
     made.points.push_back(words.point(0));
   }
   for (long i = 0; i < facets; ++i) {
     const auto& line = words.next();
     if (line.empty()) {
-      refuse_file(name, "ends after " + std::to_string(i) + " facets of " + std::to_string(facets));
+      refuse_file(name, "truncated after " + std::to_string(i) + " facets of " + std::to_string(facets));
     }
     const long count = words.whole(line[0]);
     if (count < 3 || static_cast<std::size_t>(count) >= line.size()) words.fail("expected three corners or more");

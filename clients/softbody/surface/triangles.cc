@@ -103,8 +103,8 @@ class Welded {
     }
     facets_ = std::move(made);
     if (flat > 0) {
-      note(counted(flat, "facet has", "facets have") + " fewer than three corners at different places, and " +
-           (flat == 1 ? "is" : "are") + " left out: facet " + std::to_string(example));
+      note(counted(flat, "facet has", "facets have") + " fewer than three different corners, and " +
+           (flat == 1 ? "is" : "are") + " ignored: facet " + std::to_string(example));
     }
   }
 
@@ -149,7 +149,7 @@ class Welded {
       made.ends.push_back(made.corners.size());
       numbers.push_back(numbers_[f]);
     }
-    note(counted(repeated, "facet is", "facets are") + " there again, and left out: " + example);
+    note(counted(repeated, "facet is", "facets are") + " duplicated and ignored: " + example);
     facets_ = std::move(made);
     numbers_ = std::move(numbers);
   }
@@ -165,14 +165,14 @@ class Welded {
         "facet " + std::to_string(numbers_[f]) + " at " + in_words(middle / static_cast<double>(corners.size()));
     if (corners.size() > kMostCorners) {
       refuse_file(name, who + " has " + std::to_string(corners.size()) + " corners, expected at most " +
-                            std::to_string(kMostCorners) + ": cut it into smaller ones");
+                            std::to_string(kMostCorners) + ": split it into smaller facets");
     }
     const Flat seen = flat(corners);
     const auto meet = sides_that_meet(seen);
     const auto triangles = meet ? std::vector<std::array<int, 3>>() : triangles_of(seen);
     if (triangles.empty()) {
       const auto [a, b] = meet.value_or(std::pair(0, 0));
-      refuse_file(name, who + " is not simple: its sides that begin at " + in_words(corners[at(a)]) + " and " +
+      refuse_file(name, who + " is not simple: its sides that start at " + in_words(corners[at(a)]) + " and " +
                             in_words(corners[at(b)]) + " meet");
     }
     return triangles;
@@ -192,16 +192,15 @@ void check_edges(const Triangles& surface, std::string_view name) {
     for (std::size_t i = 0; i < 3; ++i) {
       const auto [known, is_new] = edges.try_emplace({facet[i], facet[(i + 1) % 3]}, f, 0);
       if (++known->second.second > 1) {
-        refuse_file(name,
-                    surface.place(f) + " and " + surface.place(known->second.first) +
-                        " run along an edge in the same direction: one of them is turned inside out, or more than two "
-                        "facets meet there");
+        refuse_file(name, surface.place(f) + " and " + surface.place(known->second.first) +
+                              " use an edge in the same direction: one of them is turned inside out, or more than two "
+                              "facets share the edge");
       }
     }
   }
   for (const auto& [edge, facet] : edges) {
     if (!edges.contains({edge.second, edge.first})) {
-      refuse_file(name, surface.place(facet.first) + " has an edge that no other facet has: the surface is not closed");
+      refuse_file(name, surface.place(facet.first) + " has an edge without a second facet: the surface is not closed");
     }
   }
 }
@@ -269,12 +268,12 @@ void check_cuts(const Triangles& surface, std::string_view name) {
         for (std::size_t i = 0; i < 3; ++i) {
           if (pierces(own[i], own[(i + 1) % 3], theirs, rounding) ||
               pierces(theirs[i], theirs[(i + 1) % 3], own, rounding)) {
-            refuse_file(name, surface.place(f) + " and " + surface.place(other) + " cut each other");
+            refuse_file(name, surface.place(f) + " and " + surface.place(other) + " intersect");
           }
         }
         if (lie_on_each_other(own, theirs, kSamePlace * longest)) {
           refuse_file(name, surface.place(other) + " and " + surface.place(f) +
-                                " lie on each other: parts that touch must be one surface");
+                                " overlap: parts that touch must be one surface");
         }
       }
       there.push_back(f);

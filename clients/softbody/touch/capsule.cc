@@ -96,11 +96,11 @@ std::vector<CapsuleContact::Node> CapsuleContact::near(const Capsule& tool, doub
     if (!inside && (x - tool.nearest_of_axis(x)).norm() > radius_ + margin) continue;
     const Eigen::Index row = row_of_[around[k]];
     if (row < 0) {
-      if (inside) throw std::out_of_range("the capsule leaves the part of the body that was condensed");
+      if (inside) throw std::out_of_range("the capsule leaves the condensed part of the body");
       continue;
     }
     if (compliance_(3 * row, 3 * row) == 0) {
-      if (inside) throw std::out_of_range("the capsule touches a part of the body that is held");
+      if (inside) throw std::out_of_range("the capsule touches a fixed part of the body");
       continue;
     }
     Plane plane = tool.nearest(x, -n);

@@ -64,8 +64,8 @@ DistanceGrid::DistanceGrid(const std::function<double(const Vec3&)>& distance, c
   for (int axis = 0; axis < 3; ++axis) points *= std::ceil((high[axis] - low[axis]) / cell) + 1 + 2 * kAround;
   if (!(points <= static_cast<double>(kMostPoints))) {
     std::ostringstream text;
-    text << "cells of " << 1e3 * cell << " mm would make " << points << " points of a grid, expected at most "
-         << kMostPoints << ": larger cells";
+    text << "cells of " << 1e3 * cell << " mm require " << points << " grid points, expected at most " << kMostPoints
+         << ": use larger cells";
     throw std::invalid_argument(text.str());
   }
   for (int axis = 0; axis < 3; ++axis) {
@@ -85,7 +85,7 @@ DistanceGrid::DistanceGrid(const std::function<double(const Vec3&)>& distance, c
           if (std::abs(here - before) <= cell * (1 + kRoundingOfWay)) continue;
           std::ostringstream text;
           text << "the distance jumps from " << 1e3 * before << " to " << 1e3 * here << " mm at ("
-               << 1e3 * x.transpose() << ") mm: parts of the surface lie within others";
+               << 1e3 * x.transpose() << ") mm: parts of the surface are inside others";
           throw std::invalid_argument(text.str());
         }
         samples.values.push_back(here);

@@ -116,8 +116,8 @@ RigidContact::RigidContact(QuasiStaticModel& body, const Elastic& elastic, const
   expect(!tools_.empty(), "tools", 0, "1 or more");
   expect_above_zero(config.tolerance, "tolerance");
   expect(config.max_iterations >= 1, "max_iterations", config.max_iterations, "1 or more");
-  expect(body.step() == 0, "step", body.step(), "0: a body without time");
-  expect(body.self_collision() == nullptr, "self_collision", 1, "a body without it");
+  expect(body.step() == 0, "step", body.step(), "0: a quasi-static body");
+  expect(body.self_collision() == nullptr, "self_collision", 1, "a body without self-collision");
   for (const HeldTool& tool : tools_) placed_.push_back({&tool, std::nullopt});
 }
 

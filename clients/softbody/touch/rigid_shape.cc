@@ -48,8 +48,8 @@ double thickness_of(const Triangles& surface, const SurfaceDistance& distance, d
     if (behind >= kThinnestInCells) continue;
     std::ostringstream text;
     text << name << ": facet " << surface.number(f) << " at (" << 1e3 * middle.x() << ", " << 1e3 * middle.y() << ", "
-         << 1e3 * middle.z() << ") mm: the surface is thinner there than " << kThinnestInCells << " cells of "
-         << 1e3 * cell << " mm: smaller cells";
+         << 1e3 * middle.z() << ") mm: the surface is thinner than " << kThinnestInCells << " cells of " << 1e3 * cell
+         << " mm: use smaller cells";
     throw std::invalid_argument(text.str());
   }
   return least * cell;
@@ -98,7 +98,7 @@ RigidShape RigidShape::capsule(double radius, double half_length, const Vec3& ax
 RigidShape RigidShape::box(const Vec3& size, double edge) {
   for (const double length : size) expect_above_zero(length, "size");
   expect_above_zero(edge, "edge");
-  expect(edge <= size.minCoeff() / 2, "edge", edge, "at most half of the least size");
+  expect(edge <= size.minCoeff() / 2, "edge", edge, "at most half of the smallest size");
   return {size / 2 - Vec3::Constant(edge), edge, Mat3::Identity()};
 }
 

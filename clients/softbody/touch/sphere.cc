@@ -33,7 +33,7 @@ std::vector<SphereContact::Overlap> SphereContact::overlaps(const Vec3& q, doubl
     const double depth = surface_.height(surface_.nodes()[i]) - q.dot(n) + down;
     gap = std::min(gap, -depth);
     if (depth <= 0) continue;
-    if (row_of_[i] < 0) throw std::out_of_range("the sphere leaves the part of the body that was condensed");
+    if (row_of_[i] < 0) throw std::out_of_range("the sphere leaves the condensed part of the body");
     all.push_back({row_of_[i], depth, n - surface_.from_across(across) / down});
   }
   return all;

@@ -13,10 +13,9 @@ TEST(Answered, SaysTheSameCountsInWordsAndInJson) {
                       kNear};
   EXPECT_EQ(in_json(both), R"({"answers":{"tabulated":812,"learned":97,"linear":3,"fields":5,"fields_late":1}})"
                            "\n");
-  EXPECT_EQ(
-      in_words(both),
-      "812 answers were tabulated, 97 answers were learned, 3 answers were those of the linear body, 5 near fields "
-      "were made by the other thread, 1 of them came too late\n");
+  EXPECT_EQ(in_words(both),
+            "812 answers were tabulated, 97 answers were learned, 3 answers were from the linear body, 5 near fields "
+            "were computed by the other thread, 1 of them were too late\n");
 }
 
 TEST(Answered, WithoutAnotherThreadThereAreRungsAlone) {

@@ -309,7 +309,7 @@ int main(int argc, char** argv) {
                                      "Measures what an answer of each model costs. The options are those of Google's\n"
                                      "benchmark library.\n\n"
                                      "Example: tendon-bench-softbody --benchmark_filter=path/\n"
-                                     "Exit: 0 done; 2 wrong usage.\n",
+                                     "Exit: 0 success; 2 wrong usage.\n",
                                  .options = {"--benchmark_", "--v="}};
   if (const auto code = tendon::answer(usage, argc, argv)) return *code;
   benchmark::Initialize(&argc, argv);

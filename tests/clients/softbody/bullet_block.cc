@@ -132,7 +132,7 @@ int main(int argc, char** argv) {
                                      "Usage: tendon-bench-bullet\n\n"
                                      "Presses the block B1 as a deformable body of Bullet.\n\n"
                                      "Example: tendon-bench-bullet\n"
-                                     "Exit: 0 done; 2 wrong usage.\n"};
+                                     "Exit: 0 success; 2 wrong usage.\n"};
   if (const auto code = tendon::answer(usage, argc, argv)) return *code;
   for (const Law law : {Law::kLinear, Law::kNeoHookean}) {
     for (const int n : {4, 6, 8, 12}) {

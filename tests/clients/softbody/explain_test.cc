@@ -67,10 +67,10 @@ TEST(SoftbodyExplain, SaysWhatWasLearnedAndWhatAnswersCost) {
   const Explanation explanation = explain(scene, saying({0, 1e6}));
   ASSERT_EQ(explanation.learned.size(), 2U);
   const std::string text = in_words(scene, explanation);
-  EXPECT_NE(text.find("answers where it is good enough: tabulated, within "), std::string::npos) << text;
-  EXPECT_NE(text.find("answers where it is good enough: learned, within "), std::string::npos) << text;
-  EXPECT_NE(text.find(" in 80 of 80 cells, wrong by "), std::string::npos) << text;
-  EXPECT_NE(text.find("answers elsewhere: the near field, within "), std::string::npos) << text;
+  EXPECT_NE(text.find("answers, where accurate enough: tabulated, within "), std::string::npos) << text;
+  EXPECT_NE(text.find("answers, where accurate enough: learned, within "), std::string::npos) << text;
+  EXPECT_NE(text.find(" in 80 of 80 cells, error up to "), std::string::npos) << text;
+  EXPECT_NE(text.find("answers elsewhere: near field, within "), std::string::npos) << text;
   const auto json = nlohmann::json::parse(in_json(scene, explanation));
   EXPECT_EQ(json["learned"][0]["name"], "tabulated");
   EXPECT_EQ(json["learned"][1]["name"], "learned");
@@ -83,8 +83,8 @@ TEST(SoftbodyExplain, SaysHowMuchOfABodyIsNearTheTool) {
   Scene scene{.body = pressed_body(ModelKind::kNear, Element::kHex8Sri, 8)};
   const Explanation explanation = explain(scene, saying({0, 1e6}));
   const std::string text = in_words(scene, explanation);
-  EXPECT_NE(text.find("near the tool: corotational, 112 of 256 elements, within 45 mm or where the tool goes next; 312 "
-                      "unknowns, of them 60 modes in place of the 408 that near and far have in common\n"),
+  EXPECT_NE(text.find("near the tool: corotational, 112 of 256 elements, within 45 mm or on the path of the tool; 312 "
+                      "unknowns, including 60 modes instead of the 408 unknowns of the interface\n"),
             std::string::npos)
       << text;
   const auto json = nlohmann::json::parse(in_json(scene, explanation));
@@ -92,9 +92,8 @@ TEST(SoftbodyExplain, SaysHowMuchOfABodyIsNearTheTool) {
   EXPECT_EQ(json["near"]["modes"], 60);
   EXPECT_GT(json["bytes"], 100'000);
   const bool beside = factors_may_work_at_once();
-  EXPECT_NE(
-      text.find(beside ? "the next near field: by another thread" : "the next near field: about the shape at rest"),
-      std::string::npos)
+  EXPECT_NE(text.find(beside ? "next near field: in another thread" : "next near field: for the shape at rest"),
+            std::string::npos)
       << text;
   EXPECT_EQ(json["near"].contains("field_s"), beside);
   EXPECT_EQ(json["near"].contains("thread_bytes"), beside);
@@ -114,11 +113,11 @@ TEST(SoftbodyExplain, SixtyModesAreTheExactInterfaceToHalfAPercentWhenAsked) {
     EXPECT_LT(off, 0.005) << n;
     if (n > 8) continue;
     Explanation explanation = explain(scene, saying({0, 1e6}));
-    EXPECT_EQ(in_words(scene, explanation).find("beside the exact interface"), std::string::npos);
+    EXPECT_EQ(in_words(scene, explanation).find("compared with the exact interface"), std::string::npos);
     EXPECT_FALSE(nlohmann::json::parse(in_json(scene, explanation))["near"].contains("off_exact"));
     explanation.off_exact = 0.00123;
     EXPECT_NE(in_words(scene, explanation)
-                  .find("beside the exact interface: forces differ by 0.12 % at most, pressed by up to 4 mm\n"),
+                  .find("compared with the exact interface: forces differ by up to 0.12 % for depths up to 4 mm\n"),
               std::string::npos)
         << in_words(scene, explanation);
     EXPECT_EQ(nlohmann::json::parse(in_json(scene, explanation))["near"]["off_exact"], 0.00123);
@@ -135,11 +134,14 @@ TEST(SoftbodyExplain, SaysWhatAToolOfAFileIsAndCosts) {
   EXPECT_EQ(facts.facets, 1720);
   EXPECT_EQ(explanation.tool->made_s, 0.25);
   const std::string text = in_words(scene, explanation);
-  EXPECT_NE(text.find("a tool whose surface is " TENDON_SCENES "/spoon.off; with a torque"), std::string::npos) << text;
-  EXPECT_NE(text.find("\ntool: 1720 facets, "), std::string::npos) << text;
-  EXPECT_NE(text.find(std::to_string(facts.points) + " distances on a grid with cells of 0.8 mm, "), std::string::npos)
+  EXPECT_NE(text.find("with a tool with the surface " TENDON_SCENES "/spoon.off, with a torque"), std::string::npos)
       << text;
-  EXPECT_NE(text.find(" MB, made in 250 ms of processor time; its surface is right to "), std::string::npos) << text;
+  EXPECT_NE(text.find("\ntool: 1720 facets, "), std::string::npos) << text;
+  EXPECT_NE(text.find(std::to_string(facts.points) + " distances on a grid with a cell size of 0.8 mm, "),
+            std::string::npos)
+      << text;
+  EXPECT_NE(text.find(" MB, computed in 250 ms of processor time; accuracy of the surface "), std::string::npos)
+      << text;
   EXPECT_NE(text.find(" x 76 mm; "), std::string::npos) << text;
   const auto json = nlohmann::json::parse(in_json(scene, explanation));
   EXPECT_EQ(json["tool"]["bytes"], facts.bytes);
@@ -167,7 +169,7 @@ TEST(SoftbodyExplain, WhatAnEffectAddsIsTheDifferenceToTheBodyWithoutIt) {
     EXPECT_EQ(part.adds->bytes, bytes(scene.body) - bare);
     EXPECT_GT(part.adds->bytes, 0);
   }
-  EXPECT_NE(in_words(scene, explanation).find("gravity: the body sags under its weight; adds 150 ms and "),
+  EXPECT_NE(in_words(scene, explanation).find("gravity: the body deforms under its weight; adds 150 ms and "),
             std::string::npos)
       << in_words(scene, explanation);
   const auto json = nlohmann::json::parse(in_json(scene, explanation));

@@ -243,7 +243,7 @@ TEST(CutUnderLoad, ABodyThatSagsSagsMoreWhenItIsCut) {
 }
 
 TEST(Factor, OfTwoThreadsAtOnceIsRightWhereThatIsSaid) {
-  if (!factors_may_work_at_once()) GTEST_SKIP() << "this OpenBLAS is built for one thread";
+  if (!factors_may_work_at_once()) GTEST_SKIP() << "this OpenBLAS only supports one thread";
   const auto off_at_most = [](int cells) {
     const Solid solid = pressed_block(Element::kHex8Sri, cells, 0.45);
     SymmetricMatrix matrix = solid.pattern();
@@ -431,12 +431,12 @@ TEST(Cutting, APlanThatGoesWrongIsRefusedBeforeAnythingIsTouched) {
     return thrown_by([&] { Body body(config); });
   };
   EXPECT_EQ(refusal(across(0, 0.02)), "");
-  EXPECT_EQ(refusal(across(0, 0.02), 0), "cutting: cut 2 wants a force above 0");
+  EXPECT_EQ(refusal(across(0, 0.02), 0), "cutting: cut 2 expected a force above 0");
   EXPECT_EQ(refusal({Vec3::Zero(), Vec3::UnitX(), Vec3::UnitX()}), "cutting: cut 2 has no area");
   EXPECT_EQ(refusal({Vec3(1, 0, 0), Vec3::UnitX(), Vec3::UnitY()}),
-            "cutting: cut 2 lies between no two elements of the body");
+            "cutting: cut 2 does not separate any elements of the body");
   EXPECT_EQ(refusal({Vec3(-0.06, -0.06, 0.001), Vec3(0.12, 0, 0), Vec3(0, 0.12, 0)}),
-            "cutting: cut 2 lies between no two elements of the body");
+            "cutting: cut 2 does not separate any elements of the body");
   BodyConfig swinging = pressed_body(ModelKind::kLinear, Element::kHex8Sri, 4);
   swinging.cuts = {{across(0, 0.02), PlannedCut::When::kTime, 0}};
   swinging.effects = {.density = 1000, .step = 1e-3, .inertia = true};

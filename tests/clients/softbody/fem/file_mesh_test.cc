@@ -119,12 +119,12 @@ TEST_F(MeshOfAFile, ElementsThatAreThereTwiceCountOnce) {
   const BodyConfig twice = body_of(file.text());
   EXPECT_NEAR(stiffness(twice), kWhole, 1e-3);
   EXPECT_EQ(said_of(twice),
-            "block.msh: 128 elements are there again, and left out: element 2 has the nodes of element 1\n");
+            "block.msh: 128 elements are duplicated and ignored: element 2 has the nodes of element 1\n");
   file.orders = {{0, 1, 2, 3, 4, 5, 6, 7}, {2, 3, 0, 1, 6, 7, 4, 5}};
   EXPECT_NEAR(stiffness(body_of(file.text())), kWhole, 1e-3) << "with nodes in another order";
   file = {.times = [](At at) { return at.i == 3 && at.j == 4 && at.k == 1 ? 3 : 1; }};
   EXPECT_EQ(said_of(body_of(file.text())),
-            "block.msh: 2 elements are there again, and left out: element 101 has the nodes of element 100\n");
+            "block.msh: 2 elements are duplicated and ignored: element 101 has the nodes of element 100\n");
 }
 
 TEST_F(MeshOfAFile, NodesAtOnePlaceBecomeOneUnlessTheSceneSaysThatThereIsASlit) {
@@ -133,15 +133,14 @@ TEST_F(MeshOfAFile, NodesAtOnePlaceBecomeOneUnlessTheSceneSaysThatThereIsASlit) 
   const BodyConfig merged = body_of(file.text());
   EXPECT_NEAR(stiffness(merged), kWhole, 1e-3);
   EXPECT_EQ(said_of(merged),
-            "block.msh: 45 places had two nodes, which are merged, the first at (0, -50, 0); slits = true under [body] "
-            "keeps them apart\n");
+            "block.msh: 45 places had two nodes, which are merged, the first at (0, -50, 0); use slits = true in "
+            "[body] to keep them separate\n");
   const BodyConfig apart = body_of(file.text(), true);
   EXPECT_NEAR(stiffness(apart), kHalves, 1e-3);
-  EXPECT_EQ(
-      said_of(apart),
-      "block.msh: 45 places have two nodes, which stay apart, the first at (0, -50, 0)\n"
-      "block.msh: the mesh has 2 parts, which share no face; the smallest, of 128 elements, begins with element 1 "
-      "at (-43.75, -43.75, 6.25)\n");
+  EXPECT_EQ(said_of(apart),
+            "block.msh: 45 places have two nodes, which are not merged, the first at (0, -50, 0)\n"
+            "block.msh: the mesh has 2 parts without a common face; the smallest, of 128 elements, starts with element "
+            "1 at (-43.75, -43.75, 6.25)\n");
   file.side = [](At at) { return 64 * at.k + 8 * at.j + at.i; };
   EXPECT_NEAR(stiffness(body_of(file.text())), kWhole, 1e-3);
   EXPECT_NE(said_of(body_of(file.text())).find("397 places had two nodes or more, which are merged"), std::string::npos)
@@ -186,18 +185,20 @@ TEST_F(MeshOfAFile, APartThatNothingHoldsIsRefusedByItsElementAndPlace) {
   file.shift = [&](At at) { return loose(at) ? 10 : 0; };
   EXPECT_EQ(
       refusal(body_of(file.text())),
-      "block.msh: nothing holds the part of 1 element that begins with element 256 at (53.75, 43.75, 43.75) mm: it "
-      "shares no face with the other elements. Join it to them, hold it (clamped_below_mm), or leave it out");
+      "block.msh: there are no fixed nodes in the part of 1 element that starts with element 256 at (53.75, 43.75, "
+      "43.75) mm: it has no common face with the other elements. Connect it, fix it (clamped_below_mm), or remove it");
   file.side = [](At at) { return at.k < 2 ? 0 : 1; };
   file.shift = [](At at) { return at.k < 2 ? 0 : 1; };
-  EXPECT_NE(refusal(body_of(file.text())).find("nothing holds the part of 128 elements that begins with element 129"),
+  EXPECT_NE(refusal(body_of(file.text()))
+                .find("there are no fixed nodes in the part of 128 elements that starts with element 129"),
             std::string::npos);
   file.times = [](At at) { return at.k < 3 || (at.i == 7 && at.j == 7) ? 1 : 0; };
   file.side = [](At) { return 0; };
   file.shift = [](At) { return 0; };
   EXPECT_EQ(refusal(body_of(file.text())), "") << "on a face it is held";
   file.times = [](At at) { return at.k < 3 ? (at.i < 7 ? 1 : 0) : (at.i == 7 && at.j == 7 ? 1 : 0); };
-  EXPECT_NE(refusal(body_of(file.text())).find("nothing holds the part of 1 element that begins with element 169"),
+  EXPECT_NE(refusal(body_of(file.text()))
+                .find("there are no fixed nodes in the part of 1 element that starts with element 169"),
             std::string::npos)
       << refusal(body_of(file.text()));
 }
@@ -208,10 +209,9 @@ TEST_F(MeshOfAFile, PartsThatAreHeldByThemselvesAreSaid) {
   file.shift = [](At at) { return at.i < 6 ? 0 : 5; };
   const BodyConfig body = body_of(file.text());
   EXPECT_EQ(refusal(body), "");
-  EXPECT_EQ(
-      said_of(body),
-      "block.msh: the mesh has 2 parts, which share no face; the smallest, of 64 elements, begins with element 7 at "
-      "(36.25, -43.75, 6.25)\n");
+  EXPECT_EQ(said_of(body),
+            "block.msh: the mesh has 2 parts without a common face; the smallest, of 64 elements, starts with element "
+            "7 at (36.25, -43.75, 6.25)\n");
 }
 
 std::string refusal_of(const std::string& nodes, int count, const std::string& elements, int of_them) {
@@ -226,8 +226,7 @@ TEST(FileMesh, ElementsThatOverlapAreRefused) {
   const std::string nodes = "1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n5 0 0 -1\n6 0.2 0.2 2\n";
   EXPECT_EQ(refusal_of(nodes, 6, "7 4 0 1 2 3 4\n8 4 0 1 3 2 5\n", 2), "");
   EXPECT_EQ(refusal_of(nodes, 6, "7 4 0 1 2 3 4\n8 4 0 1 2 3 6\n", 2),
-            "a.msh: element 7 and element 8 at (0.3, 0.3, 0.5) overlap: they lie on the same side of a face that they "
-            "share");
+            "a.msh: element 7 and element 8 at (0.3, 0.3, 0.5) overlap: they are on the same side of a shared face");
   EXPECT_EQ(refusal_of(nodes, 6, "7 4 0 1 2 3 4\n8 4 0 1 3 2 5\n9 4 0 1 2 3 6\n", 3),
             "a.msh: element 7 and element 9 at (0.3, 0.3, 0.5) overlap: more than two elements share a face");
 }

@@ -138,10 +138,10 @@ TEST(Gmsh, NamesTheElementThatIsWrong) {
   };
   EXPECT_EQ(with("9 4 0 1 3 2 4"), "bad.msh: element 9 is turned inside out");
   EXPECT_EQ(with("9 4 0 1 2 3 5"), "bad.msh: element 9 has no volume");
-  EXPECT_EQ(with("9 4 0 1 2 3 6"), "bad.msh:15: element 9 has the node 6, which is not there");
+  EXPECT_EQ(with("9 4 0 1 2 3 6"), "bad.msh:15: element 9 has the node 6, which does not exist");
   EXPECT_EQ(with("9 4 0 1 2 3 3"), "bad.msh:15: element 9 has a node twice");
   EXPECT_EQ(with("9 11 0 1 2 3 4 5 1 2 3 4 5"),
-            "bad.msh:15: element 9 is neither a tetrahedron of 4 nodes nor a hexahedron of 8, 20 or 27");
+            "bad.msh:15: element 9: expected a tetrahedron with 4 nodes, or a hexahedron with 8, 20 or 27");
   EXPECT_EQ(with("9 4 0 1 2 3"), "bad.msh:16: expected a whole number, found \"$EndElements\"");
   EXPECT_EQ(with("9 99 0 1 2 3 4"), "bad.msh:15: unknown type of element: 99");
 }
@@ -149,14 +149,14 @@ TEST(Gmsh, NamesTheElementThatIsWrong) {
 TEST(Gmsh, RefusesWhatIsNotAMesh) {
   EXPECT_EQ(refusal(""), "bad.msh:1: expected $MeshFormat or $NOD, found the end of the file");
   EXPECT_NE(refusal("solid stl"), "");
-  EXPECT_EQ(refusal("$MeshFormat\n2.2 1 8\n"), "bad.msh:2: a binary file; save it as text");
+  EXPECT_EQ(refusal("$MeshFormat\n2.2 1 8\n"), "bad.msh:2: expected a text file, found a binary file");
   EXPECT_EQ(refusal("$MeshFormat\n3 0 8\n"), "bad.msh:2: expected format 2.2 or 4.1");
   EXPECT_EQ(refusal(kHead + "$Nodes\n99999999999\n"),
             "bad.msh:5: expected a count of at most 10 million, found 99999999999");
   EXPECT_EQ(refusal(kHead + "$Nodes\n1\n1 nan 0 0\n"), "bad.msh:6: expected a number, found \"nan\"");
   EXPECT_EQ(refusal(kHead + "$Nodes\n2\n1 0 0 0\n1 0 0 1\n"), "bad.msh:7: node 1 occurs twice");
   EXPECT_EQ(refusal(kHead + kFive + "$Elements\n1\n7 2 0 1 2 3\n$EndElements\n"),
-            "bad.msh: no volume element: this is a surface");
+            "bad.msh: expected volume elements, found only a surface");
 }
 
 }  // namespace

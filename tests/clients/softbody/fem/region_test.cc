@@ -134,7 +134,7 @@ TEST(Regions, TheLaterOneCountsAndOneWithoutAnElementIsRefused) {
     materials_of(mesh, soft, std::vector{inside, ball});
     FAIL() << "nothing is left of the smaller one";
   } catch (const std::invalid_argument& refused) {
-    EXPECT_EQ(std::string(refused.what()).find("region 1 has no element: "), 0U) << refused.what();
+    EXPECT_EQ(std::string(refused.what()).find("region 1 has no elements: "), 0U) << refused.what();
   }
 }
 
@@ -168,7 +168,7 @@ TEST(SoftbodyScene, RegionsArriveAndWhatIsWrongWithThemIsNamed) {
   EXPECT_EQ(refusal(testing::kGood + ball + "[[region]]\nmiddle_mm = [0, 0, 30]\nradius_mm = 12\n"),
             "s.toml: region[2].material: expected a table, found nothing");
   EXPECT_EQ(refusal(testing::kGood + "[[region]]\nmiddle_mm = [0, 0, 90]\nradius_mm = 12\n" + material),
-            "region 1 has no element: it is outside the body, smaller than an element, or under a later one");
+            "region 1 has no elements: it is outside the body, smaller than an element, or covered by a later region");
 }
 
 }  // namespace

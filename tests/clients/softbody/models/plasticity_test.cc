@@ -296,7 +296,7 @@ TEST(Plasticity, NonsenseIsRefusedByName) {
   EXPECT_EQ(refusal(soft_body(ModelKind::kNeoHookean)), "the model \"neo-hookean\" does not simulate plasticity");
   config = soft_body(ModelKind::kLinear);
   config.stiffening = StiffnessOverTime{.at = {0}, .factor = {2}};
-  EXPECT_EQ(refusal(config), "plasticity is not simulated together with stiffening");
+  EXPECT_EQ(refusal(config), "plasticity cannot be simulated together with stiffening");
   const Solid solid = pressed_block(Element::kHex8Sri, 2, 0.45, Law::kNeoHookean);
   EXPECT_THROW(PlasticSolid(solid, kSoft), std::invalid_argument);
 }

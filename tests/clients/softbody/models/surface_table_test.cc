@@ -101,7 +101,7 @@ TEST_F(SurfaceTableFile, OfAnotherBodyIsRefused) {
              c.regions = {{.where = Region::Ball{.middle = Vec3(0, 0, 0.03), .radius = 0.02}, .material = {1e5, 0.4}}};
            }},
           {"is the table of another body", [](auto& c) { c.material.young *= 1.0000001; }},
-          {"does not reach as far as reach_mm", [](auto& c) { c.reach = 0.03; }},
+          {"does not cover reach_mm", [](auto& c) { c.reach = 0.03; }},
       });
   BodyConfig nearer = from_file(8);
   nearer.reach = 0.005;
@@ -109,19 +109,19 @@ TEST_F(SurfaceTableFile, OfAnotherBodyIsRefused) {
 }
 
 TEST_F(SurfaceTableFile, ThatHasChangedBreaksOffOrIsNoneIsRefused) {
-  EXPECT_NE(reading().find("there is no such file"), std::string::npos);
+  EXPECT_NE(reading().find("no such file"), std::string::npos);
   write_table(file(), condense(block(4)));
   const std::string whole = bytes();
   for (const std::size_t at : {9U, 20U, 40U, 80U, 200U}) {
     std::string changed = whole;
     changed[at] = static_cast<char>(changed[at] ^ 1);
     put(changed);
-    EXPECT_NE(reading().find("no table of a surface that can be used"), std::string::npos) << at;
+    EXPECT_NE(reading().find("expected a table of a surface"), std::string::npos) << at;
   }
   put(whole.substr(0, whole.size() - 8));
   EXPECT_NE(reading().find("bytes, expected"), std::string::npos);
   put("TENDONST");
-  EXPECT_NE(reading().find("it breaks off"), std::string::npos);
+  EXPECT_NE(reading().find("it is truncated"), std::string::npos);
   put(whole + "1");
   EXPECT_NE(reading().find("bytes, expected"), std::string::npos);
 }
@@ -135,7 +135,7 @@ TEST_F(SurfaceTableFile, ThatWouldGiveOutEnergyOrAnswersOtherwiseIsRefused) {
   SurfaceTable softer = table;
   softer.compliance *= 1.001;
   write_table(file(), softer);
-  EXPECT_NE(thrown_by([&] { Body{from_file(4)}; }).find("does not answer as it did"), std::string::npos);
+  EXPECT_NE(thrown_by([&] { Body{from_file(4)}; }).find("does not reproduce the answers"), std::string::npos);
   SurfaceTable infinite = table;
   infinite.compliance(0, 0) = std::numeric_limits<double>::infinity();
   write_table(file(), infinite);
@@ -146,11 +146,11 @@ TEST_F(SurfaceTableFile, IsForTheModelCondensedAndForPatchesAndSpheres) {
   write_table(file(), condense(block(4)));
   BodyConfig linear = from_file(4);
   linear.model = ModelKind::kLinear;
-  EXPECT_EQ(thrown_by([&] { Body{linear}; }), "a table in a file is for the model \"condensed\"");
+  EXPECT_EQ(thrown_by([&] { Body{linear}; }), "a table in a file requires the model \"condensed\"");
   EXPECT_EQ(thrown_by([&] { condense(linear); }), "only the model \"condensed\" has a table");
   BodyConfig capsule = from_file(4);
   capsule.tool = CapsuleTool{.radius = 0.02, .half_length = 0};
-  EXPECT_EQ(thrown_by([&] { Body{capsule}; }), "a capsule wants more than a table in a file has");
+  EXPECT_EQ(thrown_by([&] { Body{capsule}; }), "a capsule cannot use a table in a file");
   BodyConfig sphere = from_file(4);
   sphere.tool = SphereTool{0.02};
   EXPECT_NO_THROW(Body{sphere});

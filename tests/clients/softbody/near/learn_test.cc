@@ -102,8 +102,8 @@ TEST_F(Learn, ADamagedFileIsNamedAndLeftAsItIsAndItIsLearnedAnew) {
     EXPECT_EQ(bytes_of(answers), bytes) << why;
     EXPECT_EQ(files().size(), 2U) << why;
   };
-  damage("", "it begins otherwise");
-  damage(good.substr(0, 12), "it breaks off");
+  damage("", "it does not start with the expected header");
+  damage(good.substr(0, 12), "it is truncated");
   damage(good.substr(0, good.size() - 9), "checksum");
   std::string flipped = good;
   flipped[100] = static_cast<char>(flipped[100] ^ 1);

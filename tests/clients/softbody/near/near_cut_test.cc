@@ -216,7 +216,7 @@ TEST(NearCut, AModelThatIsCutInPlaceTakesNoFieldOfTheBodyBefore) {
 }
 
 TEST(NearCut, AThreadOfItsOwnCutsWhileAnswersGoOn) {
-  if (!factors_may_work_at_once()) GTEST_SKIP() << "this OpenBLAS is built for one thread";
+  if (!factors_may_work_at_once()) GTEST_SKIP() << "this OpenBLAS only supports one thread";
   const std::vector<Cut> cuts{slit(0.025, 0.0375)};
   Body body(cut_body(Law::kNeoHookean, cuts));
   BackgroundThread thread;

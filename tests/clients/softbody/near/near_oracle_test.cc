@@ -378,7 +378,7 @@ TEST(NearOracle, WorkMayBeDoneWhenTheBodyIsGone) {
 }
 
 TEST(NearOracle, AThreadOfItsOwnKeepsAnswersRight) {
-  if (!factors_may_work_at_once()) GTEST_SKIP() << "this OpenBLAS is built for one thread";
+  if (!factors_may_work_at_once()) GTEST_SKIP() << "this OpenBLAS only supports one thread";
   NearBeside near(8, Law::kNeoHookean);
   BackgroundThread thread;
   near.model.make_fields_by([&](std::packaged_task<void()> work) { thread.give(std::move(work)); });

@@ -32,18 +32,16 @@ TEST(Shells, AShellWithinAnotherIsACavityOrIsRefused) {
   EXPECT_NEAR(hollow.volume(), 56'000, 1e-9);
   EXPECT_EQ(bodies(hollow).size(), 1U);
   EXPECT_EQ(notes_on(hollow),
-            (std::vector<std::string>{"the surface has 1 cavity; the smallest begins with facet 13 at "
-                                      "(-3.333, 3.333, -10)"}));
-  EXPECT_EQ(
-      refusal(together(cube(40), cube(20))),
-      "a: the closed part of 12 facets that begins with facet 13 at (-3.333, 3.333, -10) lies within the one that "
-      "begins with facet 1 at (-6.667, 6.667, -20), and looks outwards like it: turn its facets round where it is a "
-      "cavity, or leave it out");
-  EXPECT_EQ(
-      refusal(together(cube(20), cube(40))),
-      "a: the closed part of 12 facets that begins with facet 1 at (-3.333, 3.333, -10) lies within the one that "
-      "begins with facet 13 at (-6.667, 6.667, -20), and looks outwards like it: turn its facets round where it is a "
-      "cavity, or leave it out");
+            (std::vector<std::string>{
+                "the surface has 1 cavity; the smallest starts with facet 13 at (-3.333, 3.333, -10)"}));
+  EXPECT_EQ(refusal(together(cube(40), cube(20))),
+            "a: the closed part of 12 facets that starts with facet 13 at (-3.333, 3.333, -10) is inside the one that "
+            "starts with facet 1 at (-6.667, 6.667, -20), and has the same orientation: reverse its facets if it is a "
+            "cavity, or remove it");
+  EXPECT_EQ(refusal(together(cube(20), cube(40))),
+            "a: the closed part of 12 facets that starts with facet 1 at (-3.333, 3.333, -10) is inside the one that "
+            "starts with facet 13 at (-6.667, 6.667, -20), and has the same orientation: reverse its facets if it is a "
+            "cavity, or remove it");
   EXPECT_NE(refusal(together(turned_inside_out(cube(40)), turned_inside_out(cube(20)))).find("is turned inside out"),
             std::string::npos);
 }
@@ -59,7 +57,7 @@ TEST(Shells, ABodyInACavityIsABodyAndADeeperOneIsRefusedToo) {
   EXPECT_EQ(parts[1].place(0), "facet 25 at (-3.333, 3.333, -10)");
   const std::string wrong =
       refusal(together(together(cube(40), turned_inside_out(cube(30))), turned_inside_out(cube(20))));
-  EXPECT_NE(wrong.find("a cavity, and looks inwards like it"), std::string::npos) << wrong;
+  EXPECT_NE(wrong.find("a cavity, and has the same orientation"), std::string::npos) << wrong;
 }
 
 TEST(Shells, BodiesApartAreSaidAndOneThatIsInsideOutIsNamed) {
@@ -67,26 +65,26 @@ TEST(Shells, BodiesApartAreSaidAndOneThatIsInsideOutIsNamed) {
   EXPECT_EQ(refusal(two), "");
   EXPECT_EQ(bodies(two).size(), 2U);
   EXPECT_EQ(notes_on(two),
-            (std::vector<std::string>{"the surface has 2 bodies apart from each other; the smallest begins "
-                                      "with facet 13 at (48.33, 1.667, -5)"}));
+            (std::vector<std::string>{
+                "the surface has 2 separate bodies; the smallest starts with facet 13 at (48.33, 1.667, -5)"}));
   EXPECT_EQ(refusal(together(cube(40), turned_inside_out(cube(10, Vec3(50, 0, 0))))),
-            "a: the closed part of 12 facets that begins with facet 13 at (48.33, 1.667, -5) is turned inside out: its "
-            "facets must run anticlockwise, seen from outside");
+            "a: the closed part of 12 facets that starts with facet 13 at (48.33, 1.667, -5) is turned inside out: "
+            "expected facets anticlockwise, seen from outside");
 }
 
 TEST(Shells, PartsThatTouchAreRefusedWhereTheyDo) {
   const std::string stands = refusal(together(cube(40), cube(10, Vec3(3, 4, 25))));
-  EXPECT_NE(stands.find("lie on each other: parts that touch must be one surface"), std::string::npos) << stands;
+  EXPECT_NE(stands.find("overlap: parts that touch must be one surface"), std::string::npos) << stands;
   EXPECT_NE(stands.find("facet 13 at (1.333, 5.667, 20)"), std::string::npos) << stands;
   const std::string within = refusal(together(cube(40), cube(10, Vec3(0, 0, 15))));
-  EXPECT_NE(within.find("lie on each other"), std::string::npos) << within;
+  EXPECT_NE(within.find(" overlap"), std::string::npos) << within;
   EXPECT_EQ(refusal(together(cube(40), cube(10, Vec3(0, 0, 25.001)))), "");
 }
 
 TEST(Shells, ATooLargeNumberOfPartsIsRefused) {
   Triangles specks = cube(1);
   for (int i = 1; i <= 1000; ++i) specks = together(specks, cube(1, Vec3(2 * i, 0, 0)));
-  EXPECT_EQ(refusal(specks), "a: has 1001 parts, expected at most 1000: leave out the specks");
+  EXPECT_EQ(refusal(specks), "a: has 1001 parts, expected at most 1000: remove the small parts");
 }
 
 }  // namespace

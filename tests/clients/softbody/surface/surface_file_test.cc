@@ -48,8 +48,8 @@ TEST(SurfaceFile, ReadsEveryHeadOfOffThatHasThreeCoordinates) {
   }
   EXPECT_EQ(refusal("4OFF\n4 4 0\n", ".off"), "a.off: line 1: expected points of three coordinates, found \"4OFF\"");
   EXPECT_EQ(refusal("nOFF\n4 4 0\n", ".off"), "a.off: line 1: expected points of three coordinates, found \"nOFF\"");
-  EXPECT_EQ(refusal("OFF BINARY\n", ".off"), "a.off: line 1: a binary OFF file; save it as text");
-  EXPECT_EQ(refusal("SOFTOFF\n", ".off"), "a.off: line 1: expected an OFF file, which begins with \"OFF\"");
+  EXPECT_EQ(refusal("OFF BINARY\n", ".off"), "a.off: line 1: expected a text OFF file, found a binary file");
+  EXPECT_EQ(refusal("SOFTOFF\n", ".off"), "a.off: line 1: expected an OFF file, which starts with \"OFF\"");
   EXPECT_EQ(refusal("OFF 4 3 0\n" + kTetrahedron + kItsFacets, ".off"),
             "a.off: line 9: expected the end of the file after 3 facets");
 }
@@ -93,10 +93,10 @@ TEST(SurfaceFile, ReadsTextOfStlInUpperCaseInOneLineAndWithAnyName) {
   EXPECT_NEAR(volume(with_all(text, "\n", "\r\n"), ".stl"), kItsVolume, 1e-12);
   EXPECT_NEAR(volume(with_all(text, "solid part", "solid vertex endloop"), ".stl"), kItsVolume, 1e-12);
   EXPECT_NEAR(volume(with_all(text, "solid part", "solid"), ".stl"), kItsVolume, 1e-12);
-  EXPECT_EQ(refusal(text.substr(0, text.rfind("endloop")), ".stl"), "a.stl: ends within a facet");
-  EXPECT_EQ(refusal(text.substr(0, text.rfind("outer")), ".stl"), "a.stl: ends within a facet");
+  EXPECT_EQ(refusal(text.substr(0, text.rfind("endloop")), ".stl"), "a.stl: truncated within a facet");
+  EXPECT_EQ(refusal(text.substr(0, text.rfind("outer")), ".stl"), "a.stl: truncated within a facet");
   EXPECT_EQ(refusal("", ".stl"),
-            "a.stl: expected an STL file: text that begins with \"solid\", or 84 bytes and 50 for each facet");
+            "a.stl: expected an STL file: text that starts with \"solid\", or 84 bytes and 50 for each facet");
 }
 
 std::string binary_stl() {
@@ -109,7 +109,7 @@ std::string binary_stl() {
 TEST(SurfaceFile, SaysByHowMuchABinaryStlIsTooLongOrTooShort) {
   std::string bytes = binary_stl();
   EXPECT_NEAR(volume(bytes, ".stl"), kItsVolume, 1e-12);
-  const std::string head = "a.stl: the head of this binary STL file says 4 facets, which take 284 bytes; it has ";
+  const std::string head = "a.stl: the header of this binary STL file has 4 facets, which require 284 bytes; it has ";
   EXPECT_EQ(refusal(bytes + "x", ".stl"), head + "1 too many");
   EXPECT_EQ(refusal(bytes.substr(0, 283), ".stl"), head + "1 too few");
   EXPECT_EQ(refusal(bytes.substr(0, 184), ".stl"), head + "100 too few, as many as 2 facets");
@@ -117,13 +117,12 @@ TEST(SurfaceFile, SaysByHowMuchABinaryStlIsTooLongOrTooShort) {
   EXPECT_NEAR(volume(bytes, ".stl"), kItsVolume, 1e-12);
   EXPECT_EQ(refusal(bytes + "x", ".stl"), head + "1 too many");
   bytes.replace(80, 4, std::string(4, '\0'));
-  EXPECT_EQ(
-      refusal(bytes, ".stl"),
-      "a.stl: the head of this binary STL file says 0 facets, which take 84 bytes; it has 200 too many, as many as 4 "
-      "facets");
+  EXPECT_EQ(refusal(bytes, ".stl"),
+            "a.stl: the header of this binary STL file has 0 facets, which require 84 bytes; it has 200 too many, as "
+            "many as 4 facets");
   EXPECT_EQ(refusal(bytes.substr(0, 84), ".stl"), "a.stl: has no facet");
   EXPECT_EQ(refusal(bytes.substr(0, 20), ".stl"),
-            "a.stl: the head of this binary STL file says 0 facets, which take 84 bytes; it has 64 too few");
+            "a.stl: the header of this binary STL file has 0 facets, which require 84 bytes; it has 64 too few");
 }
 
 TEST(SurfaceFile, SkipsTheMarkOfUtf8AndNamesThatOfUtf16) {
@@ -147,16 +146,16 @@ std::string notes_of(const std::string& text, const std::string& ending) {
 
 TEST(SurfaceFile, SaysWhatIsRepairedInIt) {
   EXPECT_EQ(notes_of("OFF 4 5 0\n" + kTetrahedron + kItsFacets + "3 1 0 2\n", ".off"),
-            "1 facet is there again, and left out: facet 5 is facet 1\n");
-  EXPECT_EQ(notes_of(kObj + kObj, ".obj"), "4 facets are there again, and left out: facet 5 is facet 1\n")
+            "1 facet is duplicated and ignored: facet 5 is facet 1\n");
+  EXPECT_EQ(notes_of(kObj + kObj, ".obj"), "4 facets are duplicated and ignored: facet 5 is facet 1\n")
       << "the points of the second are of no use";
   EXPECT_EQ(notes_of("OFF 8 8 0\n" + kTetrahedron + kTetrahedron + kItsFacets + "3 4 6 5\n3 4 5 7\n3 4 7 6\n3 5 6 7\n",
                      ".off"),
             "4 places have two points or more, which are merged, the first at (0, 0, 0)\n"
-            "4 facets are there again, and left out: facet 5 is facet 1\n");
-  EXPECT_EQ(notes_of(text_stl() + text_stl(), ".stl"), "4 facets are there again, and left out: facet 5 is facet 1\n");
+            "4 facets are duplicated and ignored: facet 5 is facet 1\n");
+  EXPECT_EQ(notes_of(text_stl() + text_stl(), ".stl"), "4 facets are duplicated and ignored: facet 5 is facet 1\n");
   EXPECT_EQ(notes_of("OFF 4 6 0\n" + kTetrahedron + "3 0 0 1\n" + kItsFacets + "4 1 1 2 2\n", ".off"),
-            "2 facets have fewer than three corners at different places, and are left out: facet 1\n");
+            "2 facets have fewer than three different corners, and are ignored: facet 1\n");
 }
 
 TEST(SurfaceFile, APointThatNoFacetHasChangesNothing) {
@@ -197,12 +196,12 @@ TEST(SurfaceFile, PrismsOverAnLAndAUHaveTheirVolumeFromEveryCorner) {
 TEST(SurfaceFile, FacetsAreNumberedAsInTheFile) {
   const std::vector<std::array<int, 2>> bow{{0, 0}, {20, 20}, {20, 0}, {0, 20}};
   EXPECT_EQ(refusal(prism(bow, 0), ".obj"),
-            "a.obj: facet 1 at (10, 10, 10) is not simple: its sides that begin at (0, 0, 10) and (20, 0, 10) meet");
+            "a.obj: facet 1 at (10, 10, 10) is not simple: its sides that start at (0, 0, 10) and (20, 0, 10) meet");
   const std::vector<std::array<int, 2>> l{{0, 0}, {30, 0}, {30, 10}, {10, 10}, {10, 30}, {0, 30}};
   std::string open = prism(l, 0);
   open = open.substr(0, open.rfind("f "));
   const std::string said = refusal(open, ".obj");
-  EXPECT_NE(said.find("has an edge that no other facet has"), std::string::npos) << said;
+  EXPECT_NE(said.find("has an edge without a second facet"), std::string::npos) << said;
   EXPECT_TRUE(said.starts_with("a.obj: facet 3 ") || said.starts_with("a.obj: facet 1 ") ||
               said.starts_with("a.obj: facet 2 ") || said.starts_with("a.obj: facet 7 "))
       << said;
@@ -210,7 +209,7 @@ TEST(SurfaceFile, FacetsAreNumberedAsInTheFile) {
   for (int i = 0; i < 10'001; ++i) many += std::to_string(i) + " " + std::to_string(1e-4 * i * i) + " 0\n";
   many += "10001";
   for (int i = 0; i < 10'001; ++i) many += " " + std::to_string(i);
-  EXPECT_NE(refusal(many, ".off").find("has 10001 corners, expected at most 10000: cut it into smaller ones"),
+  EXPECT_NE(refusal(many, ".off").find("has 10001 corners, expected at most 10000: split it into smaller facets"),
             std::string::npos);
 }
 

@@ -482,15 +482,15 @@ TEST(RigidScene, ItsKeysAreItsOwnAndItRefusesWhatItCannotDo) {
   }
   expect_refusals(config, Makes<Body>(),
                   {
-                      {"a box wants the model", [](auto& c) { c.model = ModelKind::kCondensed; }},
-                      {"several hands want a rigid tool",
+                      {"a box requires the model", [](auto& c) { c.model = ModelKind::kCondensed; }},
+                      {"several hands require a rigid tool",
                        [](auto& c) {
                          c.tool = PatchTool{};
                          c.hands = 2;
                        }},
-                      {"a box presses no body with inertia",
+                      {"a box cannot press a body with inertia",
                        [](auto& c) { c.effects = {.density = 1000, .step = 1e-3, .inertia = true}; }},
-                      {"a box presses no body with self-collision", [](auto& c) { c.self_collision = 1e-4; }},
+                      {"a box cannot press a body with self-collision", [](auto& c) { c.self_collision = 1e-4; }},
                       {"stiffen",
                        [](auto& c) {
                          c.stiffening = StiffnessOverTime{.at = {0, 1}, .factor = {1, 2}};

@@ -141,7 +141,7 @@ TEST(CapsuleScene, ItsKeysAreItsOwnAndItRefusesWhatItCannotDo) {
   }
   expect_refusals(config, Makes<Body>(),
                   {
-                      {"a capsule wants the model", [](auto& c) { c.model = ModelKind::kLinear; }},
+                      {"a capsule requires the model", [](auto& c) { c.model = ModelKind::kLinear; }},
                       {"a capsule has no friction on the model", [](auto& c) { c.friction = 0.3; }},
                       {"norm of tool_axis = 2", [](auto& c) { std::get<CapsuleTool>(c.tool).axis = Vec3(0, 0, 2); }},
                       {"radius", [](auto& c) { std::get<CapsuleTool>(c.tool).radius = 0; }},

@@ -108,7 +108,7 @@ std::unique_ptr<Model> model_of(Kind kind, const Solid& solid, const TouchSurfac
 
 Patch patch_around(const TouchSurface& surface, const Vec3& middle) {
   if (auto found = surface.patch(surface.across(middle))) return *std::move(found);
-  throw std::invalid_argument("the middle of the touched side is not on the body");
+  throw std::invalid_argument("the centre of the touched side is not on the body");
 }
 
 }  // namespace

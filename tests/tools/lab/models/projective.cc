@@ -51,7 +51,7 @@ Factor factor_of(const Solid& solid, const Effects& effects) {
   for (const auto& effect : effects) effect->add_stiffness(matrix);
   Factor factor(matrix);
   if (!factor.factorize(matrix)) {
-    throw std::runtime_error("the body can still move as a whole: more of its nodes must be fixed");
+    throw std::runtime_error("the body can still move as a whole: expected more fixed nodes");
   }
   return factor;
 }
