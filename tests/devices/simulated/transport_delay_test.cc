@@ -201,13 +201,12 @@ TEST(TransportDelay, OfALoopThatIsFasterThanThatTheNewestForceStillArrives) {
 }
 
 TEST(TransportDelay, RefusesADelayThatIsNone) {
-  expect_refusals(
-      free_mass(1ms, 1ms), Makes<SimulatedDevice>(),
-      {
-          {"sample_delay = 0: expected above 0 s, at most 0.1 s", [](auto& c) { c.sample_delay = 0ms; }},
-          {"sample_delay = -0.001: expected", [](auto& c) { c.sample_delay = -1ms; }},
-          {"force_delay = 0.101: expected", [](auto& c) { c.force_delay = 101ms; }},
-      });
+  expect_refusals(free_mass(1ms, 1ms), Makes<SimulatedDevice>(),
+                  {
+                      {"sample_delay = 0: expected above 0 s, at most 0.1 s", [](auto& c) { c.sample_delay = 0ms; }},
+                      {"sample_delay = -0.001: expected", [](auto& c) { c.sample_delay = -1ms; }},
+                      {"force_delay = 0.101: expected", [](auto& c) { c.force_delay = 101ms; }},
+                  });
 }
 
 }  // namespace
