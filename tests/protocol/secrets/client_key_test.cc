@@ -35,7 +35,8 @@ TEST(ClientKey, ComesOutOfItsFileAsItWentIn) {
 TEST(ClientKey, IsRefusedWhenAnybodyButItsOwnerMayReadOrWriteIt) {
   const std::string text = key_file_text(some_key(1));
   for (const unsigned mode : {0640U, 0604U, 0620U, 0602U, 0644U, 0610U}) {
-    EXPECT_NE(refusal(text, 0100000U | mode).find("other users can read or write"), std::string::npos) << std::oct << mode;
+    EXPECT_NE(refusal(text, 0100000U | mode).find("other users can read or write"), std::string::npos)
+        << std::oct << mode;
   }
   for (const unsigned mode : {0600U, 0400U, 0700U}) EXPECT_EQ(refusal(text, 0100000U | mode), "") << std::oct << mode;
 }
@@ -55,8 +56,7 @@ TEST(ClientKey, ARefusalSaysWhatIsWrongAndNeverTheKey) {
        {Case{"", "expected one line"}, Case{digits, "got 1 words"}, Case{"admin " + digits, "begins with neither"},
         Case{"controller " + digits.substr(2), "too short: expected 64 hexadecimal digits, got 62"},
         Case{"controller " + digits + "ab", "too long"},
-        Case{"controller x" + digits.substr(1), "not hexadecimal digits"},
-        Case{good + good, "several lines"}}) {
+        Case{"controller x" + digits.substr(1), "not hexadecimal digits"}, Case{good + good, "several lines"}}) {
     const std::string said = refusal(c.text);
     EXPECT_NE(said.find(c.says), std::string::npos) << said;
     EXPECT_EQ(said.find(digits.substr(8, 16)), std::string::npos) << said;

@@ -139,7 +139,8 @@ TEST(PartRecorder, CountsTheStepsOfADeletedFileAsMissingAndGoesOnInItsFolder) {
   const auto notices = recorder.take_notices();
   ASSERT_EQ(notices.size(), 1U) << "not one each second";
   EXPECT_TRUE(notices[0].warning);
-  EXPECT_NE(notices[0].text.find(path.string() + ": it was deleted in the meantime"), std::string::npos) << notices[0].text;
+  EXPECT_NE(notices[0].text.find(path.string() + ": it was deleted in the meantime"), std::string::npos)
+      << notices[0].text;
 
   fs::create_directory(path.parent_path());
   record_run(recorder, 2000, 2000);
