@@ -125,7 +125,7 @@ TEST(Inject, ARunInWhichNothingCameBackIsInvalidAndSaysSo) {
   proxy.process().wait_for_line(R"("forwarded":3)");
   proxy.process().signal(SIGINT);
   EXPECT_EQ(proxy.process().wait(), 1);
-  const std::string why = "nothing came back from " + to_string(nobody);
+  const std::string why = "no answer from " + to_string(nobody);
   EXPECT_NE(proxy.process().out().find("\"invalid_because\":[\"" + why), std::string::npos) << proxy.process().out();
   EXPECT_NE(proxy.process().err().find("tendon-inject: " + why), std::string::npos) << proxy.process().err();
 }
@@ -139,10 +139,9 @@ TEST(Inject, SaysThatFurtherClientsAreRefusedAndWhy) {
   for (int client = 0; client < 3; ++client) send_through(server, proxy.address(), 1);
   proxy.process().wait_for_line(R"("refused_clients":1)");
   proxy.stop();
-  EXPECT_NE(
-      proxy.process().err().find("tendon-inject: 1 datagrams of further clients are refused: 2 is the most at one "
-                                 "time (--max-clients), and one is forgotten after 30 s of silence"),
-      std::string::npos)
+  EXPECT_NE(proxy.process().err().find("tendon-inject: 1 datagrams of further clients refused: 2 clients are the "
+                                       "maximum (--max-clients); a client is removed after 30 s of silence"),
+            std::string::npos)
       << proxy.process().err();
 }
 

@@ -135,16 +135,16 @@ std::vector<int> twins(const Elastic& divided, const Division& division) {
 Cutting::Cutting(std::vector<PlannedCut> plan) : plan_(std::move(plan)) {
   for (std::size_t i = 0; i < plan_.size(); ++i) {
     const auto refuse = [&](const std::string& what) {
-      throw std::invalid_argument("cutting: cut " + std::to_string(i + 1) + ' ' + what);
+      throw std::invalid_argument("cutting: cut " + std::to_string(i + 1) + what);
     };
     const Cut& cut = plan_[i].cut;
     if (!cut.corner.allFinite() || !(cut.along.cross(cut.deep).norm() > 0) ||
         !std::isfinite(cut.along.cross(cut.deep).norm())) {
-      refuse("has no area");
+      refuse(" has no area");
     }
     const bool timed = plan_[i].when == PlannedCut::When::kTime;
-    if (timed && !(plan_[i].value >= 0)) refuse("expected a time of 0 or more");
-    if (!timed && !(plan_[i].value > 0)) refuse("expected a force above 0");
+    if (timed && !(plan_[i].value >= 0)) refuse(": expected a time of 0 or more");
+    if (!timed && !(plan_[i].value > 0)) refuse(": expected a force above 0");
   }
   made_.reserve(plan_.size());
 }

@@ -15,31 +15,28 @@ namespace tendon::injector {
 namespace {
 
 constexpr const char* kAbout =
-    "A bad network that can be replayed, as a UDP proxy: between any client and any server, without root.\n"
-    "Prints the seed of every run: the same seed and the same traffic meet the same fates.";
+    "Simulate a bad network, reproducibly: a UDP proxy between any client and any server, without root.\n"
+    "Prints the seed of every run. The same seed and the same traffic give the same result.";
 
 constexpr const char* kExamples =
     "Examples\n"
-    "  a bad Wi-Fi; clients connect to port 47101 instead of 47100\n"
+    "  Simulate a bad Wi-Fi. Clients connect to port 47101 instead of 47100\n"
     "    tendon-inject --listen 127.0.0.1:47101 --to 127.0.0.1:47100 --profile wifi-bad --seed 7\n"
-    "  20 ms each way, one datagram in fifty lost, in bursts of three; the way down is slow besides\n"
+    "  Delay by 20 ms each way, and lose 2 % in bursts of three; limit the rate to the client\n"
     "    tendon-inject --listen 127.0.0.1:47101 --to 127.0.0.1:47100 --profile 'delay=20ms loss=burst(2%,3)' \\\n"
     "      --down 'delay=20ms rate=1Mbit/s queue=20packets'\n"
-    "  record a run, and meet the same fates once more\n"
+    "  Record a run, and repeat it\n"
     "    tendon-inject --listen 127.0.0.1:47101 --to 127.0.0.1:47100 --profile lte-driving --record run.csv\n"
     "    tendon-inject --listen 127.0.0.1:47101 --to 127.0.0.1:47100 --replay run.csv\n"
-    "  what would happen to 1000 packets, in no time\n"
-    "    tendon-inject --dry-run --count 1000 --seed 7 --profile wifi-bad --json\n"
-    "\n"
-    "Live: type a command while it runs in a terminal, or use --control PATH and `tendon-inject control PATH "
+    "  Print what would happen to 1000 packets, without sending them\n"
+    "    tendon-inject --dry-run --count 1000 --seed 7 --profile wifi-bad --json\n\n"
+    "Commands during a run: type them in the terminal, or use --control PATH and `tendon-inject control PATH "
     "COMMAND`:\n"
-    "  up|down|both LINE|NAME    another network from now on; `link N up …` for client N only\n"
-    "  stats                     the report as one JSON object\n"
-    "  note TEXT                 into the trace\n"
-    "  stop                      the end\n"
-    "\n"
-    "Exit: 0 done; 1 failed, or the run was INVALID: the proxy could not keep up with the network that it was asked "
-    "for;\n"
+    "  up|down|both LINE|NAME    change the network now; `link N up …` for client N only\n"
+    "  stats                     print the report as one JSON object\n"
+    "  note TEXT                 add a note to the trace\n"
+    "  stop                      end the run\n\n"
+    "Exit: 0 success; 1 failed, or the run was INVALID, because the proxy could not simulate the network exactly;\n"
     "2 wrong usage.";
 
 /// CLI11 would accept -1 as 2⁶⁴ − 1.
@@ -106,60 +103,60 @@ struct Subcommands {
 
 Subcommands add_subcommands(CLI::App& app, Said& said) {
   Subcommands verbs{};
-  verbs.control = app.add_subcommand("control", "send one command to a tendon-inject that runs with --control PATH");
-  verbs.control->add_option("PATH", said.control_path, "its socket")->required();
-  verbs.control->add_option("COMMAND", said.control_words, "for example: up wifi-bad")->required();
+  verbs.control = app.add_subcommand("control", "Send one command to a running tendon-inject with --control PATH");
+  verbs.control->add_option("PATH", said.control_path, "Socket of the running program")->required();
+  verbs.control->add_option("COMMAND", said.control_words, "Command, for example: up wifi-bad")->required();
 
   verbs.control->footer("Example\n  tendon-inject control /tmp/inject.sock up wifi-bad");
 
-  verbs.import = app.add_subcommand("import", "make a trace for --replay of what others have measured");
+  verbs.import = app.add_subcommand("import", "Convert a measurement to a trace for --replay");
   verbs.import
       ->add_option("FORMAT", said.import.format,
-                   "ping, irtt (its JSON), csv (delays in ms), or mahimahi (mm-link's log)")
+                   "ping, irtt (its JSON), csv (delays in ms), or mahimahi (log of mm-link)")
       ->required()
       ->check(usage::one_of({"ping", "irtt", "csv", "mahimahi"}));
-  verbs.import->add_option("FILE", said.import.from, "the measurement")->required();
-  verbs.import->add_option("--out", said.import.to, "the trace")->type_name("TRACE")->required();
+  verbs.import->add_option("FILE", said.import.from, "File with the measurement")->required();
+  verbs.import->add_option("--out", said.import.to, "Output file")->type_name("TRACE")->required();
   verbs.import
-      ->add_option(
-          "--share", said.share,
-          "whose delay it is: halves (of a round trip, for each direction), up, down, both, or measured (irtt with "
-          "clocks in step)")
+      ->add_option("--share", said.share,
+                   "Direction of the delays: halves (half of a round trip for each direction), up, down, both, or "
+                   "measured (irtt with synchronized clocks). Default: halves for ping and irtt, otherwise both")
       ->check(usage::one_of({"halves", "up", "down", "both", "measured"}));
   verbs.import
-      ->add_option("--interval-ms", said.interval_ms, "from one measurement to the next, where the file does not say")
+      ->add_option("--interval-ms", said.interval_ms, "Interval of the measurements, ms, if the file has no times")
       ->type_name("MS")
       ->check(between(1e-6, 1e9))
       ->capture_default_str();
 
   verbs.import->footer(
-      "A csv has one row for each datagram, and a first line with the names of its columns; others are ignored:\n"
-      "  t_ms      when it was sent; must not fall. Without this column, each is --interval-ms after the one before\n"
-      "  delay_ms  how long it took; empty: it was lost\n"
-      "  dir       up or down, in place of --share\n"
-      "Without a first line it has one column, the delays in ms, and a blank line is a lost datagram. Other units are\n"
-      "converted (t_s, delay_us, \"delay [s]\"). Commas, semicolons or tabs separate; between semicolons or tabs, "
-      "numbers\n"
-      "may have decimal commas. A profile takes the same file: delay=samples(FILE).\n\n"
+      "A csv has one row for each datagram, and a first line with the names of the columns; others are ignored:\n"
+      "  t_ms      time of sending; must not decrease. Without this column, the interval is --interval-ms\n"
+      "  delay_ms  delay; empty: lost\n"
+      "  dir       up or down, instead of --share\n"
+      "Without names of columns, it has one column with the delays in ms, and a blank line is a lost datagram.\n"
+      "Other units are converted (t_s, delay_us, \"delay [s]\"). The separator is a comma, semicolon or tab. With\n"
+      "semicolons or tabs, numbers can have decimal commas. A profile can use the same file: delay=samples(FILE).\n\n"
       "Examples\n"
-      "  ping -D -c 1000 -i 0.2 example.org >ping.txt\n  tendon-inject import ping ping.txt --out run.csv\n"
+      "  ping -D -c 1000 -i 0.2 example.org >ping.txt\n"
+      "  tendon-inject import ping ping.txt --out run.csv\n"
       "  printf 't_ms,delay_ms\\n0,20.1\\n10,\\n20,21\\n' >delays.csv\n"
       "  tendon-inject import csv delays.csv --share both --out run.csv");
 
-  verbs.export_delays = app.add_subcommand("export", "print the true one-way delays of a trace as CSV");
-  verbs.export_delays->add_option("TRACE", said.trace, "a recorded or imported trace")->required();
+  verbs.export_delays = app.add_subcommand("export", "Print the actual one-way delays of a trace as CSV");
+  verbs.export_delays->add_option("TRACE", said.trace, "Recorded or imported trace")->required();
 
   verbs.export_delays->footer("Example\n  tendon-inject export run.csv >delays.csv");
 
-  verbs.selftest = app.add_subcommand("selftest", "does it do what its profiles say? every model against its law");
-  verbs.selftest->add_option("--count", said.selftest.count, "datagrams for each model")
+  verbs.selftest = app.add_subcommand("selftest", "Compare the decisions of each model with its definition");
+  verbs.selftest->add_option("--count", said.selftest.count, "Datagrams for each model")
       ->type_name("N")
       ->check(between(1000, 1e9))
       ->capture_default_str();
-  verbs.selftest->add_option("--seed", said.seed, "of all random draws")->type_name("N");
-  verbs.selftest->add_option("--data", said.data, "a folder of measured histograms (*.csv): one more model each")
+  verbs.selftest->add_option("--seed", said.seed, "Seed of the random numbers")->type_name("N");
+  verbs.selftest
+      ->add_option("--data", said.data, "Folder with measured histograms (*.csv), each of which is an additional model")
       ->type_name("FOLDER");
-  verbs.selftest->add_flag("--json", said.json, "one JSON object per line");
+  verbs.selftest->add_flag("--json", said.json, "Print JSON on stdout, one object per line");
   verbs.selftest->footer("Example\n  tendon-inject selftest --count 100000 --json");
   return verbs;
 }
@@ -178,88 +175,92 @@ ImportTask import_task(Said said) {
 }
 
 void add_options(CLI::App& app, Said& said) {
-  app.add_option("--listen", said.listen, "where clients send to (port 0: any free one)")->type_name("HOST:PORT");
-  app.add_option("--to", said.to, "the server, anywhere: an address or a host name")->type_name("HOST:PORT");
-  app.add_flag("--open-to-network", said.open_to_network,
-               "let --listen be an address that other machines can reach: whoever does can send to the server through "
-               "this proxy");
-  app.add_option("--max-clients", said.max_clients, "at one time; others are refused")
+  app.add_option("--listen", said.listen, "Address for clients. Port 0: a free port")->type_name("HOST:PORT");
+  app.add_option("--to", said.to, "Address or host name of the server")->type_name("HOST:PORT");
+  app.add_flag(
+      "--open-to-network", said.open_to_network,
+      "Accept clients from other machines at --listen: each of them can send to the server through this proxy");
+  app.add_option("--max-clients", said.max_clients, "Number of simultaneous clients; others are refused")
       ->type_name("N")
       ->check(between(1, 1000))
       ->capture_default_str();
-  app.add_option("--duration-s", said.duration_s, "stop after this time")->type_name("S")->check(between(1e-3, 1e9));
+  app.add_option("--duration-s", said.duration_s, "Stop after this time, s")->type_name("S")->check(between(1e-3, 1e9));
 
-  const char* const network = "The network";
-  app.add_option(
-         "--profile", said.network.profile,
-         "both directions: a name (--profiles lists them), a line like 'delay=20ms loss=2%', or a name and what is "
-         "to be different: 'wifi-bad loss=5%'")
+  const char* const network = "Network";
+  app.add_option("--profile", said.network.profile,
+                 "Profile of both directions: a name (see --profiles), a line like 'delay=20ms loss=2%', or a name "
+                 "with changes: 'wifi-bad loss=5%'")
       ->type_name("LINE|NAME")
       ->group(network);
-  app.add_option("--up", said.network.up, "client to server, where it differs")->type_name("LINE|NAME")->group(network);
-  app.add_option("--down", said.network.down, "server to client, where it differs")
+  app.add_option("--up", said.network.up, "Profile from client to server, if different")
       ->type_name("LINE|NAME")
       ->group(network);
-  app.add_option("--seed", said.seed, "of all random draws; picked and printed when not given")
+  app.add_option("--down", said.network.down, "Profile from server to client, if different")
+      ->type_name("LINE|NAME")
+      ->group(network);
+  app.add_option("--seed", said.seed, "Seed of the random numbers. Default: a new one, which is printed")
       ->type_name("N")
       ->group(network);
-  app.add_option("--scenario", said.network.scenario, "a script (TOML) of how the network changes, instead")
+  app.add_option("--scenario", said.network.scenario, "TOML file with changes of the network, instead of a profile")
       ->type_name("FILE")
       ->group(network)
       ->excludes("--profile", "--up", "--down");
-  app.add_option("--replay", said.network.replay, "the fates of a recorded or imported trace instead")
+  app.add_option("--replay", said.network.replay, "Recorded or imported trace to repeat, instead of a profile")
       ->type_name("TRACE")
       ->group(network)
       ->excludes("--profile", "--up", "--down", "--seed", "--scenario");
   app.add_option("--by", said.replay_by,
-                 "which recorded fate a datagram meets: that of the datagram of the same index, or of the same time")
+                 "Treat each datagram like the recorded datagram with the same index, or at the same time")
       ->check(usage::one_of({"index", "time"}))
       ->needs("--replay")
       ->group(network);
-  app.add_flag("--profiles", said.profiles, "list the named networks")->group(network);
+  app.add_flag("--profiles", said.profiles, "Print the named profiles and exit")->group(network);
 
-  const char* const output = "What it tells";
-  app.add_flag("--json", said.json, "one JSON object per line on stdout: each second and at the end")->group(output);
-  app.add_option("--record", said.record, "every decision, planned and actual, as a trace (CSV)")
+  const char* const output = "Output";
+  app.add_flag("--json", said.json, "Print JSON on stdout, one object per line, each second and at the end")
+      ->group(output);
+  app.add_option("--record", said.record, "Record each decision, planned and actual, in a trace (CSV)")
       ->type_name("TRACE")
       ->group(output);
-  app.add_option("--control", said.control, "take commands on a Unix socket, too")->type_name("PATH")->group(output);
+  app.add_option("--control", said.control, "Accept commands on this Unix socket too")
+      ->type_name("PATH")
+      ->group(output);
 
-  const char* const honesty = "How exact it is";
-  app.add_option(
-         "--max-release-error-us", said.max_release_error_us,
-         "INVALID when one datagram in a hundred leaves later than this after it was due; the default is a haptic "
-         "period")
+  const char* const accuracy = "Accuracy";
+  app.add_option("--max-release-error-us", said.max_release_error_us,
+                 "Mark the run INVALID if 1 % of the datagrams leave later than planned by this, µs. The default is "
+                 "one period of a haptic device")
       ->type_name("US")
       ->check(between(0, 1e9))
       ->capture_default_str()
-      ->group(honesty);
+      ->group(accuracy);
   app.add_option("--spin-us", said.spin_us,
-                 "awake for this long before each release, because a sleeper wakes late; 0 saves the processor")
+                 "Wait actively for this long before each release, µs, because threads wake up late; 0 needs less "
+                 "processor time")
       ->type_name("US")
       ->check(between(0, 1e6))
       ->capture_default_str()
-      ->group(honesty);
-  app.add_option("--realtime", said.realtime, "priority 1…99 of SCHED_FIFO, where that is permitted")
+      ->group(accuracy);
+  app.add_option("--realtime", said.realtime, "Priority 1…99 of SCHED_FIFO, if permitted")
       ->type_name("P")
       ->check(between(1, 99))
-      ->group(honesty);
+      ->group(accuracy);
 
-  const char* const dry = "Decisions alone";
-  app.add_flag("--dry-run", said.dry, "print what would happen to packets, without sockets")->group(dry);
-  app.add_option("--count", said.dry_run.count, "packets in all, up and down by turns")
+  const char* const dry = "Dry run";
+  app.add_flag("--dry-run", said.dry, "Print what would happen to packets, without sending them")->group(dry);
+  app.add_option("--count", said.dry_run.count, "Total number of packets, alternately up and down")
       ->type_name("N")
       ->check(between(1, 1e12))
       ->capture_default_str()
       ->needs("--dry-run")
       ->group(dry);
-  app.add_option("--rate-hz", said.dry_run.rate_hz, "packets per second of each direction")
+  app.add_option("--rate-hz", said.dry_run.rate_hz, "Packets per second in each direction")
       ->type_name("HZ")
       ->check(between(1, 1e9))
       ->capture_default_str()
       ->needs("--dry-run")
       ->group(dry);
-  app.add_option("--bytes", said.dry_run.bytes, "of payload")
+  app.add_option("--bytes", said.dry_run.bytes, "Bytes of payload")
       ->type_name("N")
       ->check(between(0, 65'507))
       ->capture_default_str()
@@ -276,12 +277,12 @@ LiveTask live_task(Said said) {
   run.server = parse_option<ServerName>("--to", said.to);
   if (run.server.instance()) {
     throw std::invalid_argument("--to: expected HOST:PORT, got \"" + said.to +
-                                "\": a proxy has no key, and only a key tells whose a name of DNS-SD is");
+                                "\": a proxy has no key, which is required to verify the name of a DNS-SD service");
   }
   if (!is_loopback(run.listen) && !said.open_to_network) {
     throw std::invalid_argument("cannot listen on " + said.listen +
-                                ": anyone on the network could send to the server through this proxy; use a loopback "
-                                "address (127.0.0.1 or [::1]), or say --open-to-network");
+                                ": anyone on the network could send to the server through this proxy; use a "
+                                "loopback address (127.0.0.1 or [::1]), or --open-to-network");
   }
   if (said.duration_s > 0) run.duration = from_seconds(said.duration_s);
   if (said.realtime > 0) run.realtime = said.realtime;

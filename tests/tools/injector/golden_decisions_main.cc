@@ -90,13 +90,13 @@ void write_decisions(const std::filesystem::path& file, const std::string& line)
 int main(int argc, char** argv) {
   const PlainUsage usage{.help =
                              "Usage: golden_decisions FOLDER\n\n"
-                             "Writes what the decision core decides into FOLDER, one file for each profile.\n\n"
+                             "Write the decisions of the injector to FOLDER, one file for each profile.\n\n"
                              "Example: golden_decisions decisions && (cd decisions && sha256sum *.txt)\n"
                              "Exit: 0 done; 1 cannot write; 2 wrong usage.\n",
                          .most_arguments = 1};
   if (const auto code = answer(usage, argc, argv)) return *code;
   if (argc != 2) {
-    std::cerr << "golden_decisions: expected one argument, the folder to write to\n\n" << usage.help;
+    std::cerr << "golden_decisions: expected one argument: the folder for the files\n\n" << usage.help;
     return 2;
   }
   try {

@@ -61,7 +61,7 @@ struct Runner {
     if (!task.run.json) std::cout << "seed " << network.seed << "\n";
     dry_run(network, task.run, std::cout, trace ? &*trace : nullptr);
     file.flush();
-    if (!std::cout || (trace && !file)) throw std::runtime_error("not all could be written");
+    if (!std::cout || (trace && !file)) throw std::runtime_error("cannot write all of the output");
     return 0;
   }
 
@@ -79,13 +79,13 @@ struct Runner {
     if (!to) throw std::runtime_error("cannot write " + task.to.string());
     std::cerr << import_summary(trace);
     if (task.options.share == Share::kHalves) std::cerr << "each delay is half of a round trip\n";
-    std::cerr << "tendon-inject: replay them with --replay " << task.to.string() << " --by time\n";
+    std::cerr << "tendon-inject: replay with --replay " << task.to.string() << " --by time\n";
     return 0;
   }
 
   int operator()(const ExportTask& task) const {
     write_delays(std::cout, read_trace(task.trace));
-    if (!std::cout.flush()) throw std::runtime_error("not all could be written");
+    if (!std::cout.flush()) throw std::runtime_error("cannot write all of the output");
     return 0;
   }
 

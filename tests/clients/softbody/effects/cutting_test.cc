@@ -431,7 +431,7 @@ TEST(Cutting, APlanThatGoesWrongIsRefusedBeforeAnythingIsTouched) {
     return thrown_by([&] { Body body(config); });
   };
   EXPECT_EQ(refusal(across(0, 0.02)), "");
-  EXPECT_EQ(refusal(across(0, 0.02), 0), "cutting: cut 2 expected a force above 0");
+  EXPECT_EQ(refusal(across(0, 0.02), 0), "cutting: cut 2: expected a force above 0");
   EXPECT_EQ(refusal({Vec3::Zero(), Vec3::UnitX(), Vec3::UnitX()}), "cutting: cut 2 has no area");
   EXPECT_EQ(refusal({Vec3(1, 0, 0), Vec3::UnitX(), Vec3::UnitY()}),
             "cutting: cut 2 does not separate any elements of the body");

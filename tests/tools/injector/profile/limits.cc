@@ -25,7 +25,7 @@ std::optional<std::string> complaint(const Weighted* previous, const Weighted& e
   }
   if (previous != nullptr && entry.value <= previous->value) {
     return "value is " + duration_text(entry.value) + ", expected more than " + duration_text(previous->value) +
-           " of the one before it";
+           ", the previous one";
   }
   if (!(std::isfinite(entry.weight) && entry.weight >= 0)) {
     return "weight is " + number_text(entry.weight) + ", expected a number that is zero or more";
@@ -109,7 +109,7 @@ struct LossCheck {
   void operator()(const RandomLoss& l) const { check_probability(field, l.probability); }
   void operator()(const BurstLoss& l) const {
     check_probability(field, l.probability);
-    if (l.probability == 1) refuse(field + "=burst", "100%", "less: bursts need something between them");
+    if (l.probability == 1) refuse(field + "=burst", "100%", "less, because there must be gaps between bursts");
     // Otherwise P(G→B) = p/(1 − p)/L would be above 1.
     check_number(field + "=burst: mean length", l.length, std::max(1.0, l.probability / (1 - l.probability)), 1e6);
   }
@@ -123,9 +123,11 @@ struct LossCheck {
     for (const double p : {l.p13, l.p31, l.p32, l.p23, l.p14}) check_probability(field + "=fourstate", p);
     check_probability(field + "=fourstate: p13 + p14", l.p13 + l.p14);
     check_probability(field + "=fourstate: p31 + p32", l.p31 + l.p32);
-    if (l.p13 > 0 && l.p31 + l.p32 == 0) refuse(field + "=fourstate: p31 + p32", "0%", "more: nothing ends a burst");
-    if (l.p32 > 0 && l.p23 == 0) refuse(field + "=fourstate: p23", "0%", "more: nothing leaves state 2");
-    if (l.p13 > 0 && l.p31 == 0) refuse(field + "=fourstate: p31", "0%", "more: nothing leads back to state 1");
+    if (l.p13 > 0 && l.p31 + l.p32 == 0)
+      refuse(field + "=fourstate: p31 + p32", "0%", "more, because bursts would not end");
+    if (l.p32 > 0 && l.p23 == 0) refuse(field + "=fourstate: p23", "0%", "more, because state 2 would not end");
+    if (l.p13 > 0 && l.p31 == 0)
+      refuse(field + "=fourstate: p31", "0%", "more, because state 1 would not be reached again");
   }
   void operator()(const PatternLoss& l) const {
     if (l.pattern.empty() || l.pattern.size() > kMaxPattern || l.pattern.find_first_not_of("01") != std::string::npos) {
@@ -149,7 +151,7 @@ void check_bottleneck(const Bottleneck& b) {
   if (!b.opportunities_ms.empty()) {
     if (b.bits_per_second > 0) refuse("rate", std::to_string(b.bits_per_second) + "bit/s", "none beside opportunities");
     if (!std::ranges::is_sorted(b.opportunities_ms)) refuse("opportunities", "not rising", "times in order");
-    if (b.opportunities_ms.back() == 0) refuse("opportunities: the last", "0", "more: it is the period");
+    if (b.opportunities_ms.back() == 0) refuse("opportunities: the last", "0", "more, because it is the period");
   }
   const std::uint64_t most = b.queue_in_bytes ? kMaxQueueBytes : kMaxQueuePackets;
   if (b.queue < 1 || b.queue > most) {
@@ -167,7 +169,8 @@ void check(const Profile& p) {
   check_duration("memory", p.memory);
   if (p.memory > Duration::zero()) {
     check_duration("memory", p.memory, std::chrono::microseconds(1));
-    if (p.rho != 0) refuse("rho", number_text(p.rho), "0 beside a memory: correlation is by packet or by time");
+    if (p.rho != 0)
+      refuse("rho", number_text(p.rho), "0 if memory is set, because the correlation is either by packet or by time");
   }
   std::visit(LossCheck{"loss"}, p.loss);
 

@@ -58,7 +58,7 @@ constexpr std::array<NamedProfile, 8> kProfiles = {{
     // et al., "A browser-side view of Starlink connectivity", IMC 2022: losses coincide with handovers. Assumed: the
     // handover duration of 20 ms, the extra latency at the boundaries, and the division of the round trip into up and
     // down.
-    {"leo-satellite", "low earth orbit, as Starlink",
+    {"leo-satellite", "low earth orbit, like Starlink",
      "base=10ms delay=gamma(17ms,6ms) memory=1s spike(at=14.925s,every=15s,for=215ms,25ms) "
      "handover(every=15s,for=20ms,5ms) loss=burst(0.3%,3)",
      "base=10ms delay=gamma(12ms,4ms) memory=1s spike(at=14.925s,every=15s,for=215ms,15ms) "
@@ -89,7 +89,7 @@ Profile resolve_profile(std::string_view text, Direction direction) {
   const auto named = std::ranges::find(kProfiles, word, &NamedProfile::name);
   if (named == kProfiles.end()) {
     if (!word.empty() && word.find_first_of("=(") == std::string_view::npos) {
-      throw std::invalid_argument("the profile begins with \"" + std::string(word) + "\", expected one of the names " +
+      throw std::invalid_argument("the profile starts with \"" + std::string(word) + "\", expected one of the names " +
                                   names_of_profiles() + ", or a line like \"delay=20ms loss=2%\"" +
                                   did_you_mean(word, names_of_profiles()));
     }

@@ -267,7 +267,8 @@ TEST(Profile, RefusesTheImpossibleByFieldValueAndExpectation) {
   EXPECT_EQ(complaint_about(p), "rho is 1, expected 0 to 0.999999");
   p.rho = 0.5;
   p.memory = 1ms;
-  EXPECT_EQ(complaint_about(p), "rho is 0.5, expected 0 beside a memory: correlation is by packet or by time");
+  EXPECT_EQ(complaint_about(p),
+            "rho is 0.5, expected 0 if memory is set, because the correlation is either by packet or by time");
   p = {};
   p.steps.resize(65);
   EXPECT_EQ(complaint_about(p), "step, ramp, spike, stall, handover or outage is 65 events, expected at most 64");
@@ -294,7 +295,7 @@ TEST(Profile, RefusesALineItDoesNotUnderstandAndSaysWhere) {
            {"delay=uniform(2ms,1ms)", "delay: upper end is 1ms, expected 2ms to 60s"},
            {"delay=gamma(20ms,1us)", "delay: standard deviation is 0.001ms, expected 0.2ms to 200ms"},
            {"delay=histogram(2ms:1,1ms:1)",
-            "delay=histogram, entry 1: value is 1ms, expected more than 2ms of the one before it"},
+            "delay=histogram, entry 1: value is 1ms, expected more than 2ms, the previous one"},
            {"delay=histogram(1ms:0)",
             "delay=histogram: the sum of all weights is 0, expected a finite number above zero"},
            {"loss=burst(50%,0.5)", "loss=burst: mean length is 0.5, expected 1 to 1e+06"},
@@ -381,7 +382,7 @@ TEST(ProfileFiles, WhatCannotBeReadIsNamedByFileAndLine) {
   EXPECT_EQ(complaint_in("1,2\nedge,count\n"), ":2: expected a finite number in column 0 (from 0), found 'edge'");
   EXPECT_EQ(complaint_in("1\n"), ":1: expected LOWER_EDGE_MS,COUNT like 0.56,72, found 1 column");
   EXPECT_EQ(complaint_in("1,2,3\n"), ":1: expected LOWER_EDGE_MS,COUNT like 0.56,72, found 3 columns");
-  EXPECT_EQ(complaint_in("1,2\n\n1,2\n"), ":3: value is 1ms, expected more than 1ms of the one before it");
+  EXPECT_EQ(complaint_in("1,2\n\n1,2\n"), ":3: value is 1ms, expected more than 1ms, the previous one");
   EXPECT_EQ(complaint_in("1,-2\n"), ":1: weight is -2, expected a number that is zero or more");
   EXPECT_EQ(complaint_in("1e300,2\n"), ":1: value is 1e+300ms, expected 0ms to 60s");
   EXPECT_EQ(complaint_in("x\n", "samples("),

@@ -44,7 +44,7 @@ class Keys {
       if (std::ranges::find(known, key.str()) != known.end()) continue;
       std::string all = did_you_mean(key.str(), known);
       if (all.empty()) {
-        for (const std::string_view name : known) all.append(all.empty() ? "; known here: " : ", ").append(name);
+        for (const std::string_view name : known) all.append(all.empty() ? "; expected one of " : ", ").append(name);
       }
       fail(node, key.str(), (node.is_table() ? "unknown table" : "unknown key") + all);
     }
@@ -162,7 +162,7 @@ DriftingClock::Config clock_of(const Keys& keys) {
 Scenario::Timed timed_of(const Keys& keys) {
   keys.refuse_others_than({"t_s", "up", "down", "both", "link", "note"});
   const auto at = keys.duration("t_s", 1e9, false);
-  if (!at) keys.fail("t_s is missing, expected when, in seconds since the start");
+  if (!at) keys.fail("t_s: expected the time since the start, s, found nothing");
   Change change = keys.profiles();
   if (const auto link = keys.whole("link", kMaxLink)) {
     if (!change.up && !change.down) keys.fail(*keys.find("link"), "link", "expected up, down or both with it");
@@ -219,7 +219,7 @@ Scenario parse_scenario(std::string_view toml, const std::string& name) {
   keys.each("at", kMaxChanges, [&scenario](const Keys& table) {
     Scenario::Timed timed = timed_of(table);
     if (!scenario.changes.empty() && timed.at < scenario.changes.back().at) {
-      table.fail(*table.find("t_s"), "t_s", "is earlier than the one before, expected the order of time");
+      table.fail(*table.find("t_s"), "t_s", "is earlier than the previous one, expected increasing times");
     }
     scenario.changes.push_back(std::move(timed));
   });
@@ -243,7 +243,7 @@ Command parse_command(std::string_view line) {
     const auto link = parse_whole(number);
     const auto [way, profile] = split(what);
     if (!link || *link > kMaxLink || !is_way(way)) {
-      throw std::invalid_argument("link: expected a client's number and what is to change, like: link 2 both wifi-bad");
+      throw std::invalid_argument("link: expected the number of a client and a change, like: link 2 both wifi-bad");
     }
     Change change = change_of(way, profile);
     change.link = static_cast<std::uint32_t>(*link);
@@ -251,7 +251,7 @@ Command parse_command(std::string_view line) {
     return change;
   }
   if (verb == "note") {
-    if (rest.empty()) throw std::invalid_argument("note: expected the text after it");
+    if (rest.empty()) throw std::invalid_argument("note: expected a text");
     Change change;
     append(change.text, verb, rest);
     return change;

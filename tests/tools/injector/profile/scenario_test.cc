@@ -95,17 +95,17 @@ TEST(Scenario, WhatIsWrongIsNamedWithFileLineAndKey) {
   EXPECT_EQ(refusal("both = \"lan\"\nup = \"lan\""), "storm.toml:2: up: expected either both, or up and down");
   EXPECT_EQ(refusal("[[at]]\nt_s = 1\nboth = \"loss=150%\"").substr(0, 40), "storm.toml:3: at.both: loss is 150%, exp");
   EXPECT_EQ(refusal("[[at]]\nboth = \"lan\""),
-            "storm.toml:1: at: t_s is missing, expected when, in seconds since the start");
+            "storm.toml:1: at: t_s: expected the time since the start, s, found nothing");
   EXPECT_EQ(refusal("[[at]]\nt_s = 1"), "storm.toml:1: at: expected up, down, both or note");
   EXPECT_EQ(refusal("[[at]]\nt_s = -1"), "storm.toml:2: at.t_s: expected 0 or more, and at most a day");
   EXPECT_EQ(refusal("[[at]]\nt_s = nan"), "storm.toml:2: at.t_s: expected a number");
   EXPECT_EQ(refusal("[[at]]\nt_s = 2\nnote = \"a\"\n[[at]]\nt_s = 1\nnote = \"b\""),
-            "storm.toml:5: at.t_s: is earlier than the one before, expected the order of time");
+            "storm.toml:5: at.t_s: is earlier than the previous one, expected increasing times");
   EXPECT_EQ(refusal("[[at]]\nt_s = 1\nlink = 2"), "storm.toml:3: at.link: expected up, down or both with it");
   EXPECT_EQ(refusal("[at]\nt_s = 1"), "storm.toml:1: at: expected tables [[at]]");
   EXPECT_EQ(refusal("[[at]]\nt_s = 1\nbooth = \"lan\""), "storm.toml:3: at.booth: unknown key; did you mean both?");
   EXPECT_EQ(refusal("[clock]\nsteps = 1"), "storm.toml:2: clock.steps: unknown key; did you mean step?");
-  EXPECT_EQ(refusal("[clock]\ndrift_ppm = 1e6"), "storm.toml:1: clock: a clock's drift is beyond 100000 ppm");
+  EXPECT_EQ(refusal("[clock]\ndrift_ppm = 1e6"), "storm.toml:1: clock: the drift of a clock exceeds 100000 ppm");
   EXPECT_EQ(refusal("[[clock.step]]\nt_s = 1"), "storm.toml:1: clock.step: expected t_s and step_ms");
   EXPECT_EQ(refusal("seed = 7\n= 8").substr(0, 22), "storm.toml:2: not TOML");
 }
@@ -220,8 +220,8 @@ TEST(Command, AWrongOneSaysWhatWasExpected) {
   EXPECT_EQ(refusal_of_command("stop now"), "unknown command \"stop\", expected " + command_help());
   EXPECT_EQ(refusal_of_command("up").substr(0, 30), "\"up\" without a profile, expect");
   EXPECT_EQ(refusal_of_command("link two both lan"),
-            "link: expected a client's number and what is to change, like: link 2 both wifi-bad");
-  EXPECT_EQ(refusal_of_command("note"), "note: expected the text after it");
+            "link: expected the number of a client and a change, like: link 2 both wifi-bad");
+  EXPECT_EQ(refusal_of_command("note"), "note: expected a text");
   EXPECT_NE(refusal_of_command("both delay=20").find("20ms"), std::string::npos);
 }
 

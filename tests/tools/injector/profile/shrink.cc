@@ -57,7 +57,7 @@ class Shrinking {
   Shrunk result() {
     const std::size_t from = part_.size();
     if (!still_fails(part_)) {
-      throw std::invalid_argument("the trace does not fail when all that is nearly benign in it is benign");
+      throw std::invalid_argument("the trace no longer fails if its nearly benign datagrams become benign");
     }
     if (!part_.empty() && still_fails({})) part_.clear();
     const bool minimal = part_.size() < 2 || minimize();

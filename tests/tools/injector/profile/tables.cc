@@ -97,7 +97,7 @@ std::vector<Weighted> samples_from_csv(const std::filesystem::path& file) {
 
 DelayList open_delays(std::istream& from, const std::string& name) {
   TableReader table(from, name, {.blank_lines_are_cells = true, .trailing_comments = true});
-  if (table.width() == 0) throw std::runtime_error(name + ": no delay in it");
+  if (table.width() == 0) throw std::runtime_error(name + ": has no delays");
   if (table.names().empty() && table.width() > 1) {
     const std::string found = std::to_string(table.width()) + " numbers in " + in_quotes(table.first_line());
     table.fail(

@@ -74,7 +74,7 @@ ControlSocket::ControlSocket(const std::filesystem::path& path)
     if (other >= 0) {
       ::close(other);
       ::close(fd_);
-      fail(path, "a process listens there already");
+      fail(path, "another process already listens at this socket");
     }
     std::filesystem::remove(path);
     bind_here();
@@ -82,7 +82,7 @@ ControlSocket::ControlSocket(const std::filesystem::path& path)
   if (::listen(fd_, static_cast<int>(kMaxClients)) != 0) {
     const bool in_the_way = std::filesystem::exists(path);
     ::close(fd_);
-    fail(path, in_the_way ? "is in the way and not a socket" : "cannot make a socket there");
+    fail(path, in_the_way ? "the file exists and is not a socket" : "cannot create the socket");
   }
 }
 
@@ -159,7 +159,8 @@ std::string ask_control_socket(const std::filesystem::path& path, std::string_vi
     }
   }
   ::close(fd);
-  if (!answer.ends_with('\n')) throw std::runtime_error(path.string() + ": went away without an answer");
+  if (!answer.ends_with('\n'))
+    throw std::runtime_error(path.string() + ": the connection was closed without an answer");
   answer.pop_back();
   return answer;
 }

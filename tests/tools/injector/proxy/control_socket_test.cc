@@ -75,11 +75,11 @@ TEST(ControlSocket, ReplacesASocketOfTheDeadAndNothingElse) {
   const auto path = folder.path() / "control";
   {
     const ControlSocket alive(path);
-    EXPECT_EQ(refusal(path), "--control " + path.string() + ": a process listens there already");
+    EXPECT_EQ(refusal(path), "--control " + path.string() + ": another process already listens at this socket");
   }
   const auto file = folder.path() / "file";
   std::ofstream(file) << "precious";
-  EXPECT_EQ(refusal(file), "--control " + file.string() + ": is in the way and not a socket");
+  EXPECT_EQ(refusal(file), "--control " + file.string() + ": the file exists and is not a socket");
   EXPECT_TRUE(std::filesystem::exists(file));
   EXPECT_NE(refusal(folder.path() / "none" / "control"), "");
   EXPECT_NE(refusal(folder.path() / std::string(200, 'x')), "");

@@ -112,7 +112,7 @@ std::vector<Address> addresses_of(const LiveRun& options) {
   std::string problem;
   for (const Address& address : addresses) {
     if (address == options.listen) {
-      throw std::invalid_argument("--to: expected another address than --listen, got " + options.server.text() +
+      throw std::invalid_argument("--to: expected a different address than --listen, got " + options.server.text() +
                                   " for both");
     }
     try {
@@ -203,7 +203,7 @@ class Conversation {
     } else {
       std::cout << end_text(heading_, last) << std::flush;
     }
-    if (tells) std::cerr << "tendon-inject: nothing came back from " << heading_.server << ": is a server there?\n";
+    if (tells) std::cerr << "tendon-inject: no answer from " << heading_.server << ": is a server there?\n";
     return why_invalid(last, options_.max_release_error).empty();
   }
 
@@ -254,9 +254,9 @@ class Conversation {
     const LocalTime now = monotonic_now();
     if (refused == told_refused_ || now < tell_refused_) return;
     std::cerr << "tendon-inject: " << refused - std::exchange(told_refused_, refused)
-              << " datagrams of further clients are refused: ";
+              << " datagrams of further clients refused: ";
     if (status.no_socket.empty()) {
-      std::cerr << options_.max_clients << " is the most at one time (--max-clients), and one is forgotten after "
+      std::cerr << options_.max_clients << " clients are the maximum (--max-clients); a client is removed after "
                 << seconds(Proxy::kIdleTimeout) << " s of silence\n";
     } else {
       std::cerr << status.no_socket << "\n";
@@ -327,7 +327,7 @@ std::string Conversation::execute(std::string_view line) {
   }
   const Change& change = std::get<Change>(command);
   if (network_.replay && (change.up || change.down)) {
-    throw std::invalid_argument("a trace is replayed: its network cannot be changed");
+    throw std::invalid_argument("the network cannot be changed, because a trace is replayed");
   }
   driver_.change(prepare(change, network_.seed));
   if (recorder_ != nullptr) recorder_->note(change.text);

@@ -15,8 +15,7 @@ Scenario scenario_of(const NetworkOptions& options) {
   if (!options.scenario.empty()) {
     Scenario scenario = read_scenario(options.scenario);
     if (scenario.clock) {
-      throw std::invalid_argument("--scenario " + options.scenario.string() +
-                                  ": [clock] is for simulated worlds: real peers have real clocks");
+      throw std::invalid_argument("--scenario " + options.scenario.string() + ": [clock] is only for simulations");
     }
     return scenario;
   }

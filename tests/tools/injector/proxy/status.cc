@@ -66,8 +66,8 @@ std::vector<std::string> why_invalid(const Status& status, Duration max_release_
     const Duration p99 = status.of(direction).release_error.quantile(0.99);
     if (p99 <= max_release_error) continue;
     why.push_back(std::string(direction == Direction::kUp ? "up" : "down") + ": one datagram in a hundred left " +
-                  us(p99) + " us late or later, the bound is " + us(max_release_error) +
-                  " us; the machine's own timer was " + us(status.timer_floor.quantile(0.99)) + " us late");
+                  us(p99) + " us late or later, expected at most " + us(max_release_error) +
+                  " us; the timer of this machine was " + us(status.timer_floor.quantile(0.99)) + " us late");
   }
   std::uint64_t full = 0;
   std::uint64_t unsent = 0;
@@ -75,13 +75,13 @@ std::vector<std::string> why_invalid(const Status& status, Duration max_release_
     full += measured.counters.refused_full;
     unsent += measured.counters.unsent;
   }
-  add_count(status.overflowed, "were thrown away by the kernel because the proxy did not read them in time");
-  add_count(full, "did not fit into the proxy's memory");
-  add_count(unsent, "were not taken by the kernel when they were due");
-  add_count(status.late_rebinds, "left by the old port, because the system gave no socket for the new one");
+  add_count(status.overflowed, "were dropped by the kernel because the proxy did not read them in time");
+  add_count(full, "did not fit in the memory of the proxy");
+  add_count(unsent, "were refused by the kernel at their time of release");
+  add_count(status.late_rebinds, "were sent from the old port, because the system provided no socket for the new one");
   if (is_unanswered(status)) {
-    why.push_back("nothing came back from " + to_string(status.server) + ", for which " +
-                  std::to_string(status.of(Direction::kUp).counters.forwarded) + " datagrams left");
+    why.push_back("no answer from " + to_string(status.server) + " to " +
+                  std::to_string(status.of(Direction::kUp).counters.forwarded) + " datagrams");
   }
   add_count(status.unrecorded, "are missing in the trace because the disk was too slow");
   return why;

@@ -59,7 +59,7 @@ TEST(Verdict, IsInvalidWhenNothingCameBack) {
   s.server = parse_address("127.0.0.1:47441");
   s.directions[1].counters.received = 0;
   ASSERT_EQ(why_invalid(s, 1ms).size(), 1U);
-  EXPECT_EQ(why_invalid(s, 1ms)[0], "nothing came back from 127.0.0.1:47441, for which 1000 datagrams left");
+  EXPECT_EQ(why_invalid(s, 1ms)[0], "no answer from 127.0.0.1:47441 to 1000 datagrams");
   s.directions[0].counters.forwarded = 0;
   EXPECT_TRUE(why_invalid(s, 1ms).empty()) << "nobody has asked it anything";
 }

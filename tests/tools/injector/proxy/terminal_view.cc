@@ -53,7 +53,7 @@ std::string other_fates(const ProxyCounters& n) {
   add("truncated", n.truncated);
   add("refused: too many clients", n.refused_clients);
   add("refused: memory full", n.refused_full);
-  add("not taken by the kernel", n.unsent);
+  add("refused by the kernel", n.unsent);
   return text;
 }
 
@@ -80,7 +80,7 @@ std::string terminal_view(const Heading& heading, const Status& now, const Statu
                           std::size_t columns) {
   std::vector<std::string> lines;
   const std::vector<std::string> why = why_invalid(now, heading.max_release_error);
-  lines.push_back(format("tendon-inject  %s -> %s   seed %llu   %.0f s   %zu client%s   %zu on their way",
+  lines.push_back(format("tendon-inject  %s -> %s   seed %llu   %.0f s   %zu client%s   %zu in flight",
                          heading.listen.c_str(), heading.server.c_str(), static_cast<unsigned long long>(heading.seed),
                          seconds(now.elapsed), now.clients.size(), now.clients.size() == 1 ? "" : "s", now.in_flight));
   lines.emplace_back();
@@ -99,7 +99,7 @@ std::string terminal_view(const Heading& heading, const Status& now, const Statu
                            percent(all.counters.duplicated - old.counters.duplicated, received),
                            in_us(late.quantile(0.5)), in_us(late.quantile(0.99)), in_us(late.max())));
   }
-  lines.push_back(format("%-65s%6.0f  %6.0f   %6.0f", "the machine's own timer, for comparison",
+  lines.push_back(format("%-65s%6.0f  %6.0f   %6.0f", "timer of this machine, for comparison",
                          in_us(now.timer_floor.quantile(0.5)), in_us(now.timer_floor.quantile(0.99)),
                          in_us(now.timer_floor.max())));
   lines.emplace_back();
@@ -146,7 +146,7 @@ std::string log_line(const Status& now, const Status& before) {
 }
 
 std::string end_text(const Heading& heading, const Status& end) {
-  std::string text = format("after %.1f s, seed %llu, %zu still on their way\n", seconds(end.elapsed),
+  std::string text = format("after %.1f s, seed %llu, %zu still in flight\n", seconds(end.elapsed),
                             static_cast<unsigned long long>(heading.seed), end.in_flight);
   for (const Direction direction : {Direction::kUp, Direction::kDown}) {
     const ProxyMeasurements& measured = end.of(direction);
@@ -164,12 +164,12 @@ std::string end_text(const Heading& heading, const Status& end) {
     text += quantiles("one-way delay", measured.delay, ms, "ms");
     text += quantiles("released late by", measured.release_error, in_us, "us");
   }
-  text += format("  the machine's own timer was late by p50 %.2f, p99 %.2f, max %.2f us (n = %llu)\n",
+  text += format("  the timer of this machine was late by p50 %.2f, p99 %.2f, max %.2f us (n = %llu)\n",
                  in_us(end.timer_floor.quantile(0.5)), in_us(end.timer_floor.quantile(0.99)),
                  in_us(end.timer_floor.max()), static_cast<unsigned long long>(end.timer_floor.count()));
   const std::vector<std::string> why = why_invalid(end, heading.max_release_error);
   for (const std::string& reason : why) text += "  INVALID: " + reason + "\n";
-  if (why.empty()) text += "  valid: the network was the one that was asked for\n";
+  if (why.empty()) text += "  valid: the network was simulated exactly\n";
   return text;
 }
 

@@ -34,7 +34,7 @@ std::vector<Check> events(const SelftestOptions& options) {
       const double expected = expected_ms(ns(decision.arrival - kStart) / kMs) * kMs;
       most = std::max(most, std::abs(ns(delay(decision)) - expected));
     });
-    checks.push_back({line, "furthest from its delay, ns", most, 1});
+    checks.push_back({line, "largest error of the delay, ns", most, 1});
   };
   worst("base=10ms step(at=300ms,20ms) step(at=700ms,-15ms) order=free",
         [](double t) { return 10 + (t >= 300 ? 20 : 0) - (t >= 700 ? 15 : 0); });

@@ -61,7 +61,7 @@ std::vector<Check> separation(const SelftestOptions& options) {
     if (lost(decision)) of_lost.push_back(ns(delay(decision)));
   });
   return {none(line, "delays that differ from those without loss", off),
-          kolmogorov(line, "delays of what is lost, Kolmogorov", of_lost, delay_laws()[6].law)};
+          kolmogorov(line, "delays of lost datagrams, Kolmogorov", of_lost, delay_laws()[6].law)};
 }
 
 std::vector<Check> regimes(const SelftestOptions& options) {

@@ -53,8 +53,8 @@ std::vector<Check> order(const SelftestOptions& options) {
     off += decision.release == std::max(last, own) ? 0U : 1U;
     last = decision.release;
   });
-  checks.push_back(none(jitter, "releases before the one ahead", backwards));
-  checks.push_back(none(jitter, "releases that are not max(the one ahead, own)", off));
+  checks.push_back(none(jitter, "releases before the previous datagram", backwards));
+  checks.push_back(none(jitter, "releases that are not max(previous, own)", off));
 
   const std::string jump = "delay=20ms jump(2%,3)";
   std::size_t jumped = 0;
@@ -159,7 +159,7 @@ std::vector<Check> bottleneck(const SelftestOptions& options) {
     });
     const double load = ns(kService) / ns(over.period);
     const double seconds_busy = seconds(last - kStart);
-    checks.push_back(none(line, "decisions that differ from a queue's", off));
+    checks.push_back(none(line, "decisions that differ from those of a queue", off));
     checks.push_back(
         {line, "drops against 1 - 1/load", std::abs(static_cast<double>(dropped) / n - (1 - 1 / load)), 20 / n});
     checks.push_back({line, "bit/s out against rate, relative",

@@ -25,7 +25,7 @@ struct Histogram {
 };
 
 std::vector<Histogram> histograms_in(const std::filesystem::path& folder) {
-  if (!std::filesystem::is_directory(folder)) throw std::runtime_error(folder.string() + " is no folder");
+  if (!std::filesystem::is_directory(folder)) throw std::runtime_error(folder.string() + ": expected a folder");
   std::vector<Histogram> found;
   for (const auto& entry : std::filesystem::recursive_directory_iterator(folder)) {
     if (!entry.is_regular_file() || entry.path().extension() != ".csv") continue;

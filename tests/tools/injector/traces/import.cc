@@ -38,9 +38,9 @@ std::string start_of(std::string_view text) { return in_quotes(text.substr(0, 60
 
 void need_shared(const std::string& name, const ImportOptions& options) {
   if (options.share == Share::kMeasured) {
-    throw std::runtime_error(name + ": holds one delay for each packet, expected a choice whose it is");
+    throw std::runtime_error(name + ": has one delay for each packet, expected --share up, down, both or halves");
   }
-  if (options.interval <= Duration::zero()) throw std::runtime_error("the interval of an import is not above zero");
+  if (options.interval <= Duration::zero()) throw std::runtime_error("the interval of an import must be above zero");
 }
 
 /// An empty delay is a loss.
@@ -171,9 +171,9 @@ class PingTimes {
              "expected the decimal sign of line " + std::to_string(std::min(comma_, point_)) + ", found another");
     }
     if (comma_ != 0 || either_ == 0 || !thousands) return;
-    refuse(
-        name_, either_,
-        "expected a decimal point, found time=" + either_text_ + ": is the comma a decimal one, or between thousands?");
+    refuse(name_, either_,
+           "expected a decimal point, found time=" + either_text_ +
+               ": is the comma a decimal comma, or a thousands separator?");
   }
 
  private:
@@ -276,8 +276,8 @@ PingLog read_ping(std::istream& from, const std::string& name) {
         std::min<std::uint64_t>(parse_whole(counted.substr(0, counted.find(' '))).value_or(0), 0xffff));
   });
   if (log.answers.empty()) {
-    throw std::runtime_error(
-        name + ": no answer in it, expected what ping of Linux or macOS prints in English: LC_ALL=C ping");
+    throw std::runtime_error(name +
+                             ": has no answers; expected the English output of ping on Linux or macOS: LC_ALL=C ping");
   }
   times.check();
   log.first = *oldest;
@@ -353,7 +353,8 @@ class IrttTrip {
     if (!ns) refuse(key + ": expected whole nanoseconds");
     if (*ns < 0) {
       refuse(key + " is " + std::to_string(*ns) +
-             " ns: the clocks of client and server were not synchronised. Import the round trip instead, by halves");
+             " ns, because the clocks of client and server were not synchronized; import half of the round trip "
+             "instead, with --share halves");
     }
     const Duration delay(*ns);
     if (delay > std::chrono::hours(24)) refuse(key + ": expected at most a day");
@@ -464,7 +465,7 @@ Trace import_csv(std::istream& from, const std::string& name, const ImportOption
   };
   while (table.next_row()) {
     const auto delay = duration(list.delay, kDayMs);
-    if (delay && *delay < Duration::zero()) table.fail("a delay below zero");
+    if (delay && *delay < Duration::zero()) table.fail("the delay is below zero");
     Duration at = evenly(count, options.interval);
     if (list.t) {
       const auto t = duration(*list.t, 10'000 * kDayMs);
@@ -478,21 +479,21 @@ Trace import_csv(std::istream& from, const std::string& name, const ImportOption
       share = dir == "up" ? Share::kUp : Share::kDown;
     }
     Duration& newest = before[list.dir && share == Share::kDown ? 1 : 0];
-    if (at < newest) table.fail("the time is earlier than the one before");
+    if (at < newest) table.fail("the time is earlier than the previous one");
     newest = at;
     // With directions, the times belong to a trace with a common origin.
     if (!zero) zero = list.dir ? Duration::zero() : at;
     ++count;
     building.add(at - *zero, share, shared(share, delay));
   }
-  if (count == 0) throw std::runtime_error(name + ": no delay in it");
+  if (count == 0) throw std::runtime_error(name + ": has no delays");
   return std::move(building).trace();
 }
 
 Trace import_mahimahi_log(std::istream& from, const std::string& name, const ImportOptions& options) {
   need_shared(name, options);
   if (options.share == Share::kHalves) {
-    throw std::runtime_error(name + ": is the log of one direction, expected up, down or both");
+    throw std::runtime_error(name + ": is the log of one direction, expected --share up, down or both");
   }
   struct Logged {
     Duration arrival{};
@@ -527,7 +528,7 @@ Trace import_mahimahi_log(std::istream& from, const std::string& name, const Imp
       packets.insert(packets.end(), *amount, Logged{at, std::nullopt, 0});
     }
   });
-  if (packets.empty()) throw std::runtime_error(name + ": no packet in it");
+  if (packets.empty()) throw std::runtime_error(name + ": has no packets");
   std::ranges::stable_sort(packets, {}, &Logged::arrival);
   Building building(name);
   for (const Logged& packet : packets) {

@@ -129,10 +129,12 @@ TEST(ImportPing, UnderstandsTimesHoweverTheyAreWritten) {
 }
 
 TEST(ImportPing, ACommaThatMayBeEitherIsRefused) {
-  EXPECT_EQ(refusal(import_ping, ping_of({"998 ms", "1,012 ms"})),
-            "file:2: expected a decimal point, found time=1,012: is the comma a decimal one, or between thousands?");
-  EXPECT_EQ(refusal(import_ping, ping_of({"99.5 ms", "1,012 ms"})),
-            "file:2: expected a decimal point, found time=1,012: is the comma a decimal one, or between thousands?");
+  EXPECT_EQ(
+      refusal(import_ping, ping_of({"998 ms", "1,012 ms"})),
+      "file:2: expected a decimal point, found time=1,012: is the comma a decimal comma, or a thousands separator?");
+  EXPECT_EQ(
+      refusal(import_ping, ping_of({"99.5 ms", "1,012 ms"})),
+      "file:2: expected a decimal point, found time=1,012: is the comma a decimal comma, or a thousands separator?");
   EXPECT_EQ(refusal(import_ping, ping_of({"99.5 ms", "1,5 ms"})),
             "file:2: expected the decimal sign of line 1, found another");
   for (const char* time : {"1,01,2.5 ms", "1.2.3 ms", "5 parsecs", "5", ", ms"}) {
@@ -150,13 +152,13 @@ TEST(ImportPing, SequenceNumbersGoOnBeyond16Bits) {
 
 TEST(ImportPing, WhatIsNotPingIsRefused) {
   EXPECT_EQ(refusal(import_ping, "hello\n"),
-            "file: no answer in it, expected what ping of Linux or macOS prints in English: LC_ALL=C ping");
+            "file: has no answers; expected the English output of ping on Linux or macOS: LC_ALL=C ping");
   EXPECT_EQ(refusal(import_ping, "\n64 bytes from 10.0.0.1: icmp_seq=1 ttl=64 time=fast\n").substr(0, 37),
             "file:2: expected time=… ms, us or s");
   EXPECT_EQ(refusal(import_ping, "64 bytes from 10.0.0.1: icmp_seq=70000 ttl=64 time=1 ms\n").substr(0, 37),
             "file:1: expected icmp_seq=0 to 65535 ");
   EXPECT_EQ(refusal(import_ping, kPing, {.share = Share::kMeasured}),
-            "file: holds one delay for each packet, expected a choice whose it is");
+            "file: has one delay for each packet, expected --share up, down, both or halves");
 }
 
 // From the documentation of irtt, shortened; entries from the third on have losses of each kind.
@@ -193,10 +195,9 @@ TEST(ImportIrtt, HalvesTheRoundTripWhenAsked) {
 TEST(ImportIrtt, ClocksThatWereNotSynchronisedAreRefused) {
   std::string text = kIrtt;
   text.replace(text.find("89283"), 5, "-9283");
-  EXPECT_EQ(
-      refusal(import_irtt, text, {.share = Share::kMeasured}),
-      "file: round_trips[0].delay.send is -9283 ns: the clocks of client and server were not synchronised. Import "
-      "the round trip instead, by halves");
+  EXPECT_EQ(refusal(import_irtt, text, {.share = Share::kMeasured}),
+            "file: round_trips[0].delay.send is -9283 ns, because the clocks of client and server were not "
+            "synchronized; import half of the round trip instead, with --share halves");
 }
 
 TEST(ImportIrtt, WhatIsNotItsResultIsRefused) {
@@ -223,14 +224,14 @@ TEST(ImportCsv, TimesAreTakenFromTheFileAndBeginAtZero) {
 }
 
 TEST(ImportCsv, WhatIsWrongIsNamedWithItsLine) {
-  EXPECT_EQ(refusal(import_csv, ""), "file: no delay in it");
+  EXPECT_EQ(refusal(import_csv, ""), "file: has no delays");
   EXPECT_EQ(refusal(import_csv, "a,b\n"),
             "file:1: expected numbers, or names of columns with delay_ms among them, found \"a,b\"");
   const std::string named = "t_ms,delay_ms\n";
   EXPECT_EQ(refusal(import_csv, named + "3,four\n"), "file:2: expected a finite number as delay_ms, found 'four'");
   EXPECT_EQ(refusal(import_csv, named + "3\n"), "file:2: expected 2 cells as in the first row, found 1");
-  EXPECT_EQ(refusal(import_csv, named + "5,2\n3,2\n"), "file:3: the time is earlier than the one before");
-  EXPECT_EQ(refusal(import_csv, named + "1,-2\n"), "file:2: a delay below zero");
+  EXPECT_EQ(refusal(import_csv, named + "5,2\n3,2\n"), "file:3: the time is earlier than the previous one");
+  EXPECT_EQ(refusal(import_csv, named + "1,-2\n"), "file:2: the delay is below zero");
   EXPECT_EQ(refusal(import_csv, named + "1,86400001\n"), "file:2: expected at most 1 days, found \"86400001\"");
 }
 
@@ -306,7 +307,7 @@ TEST(ImportMahimahiLog, DeparturesAreDatagramsAndDropsAreLost) {
             "file:1: expected the delay in ms after the bytes");
   EXPECT_EQ(refusal(import_mahimahi_log, "12\n", {.share = Share::kUp}),
             "file:1: expected a line of a log of mm-link, like \"512 - 1504 20\"");
-  EXPECT_EQ(refusal(import_mahimahi_log, log), "file: is the log of one direction, expected up, down or both");
+  EXPECT_EQ(refusal(import_mahimahi_log, log), "file: is the log of one direction, expected --share up, down or both");
 }
 
 TEST(Import, EveryImportIsATraceThatReadsBack) {

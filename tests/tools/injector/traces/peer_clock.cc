@@ -23,16 +23,16 @@ Duration scaled(Duration a, std::int64_t b, std::int64_t c) noexcept {
 
 DriftingClock::DriftingClock(Config config, LocalTime start) : config_(std::move(config)), start_(start) {
   const auto beyond = [](Duration change) { return change > kMaxOffset || change < -kMaxOffset; };
-  if (beyond(config_.offset)) throw std::invalid_argument("a clock's offset is beyond 10 years");
+  if (beyond(config_.offset)) throw std::invalid_argument("the offset of a clock exceeds 10 years");
   if (config_.drift_ppb > kMaxDriftPpb || config_.drift_ppb < -kMaxDriftPpb) {
-    throw std::invalid_argument("a clock's drift is beyond 100000 ppm");
+    throw std::invalid_argument("the drift of a clock exceeds 100000 ppm");
   }
   if (config_.steps.size() > kMaxSteps) throw std::invalid_argument("a clock has more than 1000 steps");
   Duration sum = config_.offset;
   Duration before = Duration::min();
   for (const Step& step : config_.steps) {
     if (step.at <= before || beyond(step.at)) {
-      throw std::invalid_argument("the steps of a clock are not rising in time, or beyond 10 years");
+      throw std::invalid_argument("the times of a clock's steps must increase, and not exceed 10 years");
     }
     if (beyond(step.change) || beyond(sum += step.change)) {
       throw std::invalid_argument("the steps of a clock add up to more than 10 years");

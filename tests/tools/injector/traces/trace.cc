@@ -65,8 +65,7 @@ class Line {
 void write_text(std::ostream& to, std::string_view key, std::string_view text) {
   if (text.empty()) return;
   if (text.find_first_of("\r\n") != std::string_view::npos) {
-    throw std::invalid_argument("\"" + std::string(key) +
-                                "\" of a trace's header holds a line break, expected one line");
+    throw std::invalid_argument("\"" + std::string(key) + "\" in the header of a trace: expected one line");
   }
   to << "# " << key << ' ' << text << '\n';
 }
@@ -128,10 +127,10 @@ class Reader {
     if (from_.peek() == std::istream::traits_type::eof()) return false;
     std::getline(from_, line_);
     if (from_.bad()) fail("cannot be read");
-    if (from_.eof()) fail("the last line is not complete; remove it to use the trace without it");
+    if (from_.eof()) fail("the last line is incomplete; remove it to use the rest of the trace");
     if (number_ == 1) line_ = without_byte_order_mark(line_);
     if (line_.size() > kMaxTraceLine) fail("the line is longer than " + std::to_string(kMaxTraceLine) + " bytes");
-    if (line_.find('\r') != std::string::npos) fail("there is a carriage return, expected lines that end with \\n");
+    if (line_.find('\r') != std::string::npos) fail("found a carriage return, expected lines that end with \\n");
     return true;
   }
 
@@ -163,8 +162,7 @@ class Reader {
       if (delay < Duration::zero()) fail(key + " is " + shown(value) + ", expected a delay of 0 ns or more");
       trace_.benign[key == "benign up" ? 0 : 1] = delay;
     } else {
-      fail("# " + shown(key) +
-           " is not known, expected seed, start, up, down, tables, build, benign up or benign down");
+      fail("# " + shown(key) + ": unknown, expected seed, start, up, down, tables, build, benign up or benign down");
     }
   }
 
@@ -206,7 +204,7 @@ class Reader {
     if (!known_verdict) fail("verdict is " + shown(verdict) + ", expected pass, drop or dup");
     record.verdict = *known_verdict;
     const auto known_cause = parse_cause(cause);
-    if (!known_cause) fail("cause is " + shown(cause) + ", which is none that this program knows");
+    if (!known_cause) fail("cause is " + shown(cause) + ", which is unknown");
     record.cause = *known_cause;
     record.release = later("t_out_ns", t_out, record.arrival);
     if (!t_actual.empty()) record.actual = time("t_actual_ns", t_actual);

@@ -36,7 +36,7 @@ Duration median_delay(const Trace& trace, Direction direction) {
 TracePlayer::TracePlayer(const Trace& trace, Direction direction, std::uint32_t link, By by, LocalTime start)
     : by_(by), start_(start), recorded_start_(trace.start), wraps_(!trace.sparse()) {
   if (by == By::kTime && trace.sparse()) {
-    throw std::invalid_argument("a sparse trace cannot be replayed by time, only by index");
+    throw std::invalid_argument("a sparse trace can only be replayed by index");
   }
   const std::uint32_t wanted = recorded_link(trace, link);
   for (const TraceRecord& record : trace.records) {

@@ -81,7 +81,7 @@ void TraceRecorder::finish() {
   thread_.join();
   if (!stream_) throw std::runtime_error("cannot write " + file_.string() + ": the disk is full or gone");
   if (lost_ > 0) {
-    throw std::runtime_error(file_.string() + " has gaps: the disk was too slow for " + std::to_string(lost_) +
+    throw std::runtime_error(file_.string() + " is incomplete: the disk was too slow for " + std::to_string(lost_) +
                              " datagrams");
   }
 }

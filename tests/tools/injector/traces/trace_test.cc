@@ -153,9 +153,8 @@ TEST(Trace, WhatIsWrongIsNamedWithFileAndLine) {
   EXPECT_EQ(refusal(""), "run.csv:1: expected the first line of a trace, \"# tendon-trace 1\"");
   EXPECT_EQ(refusal("# tendon-trace 2\n"), "run.csv:1: expected the first line of a trace, \"# tendon-trace 1\"");
   EXPECT_EQ(refusal("# tendon-trace 1\n"), "run.csv:2: the trace ends before its column names");
-  EXPECT_EQ(
-      refusal("# tendon-trace 1\n# sed 7\n"),
-      "run.csv:2: # \"sed\" is not known, expected seed, start, up, down, tables, build, benign up or benign down");
+  EXPECT_EQ(refusal("# tendon-trace 1\n# sed 7\n"),
+            "run.csv:2: # \"sed\": unknown, expected seed, start, up, down, tables, build, benign up or benign down");
   EXPECT_EQ(refusal("# tendon-trace 1\n# seed 7\n# seed 7\n"), "run.csv:3: # seed occurs twice");
   EXPECT_EQ(refusal("# tendon-trace 1\n# seed -1\n"), "run.csv:2: seed is \"-1\", expected a whole number");
   EXPECT_EQ(refusal("# tendon-trace 1\n# seed\n"), "run.csv:2: # seed has no value");
@@ -163,9 +162,9 @@ TEST(Trace, WhatIsWrongIsNamedWithFileAndLine) {
             "run.csv:2: benign up is \"-1\", expected a delay of 0 ns or more");
   // Such a text could not be written back.
   EXPECT_EQ(refusal("# tendon-trace 1\n# down a\rb\n"),
-            "run.csv:2: there is a carriage return, expected lines that end with \\n");
+            "run.csv:2: found a carriage return, expected lines that end with \\n");
   EXPECT_EQ(refusal(with_lines("# note a\rb\n")),
-            "run.csv:4: there is a carriage return, expected lines that end with \\n");
+            "run.csv:4: found a carriage return, expected lines that end with \\n");
   EXPECT_EQ(refusal("# tendon-trace 1\n# tables 12 34\n"),
             "run.csv:2: tables is \"12\", expected 16 hexadecimal digits");
   EXPECT_EQ(refusal("# tendon-trace 1\nup,0,0\n").substr(0, 36), "run.csv:2: expected the column names");
@@ -175,7 +174,7 @@ TEST(Trace, WhatIsWrongIsNamedWithFileAndLine) {
   EXPECT_EQ(refusal(with_lines("up,0,0,1000,9,,lost,delay,9000,,,,,,,0\n")),
             "run.csv:4: verdict is \"lost\", expected pass, drop or dup");
   EXPECT_EQ(refusal(with_lines("up,0,0,1000,9,,pass,magic,9000,,,,,,,0\n")),
-            "run.csv:4: cause is \"magic\", which is none that this program knows");
+            "run.csv:4: cause is \"magic\", which is unknown");
   EXPECT_EQ(refusal(with_lines("up,0,0,1000,9,,pass,delay,999,,,,,,,0\n")),
             "run.csv:4: t_out_ns is earlier than t_in_ns");
   EXPECT_EQ(refusal(with_lines("up,0,0,1e9,9,,pass,delay,999,,,,,,,0\n")),
@@ -197,7 +196,7 @@ TEST(Trace, WhatIsWrongIsNamedWithFileAndLine) {
   EXPECT_EQ(refusal(with_lines("up,0,1,999,9,,pass,delay,9000,,,,,,,0\n" + good)),
             "run.csv:4: t_in_ns is earlier than that of a datagram of the same flow with a smaller index");
   EXPECT_EQ(refusal(with_lines(good.substr(0, 20))),
-            "run.csv:4: the last line is not complete; remove it to use the trace without it");
+            "run.csv:4: the last line is incomplete; remove it to use the rest of the trace");
 }
 
 // A small fuzz test: a valid trace with a few bytes changed, removed or moved.
