@@ -14,13 +14,14 @@ namespace tendon {
 /// for example "0 to 17: the rows of the table".
 inline void add_part_options(CLI::App& verb, Part& part, const std::string& units) {
   part.progress = isatty(STDERR_FILENO) != 0;
-  CLI::Option* const these = verb.add_option_function<std::string>(
-                                     "--units", [&part](const std::string& text) { part.units = parse_units(text); },
-                                     "a shard of a sweep: these units of " + units + "; lines of JSON (tendon-sweep)")
-                                 ->type_name("FIRST:COUNT");
+  CLI::Option* const these =
+      verb.add_option_function<std::string>(
+              "--units", [&part](const std::string& text) { part.units = parse_units(text); },
+              "Run only these units, as a shard of a sweep, and print JSON (see tendon-sweep). Units: " + units)
+          ->type_name("FIRST:COUNT");
   verb.add_option_function<std::string>(
           "--from", [&part](const std::string& file) { part.from = file; },
-          "runs nothing: says what the shards of a sweep came to (tendon-sweep merge)")
+          "Run nothing, but print the result of the shards of a sweep (see tendon-sweep merge)")
       ->type_name("FILE")
       ->excludes(these);
 }

@@ -92,7 +92,7 @@ int main(int argc, char** argv) {
                              "Usage: golden_decisions FOLDER\n\n"
                              "Write the decisions of the injector to FOLDER, one file for each profile.\n\n"
                              "Example: golden_decisions decisions && (cd decisions && sha256sum *.txt)\n"
-                             "Exit: 0 done; 1 cannot write; 2 wrong usage.\n",
+                             "Exit: 0 success; 1 cannot write; 2 wrong usage.\n",
                          .most_arguments = 1};
   if (const auto code = answer(usage, argc, argv)) return *code;
   if (argc != 2) {

@@ -8,14 +8,16 @@
 #include "tests/tools/lab/verbs/verb.h"
 
 int main(int argc, char** argv) {
-  CLI::App app("Experiments with Tendon.", "tendon-lab");
+  CLI::App app("Run experiments with Tendon.", "tendon-lab");
   tendon::usage::dress(app);
   app.set_version_flag("--version", tendon::version_text());
   app.require_subcommand(1);
   app.footer(
-      "\nExample: every stability controller in every situation, as tables and pictures\n"
-      "  tendon-lab compare --out comparison\n"
-      "\ntendon-lab VERB --help tells more.\n\nExit: 0 done; 1 failed; 2 wrong usage.");
+      "\n"
+      "Example: compare all stability controllers in all situations, with tables and figures\n"
+      "  tendon-lab compare --out comparison\n\n"
+      "Use tendon-lab VERB --help for more.\n\n"
+      "Exit: 0 success; 1 failed; 2 wrong usage.");
   int exit = 0;
   for (const tendon::lab::Verb& verb : tendon::lab::verbs()) verb.add(*app.add_subcommand(verb.name, verb.what), exit);
 

@@ -16,27 +16,28 @@ int main(int argc, char** argv) {
   std::vector<std::string> recordings;
   std::string picture;
   bool pairs = false;
-  CLI::App app("Sums up recorded runs as a table and a picture.", "tendon-report");
+  CLI::App app("Summarize recorded runs as a table and a picture.", "tendon-report");
   tendon::usage::dress(app);
   app.set_version_flag("--version", tendon::version_text());
-  app.add_option("RECORDING", recordings, "recordings of tendond, a column for each device in them")
+  app.add_option("RECORDING", recordings, "Recordings of tendond. The table has a column for each device")
       ->type_name("FILE.mcap")
       ->required();
-  app.add_option("--out", picture, "draw the runs side by side (needs gnuplot)")->type_name("FILE.svg|FILE.png");
-  app.add_option("--label", options.labels, "what a run is called; once for each recording, in order")
+  app.add_option("--out", picture, "Draw the runs side by side (requires gnuplot)")->type_name("FILE.svg|FILE.png");
+  app.add_option("--label", options.labels, "Name of a run; once for each recording, in order")
       ->type_name("TEXT")
       ->allow_extra_args(false);
-  app.add_option("--device", options.devices, "columns for this device only; once for each")
+  app.add_option("--device", options.devices, "Only this device; can be repeated")
       ->type_name("NAME")
       ->allow_extra_args(false);
-  app.add_flag("--pairs", pairs, "the recordings are of two coupled ends each, as `tendon-replay --merge` writes them");
+  app.add_flag("--pairs", pairs, "Each recording is of two coupled ends, from `tendon-replay --merge`");
   app.add_flag("--json", options.json,
-               "one JSON object for each device of each recording on stdout instead of the table");
-  app.add_flag("--check", options.check, "fails where the ledger of any device, or of a pair, has fallen below -1 nJ");
+               "Print JSON on stdout, one object per device of each recording, instead of the table");
+  app.add_flag("--check", options.check, "Fail if the ledger of a device, or of a pair, fell below -1 nJ");
   app.footer(
-      "\nExample: the same motion without and with the limiter\n"
-      "  tendon-report off.mcap on.mcap --label \"limiter off\" --label \"limiter on\" --out runs.svg\n"
-      "\nExit: 0 done; 1 a recording cannot be read, gnuplot or --check failed; 2 wrong usage.");
+      "\n"
+      "Example: the same motion without and with the limiter\n"
+      "  tendon-report off.mcap on.mcap --label \"limiter off\" --label \"limiter on\" --out runs.svg\n\n"
+      "Exit: 0 success; 1 failed, because a recording cannot be read, or gnuplot or --check failed; 2 wrong usage.");
 
   return tendon::run_tool(app, argc, argv, [&] {
     options.recordings.assign(recordings.begin(), recordings.end());

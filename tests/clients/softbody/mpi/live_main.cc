@@ -82,7 +82,7 @@ int main(int argc, char** argv) {
   app.footer(
       "\nExample:\n  tendon-bench-fem b1.toml \"mpirun -n 2 tendon-fem-worker --way multigrid\"\n\nPrints one JSON "
       "object.\n"
-      "Exit: 0 done; 1 the worker failed; 2 wrong usage.");
+      "Exit: 0 success; 1 the worker failed; 2 wrong usage.");
   try {
     usage::parse(app, argc, argv);
   } catch (const CLI::ParseError& error) {

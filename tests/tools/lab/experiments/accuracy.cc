@@ -233,7 +233,7 @@ std::vector<AccuracyPoint> ladder(Candidate candidate, const AccuracyOptions& op
     if (predicted(points, n, &AccuracyPoint::update_ms_p50, kPowerOfSolutions) > options.slowest_ms ||
         predicted(points, n, &AccuracyPoint::setup_s, kPowerOfFactors) > longest_setup ||
         predicted(points, n, &AccuracyPoint::measuring_s, kPowerOfMeasuring) > options.longest_point_s) {
-      left_out.push_back(name + ": would take too long");
+      left_out.push_back(name + ": takes too long");
       break;
     }
     if (options.part.progress) std::cerr << "\r" << name << "            " << std::flush;
@@ -364,7 +364,7 @@ std::optional<AccuracyPoint> best_within(const AccuracyOptions& options, Truth& 
   std::vector<AccuracyPoint> at_hand;
   for (Trial& trial : kept) {
     if (options.part.progress) {
-      std::cerr << "\rat the hand: " << trial.point.candidate.name() << " n=" << trial.point.candidate.n
+      std::cerr << "\rerror at the hand: " << trial.point.candidate.name() << " n=" << trial.point.candidate.n
                 << "            " << std::flush;
     }
     feel(trial, truth, *options.network, std::numeric_limits<double>::infinity());
@@ -392,25 +392,25 @@ double round_trip_ms(const Network& network) {
 void check(const AccuracyOptions& options) {
   if (options.resolutions.empty() || options.resolutions.front() < 1 ||
       !std::ranges::is_sorted(options.resolutions, std::less_equal<>())) {
-    throw std::invalid_argument("--n: expected ascending numbers of cells, as in 4,8,16");
+    throw std::invalid_argument("--n: expected ascending numbers of cells, for example 4,8,16");
   }
-  if (options.budget_ms && !options.network) throw std::invalid_argument("--budget-ms: say --network too");
+  if (options.budget_ms && !options.network) throw std::invalid_argument("--budget-ms: requires --network");
   if (options.budget_ms && options.out) {
-    throw std::invalid_argument("--out: there is no figure with --budget-ms, which measures no more than it must");
+    throw std::invalid_argument("--out: cannot be used with --budget-ms, which draws no figure");
   }
   options.block.check();
-  if (options.learned && options.budget_ms) throw std::invalid_argument("--learned: not with --budget-ms");
+  if (options.learned && options.budget_ms) throw std::invalid_argument("--learned: cannot be used with --budget-ms");
   if (options.learned && std::ranges::count(models_of(options), AnyModel(ModelKind::kNear)) == 0) {
-    throw std::invalid_argument("--learned: expected near among --models, whose bodies learn");
+    throw std::invalid_argument("--learned: expected the model near in --models, because only its bodies learn");
   }
   if (options.errors_only && (options.network || options.budget_ms)) {
     throw std::invalid_argument(
-        "--errors-only, --units and --from: not with --network or --budget-ms, whose answers "
-        "depend on times");
+        "--errors-only, --units and --from: cannot be used with --network or --budget-ms, whose results depend on "
+        "times");
   }
   if (options.errors_only && !options.worker.empty()) {
     throw std::invalid_argument(
-        "--worker: not with --errors-only, --units or --from, whose last bits are the same always");
+        "--worker: cannot be used with --errors-only, --units or --from, whose results must be identical in each run");
   }
   if (options.network) route_of(*options.network, 0);  // rejects an unknown network before measuring
 }
@@ -452,7 +452,7 @@ MeshErrors errors_of(const Candidate& candidate, Bench& bench) {
 
 void errors_only(const AccuracyOptions& options, std::ostream& out) {
   const std::vector<Candidate> meshes = candidates(options);
-  if (meshes.empty()) throw std::invalid_argument("--models, --elements: no such model has such an element");
+  if (meshes.empty()) throw std::invalid_argument("--models, --elements: none of these models has such an element");
   std::unique_ptr<Bench> bench;
   const SweptWork<MeshErrors> work{
       .what = "meshes",
@@ -495,7 +495,7 @@ void errors_only(const AccuracyOptions& options, std::ostream& out) {
     for (const AccuracyPoint& point : points) write_row(out, point);
     for (const MeshErrors& one : *all) {
       if (one.left_out.empty()) continue;
-      out << "left out: " << one.point.candidate.name() << " n=" << one.point.candidate.n << ": " << one.left_out
+      out << "omitted: " << one.point.candidate.name() << " n=" << one.point.candidate.n << ": " << one.left_out
           << "\n";
     }
   }
@@ -515,7 +515,7 @@ void accuracy(const AccuracyOptions& given, std::ostream& out) {
   options.errors_only = given.errors_only || given.part.units || given.part.from;
   check(options);
   if (options.errors_only) return errors_only(options, out);
-  if (options.part.progress) std::cerr << "the truth …" << std::flush;
+  if (options.part.progress) std::cerr << "computing the reference …" << std::flush;
   Truth truth(options.block, options.truth);
   truth.script();  // computed now, so that it is not charged to the first point
   const Meter meter;
@@ -550,20 +550,22 @@ void accuracy(const AccuracyOptions& given, std::ostream& out) {
   }
   if (options.part.progress) std::cerr << "\n";
   if (rows) {
-    out << "\nThe best, small load: nothing else is both quicker and closer (errors that cancel do not count):\n"
+    out << "\n"
+           "Best for the small load: no other mesh is both faster and more accurate (without the cancellation of "
+           "errors):\n"
         << heading(true);
     for (const AccuracyPoint& point : pareto_front(all, 0)) write_row(out, point);
     write_exponents(out, ladders);
     if (options.network) {
-      out << "\nAt the hand, behind " << options.network->name << ", seed " << options.network->seed << ":\n"
+      out << "\nAt the hand, with the network " << options.network->name << ", seed " << options.network->seed << ":\n"
           << kFeltHeading;
       for (const AccuracyPoint& point : all) write_felt(out, point);
     }
     if (!options.worker.empty()) {
       out << "\nworker: " << options.worker
-          << "; its times are on the wall, its solver's error is the bound that it sends\n";
+          << "; its times are elapsed times, and its solver error is the bound that it sends\n";
     }
-    for (const std::string& one : left_out) out << "left out: " << one << "\n";
+    for (const std::string& one : left_out) out << "omitted: " << one << "\n";
   }
   if (options.network && rows) {
     std::vector<AccuracyPoint> asked = all;

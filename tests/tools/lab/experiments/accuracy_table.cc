@@ -210,14 +210,14 @@ std::string to_json(const AccuracyPoint& point, Truth& truth) {
 }
 
 void write_truth(std::ostream& out, const TruthFigures& truth, const PressedBlock& block) {
-  out << "The truth: " << with_tenths(truth.linear) << " N/m while strains are small, " << with_tenths(truth.small)
+  out << "Reference: " << with_tenths(truth.linear) << " N/m for small strains, " << with_tenths(truth.small)
       << " N/m under " << load_text(block.loads[0]) << ", " << with_tenths(truth.hard) << " N/m under "
-      << load_text(block.loads[1]) << "; its own meshes leave " << with_tenths(100 * truth.uncertainty)
-      << " % open. Commit " << kCommit << "\n\n";
+      << load_text(block.loads[1]) << "; uncertainty of the reference: " << with_tenths(100 * truth.uncertainty)
+      << " %. Commit " << kCommit << "\n\n";
 }
 
 void write_exponents(std::ostream& out, const Ladders& ladders) {
-  out << "\nAn update takes as long as its unknowns to the power of\n";
+  out << "\nThe time of an update is proportional to the number of unknowns to the power of\n";
   for (const auto& ladder : ladders) {
     if (ladder.size() < 2) continue;
     std::array<char, 160> line{};
@@ -242,12 +242,12 @@ void write_answer(std::ostream& out, const AccuracyOptions& options, const std::
     }
     out << line.add("commit", kCommit).str() << "\n";
   } else if (!best) {
-    out << "\nNo model and mesh is quick enough and leaves the hand quiet.\n";
+    out << "\nNo model and mesh is fast enough and does not vibrate.\n";
   } else {
-    out << "\nClosest to the truth at the hand, on this machine and behind " << options.network->name;
+    out << "\nMost accurate at the hand, on this machine and with the network " << options.network->name;
     if (options.budget_ms) out << ", in " << shortest(*options.budget_ms) << " ms";
     out << ": " << best->candidate.name() << " with n = " << best->candidate.n << ", "
-        << with_tenths(100 * best->felt->force_error) << " % off where its own error is "
+        << with_tenths(100 * best->felt->force_error) << " % error at the hand, and an own error of "
         << with_tenths(100 * best->at_load[0].total) << " %.\n";
   }
 }

@@ -179,7 +179,8 @@ SweptWork<Point> work_of(const BoundaryOptions& options) {
                         .linear = number_of(line, "gil_n_per_m"),
                         .passive = number_of(line, "passive_n_per_m"),
                         .map = line.at("swings_up")};
-                if (p.map.size() != 2 * kMapped + 1) throw std::invalid_argument("another map");
+                if (p.map.size() != 2 * kMapped + 1)
+                  throw std::invalid_argument("expected a different number of points");
                 return p;
               },
           .count =
@@ -197,8 +198,8 @@ void boundary(const BoundaryOptions& options, std::ostream& out) {
   const auto points = outcomes(work_of(options), options.part, out);
   if (!points) return;
   if (!options.json) {
-    out << "The stiffest spring, N/m: " << options.mass << " kg, " << options.viscous
-        << " N s/m, nobody holds it; commit " << kCommit
+    out << "Stiffest stable spring, N/m: " << options.mass << " kg, " << options.viscous
+        << " N s/m, without a hand; commit " << kCommit
         << "\n\n   rate Hz  delay ms   simulated  eigenvalues  b/(T/2+t_d)   passive\n";
   }
   for (const Point& p : *points) {

@@ -217,13 +217,13 @@ void recommend(std::ostream& out, const std::string& where, const std::vector<Su
   const Summary* const lucky = best_of(false);
   out << "  " << where << ": ";
   if (safe == nullptr) {
-    out << "none that keeps its promise.\n";
+    out << "no law that keeps its promise.\n";
     return;
   }
   out << safe->contender.name << " (force error " << percent(safe->error) << ", stable in " << percent(safe->stable)
       << " of " << safe->cells << " cells)";
   if (lucky != nullptr && lucky->error < safe->error && lucky->stable >= safe->stable) {
-    out << "; without a promise for every object: " << lucky->contender.name << " (" << percent(lucky->error) << ")";
+    out << "; without a guarantee for every object: " << lucky->contender.name << " (" << percent(lucky->error) << ")";
   }
   out << ".\n";
 }
@@ -423,7 +423,7 @@ Cell cell_of(const nlohmann::json& json) {
     cell.preset = contender.preset;
     return cell;
   }
-  throw std::invalid_argument("law \"" + name + "\" is none of ours");
+  throw std::invalid_argument("law \"" + name + "\": unknown");
 }
 
 using Cells = std::vector<Cell>;
@@ -516,14 +516,19 @@ void report(const std::vector<Cell>& cells, const CompareOptions& options, std::
                   s.noticed * 100, s.limited * 100, s.latency * 1e3);
     out << line.data();
   }
-  out << "\npassive: the true ledger never below -1 nJ. given out: the most in any cell. Medians: error (rms, of the "
-         "true "
-         "force);\nfloor (the least error of any law that is passive in this one's sense, on the perfect spring: "
-         "tendon-lab floor);\nvibration (last second), and felt, the same as a hand feels it: dB above what it just "
-         "feels; noticed (share of the time in\nwhich the force is off by more than "
-      << kForceWeber * 100 << " %, which a hand tells); limited; latency. Stable: vibration at most 8 mm/s.\n";
-  out << "\nWhich one to use (the least median force error among the laws that promise to be passive and were, if "
-         "possible stable\nthroughout):\n";
+  out << "\n"
+         "passive: the true ledger is never below -1 nJ. given out: largest value of all cells. Medians: error (rms, "
+         "relative to the\n"
+         "true force); floor (least error of any law with the same passivity on the ideal spring, see tendon-lab "
+         "floor); vibration\n"
+         "(last second); felt (the same in dB above the threshold of a hand); noticed (share of the time in which the "
+         "error of the\n"
+         "force is above "
+      << kForceWeber * 100 << " %, the threshold of a hand); limited; latency. stable: vibration at most 8 mm/s.\n";
+  out << "\n"
+         "Which one to use (smallest median force error among the laws that guarantee passivity and were passive, if "
+         "possible\n"
+         "always stable):\n";
   for (const TestDevice& device : kDevices) {
     for (const bool soft : {true, false}) {
       const std::string object =
@@ -534,9 +539,9 @@ void report(const std::vector<Cell>& cells, const CompareOptions& options, std::
       recommend(out, object + "on this machine (no delay, 1 kHz)", summaries(cells, [&](const Situation& s) {
                   return here(s) && s.delay_ms == 0 && s.jitter_ms == 0 && s.rate_hz == 1000;
                 }));
-      recommend(out, object + "near (to 5 ms, from 200 Hz)",
+      recommend(out, object + "near (at most 5 ms, at least 200 Hz)",
                 summaries(cells, [&](const Situation& s) { return here(s) && s.delay_ms <= 5 && s.rate_hz >= 200; }));
-      recommend(out, object + "far or slow (20 ms and more, or 50 Hz and less)",
+      recommend(out, object + "far or slow (at least 20 ms, or at most 50 Hz)",
                 summaries(cells, [&](const Situation& s) { return here(s) && (s.delay_ms >= 20 || s.rate_hz <= 50); }));
     }
   }
@@ -547,13 +552,13 @@ void report(const std::vector<Cell>& cells, const CompareOptions& options, std::
            " %)";
   };
   out << "\naol+ is passive in " << v.passive << " of its " << v.cells << " cells. In " << share(v.beaten)
-      << " of them another law that promises to be passive, and was, has a lower force\nerror; in "
-      << share(v.beaten_clearly) << " by more than 5 %. Run again without one part at a time, it would not have been "
-      << "beaten without its robust\nledger (which pays for the counts of the encoder) in " << v.robust_ledger
+      << " of them, another law that guarantees passivity and was passive has a smaller force\nerror; in "
+      << share(v.beaten_clearly) << " by more than 5 %. In runs without one part, it would not have been beaten "
+      << "without its robust\nledger (which accounts for the steps of the encoder) in " << v.robust_ledger
       << ", its knee in " << v.knee << ", its energy cap in " << v.energy_cap << ", bounded acceleration in "
       << v.bounded_acceleration << "; in " << v.vibrating
-      << " it vibrates with an\nobject that the other law shows softer; in " << v.no_single_part
-      << " no single part is the reason.\n";
+      << " it vibrates with an\nobject that is softer with the other law; in " << v.no_single_part
+      << " the cause is no single part.\n";
   for (const std::string& file : written) out << "written: " << file << "\n";
   if (!out.flush()) throw std::runtime_error("cannot write the table: is the disk full?");
 }

@@ -167,7 +167,7 @@ void compare_kinds(const CompareKindsOptions& options, std::ostream& out) {
   }
   for (const std::string& kind : kinds) {
     if (!draw_situation(kind, first)) {
-      if (!options.json) out << kind << ": left out, because TENDON_DATA is not set\n\n";
+      if (!options.json) out << kind << ": omitted, because TENDON_DATA is not set\n\n";
       continue;
     }
     const std::vector<Result> results = results_of(kind, first, options.count, all, options.progress);
@@ -224,13 +224,13 @@ void compare_kinds(const CompareKindsOptions& options, std::ostream& out) {
     if (!options.json) out << "\n";
   }
   if (!options.json) {
-    out << "passive: the true ledger never below -1 nJ. Medians: error (rms, of the true force); vibration (last "
-           "second) "
-           "and felt, the\nsame as a hand feels it: dB above what it just feels; noticed: share of the time in which "
-           "the "
-           "force is off by more than a\nhand tells. beaten: situations in which a law that promises to be passive, "
-           "and "
-           "was, has an error more than 3 points lower;\nworst: points above the best of them.\n";
+    out << "passive: the true ledger is never below -1 nJ. Medians: error (rms, relative to the true force); vibration "
+           "(last second);\n"
+           "felt: the same in dB above the threshold of a hand; noticed: share of the time in which the error of the "
+           "force is above\n"
+           "the threshold of a hand. beaten: situations in which another law that guarantees passivity and was passive "
+           "has an error\n"
+           "more than 3 points smaller; worst: points above the best of them.\n";
   }
   if (!out.flush() || (csv.is_open() && !csv.flush())) throw std::runtime_error("cannot write: is the disk full?");
 }

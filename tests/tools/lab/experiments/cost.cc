@@ -164,7 +164,7 @@ std::vector<Costed> measure(const Bench& bench) {
   part("latency_reserve", [](Parts& p) { p.latency_reserve.emplace(); });
   part("bounded_acceleration", [](Parts& p) { p.bounded_acceleration = low_friction_parts(0).bounded_acceleration; });
   part("adaptive_friction", [](Parts& p) { p.adaptive_friction.emplace(); });
-  part("the default ones", [](Parts& p) { p = default_parts(kPaperEncoder); });
+  part("the default parts", [](Parts& p) { p = default_parts(kPaperEncoder); });
 
   lines.push_back(lines.front());
   lines.back().kind = "estimator";
@@ -187,7 +187,7 @@ void cost(const CostOptions& options, std::ostream& out) {
   const std::vector<Costed> lines = measure(bench);
   if (!options.json) {
     out << "One step of each, median of " << options.batches << " batches of " << kBatch << "; commit " << kCommit
-        << (bench.counts() ? "" : "\nInstructions: this kernel does not let us count them.") << "\n\n"
+        << (bench.counts() ? "" : "\nInstructions are not counted, because the kernel does not permit it.") << "\n\n"
         << "                                             ns  instructions  force error N\n";
   }
   for (const Costed& line : lines) {
@@ -216,9 +216,9 @@ void cost(const CostOptions& options, std::ostream& out) {
     out << text.data();
   }
   if (!options.json) {
-    out << "\nForce error: rms against a spring of " << kStiffness << " N/m (the estimators': " << kSoft
-        << ", 40 ms late) that answers at 25 Hz, on a hand that is free to move,\nb = 0.26 N s/m, "
-           "f_c = 0.02 N. Estimators stand before aol+ with its default parts.\n";
+    out << "\nForce error: rms against a spring of " << kStiffness << " N/m (for estimators: " << kSoft
+        << ", 40 ms late) with updates at 25 Hz, with a hand that is free to move,\n"
+           "b = 0.26 N s/m, f_c = 0.02 N. Estimators are used with aol+ and its default parts.\n";
   }
   if (options.out) {
     std::filesystem::create_directories(*options.out);

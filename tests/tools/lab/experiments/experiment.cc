@@ -180,7 +180,7 @@ class Hand {
 }  // namespace
 
 std::vector<Moment> run(const Experiment& experiment) {
-  if (!experiment.environment.force) throw std::invalid_argument("an experiment needs an environment");
+  if (!experiment.environment.force) throw std::invalid_argument("an experiment requires an environment");
   if (experiment.environment.period <= Duration::zero() || experiment.period <= Duration::zero())
     throw std::invalid_argument("a period must be above zero");
   HapticController heart(controller(experiment));

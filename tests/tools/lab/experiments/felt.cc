@@ -43,7 +43,7 @@ class Answers {
   const softbody::Feel& at(double t, const Vec3& tool) {
     if (t == asked_at_ && tool == asked_) return feel_;
     if (engine_.took(meter_.read() - start_) > longest_)
-      throw TooSlow("what is left at the hand takes too long to find");
+      throw TooSlow("computing the error at the hand takes too long");
     if (next_ < given_.size() && given_[next_].t == t && given_[next_].tool == tool) {
       feel_ = given_[next_++].feel;
     } else {

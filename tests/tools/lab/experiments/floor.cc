@@ -165,7 +165,7 @@ Floor floor_of(const FloorProblem& problem, Passive sense) {
   expect_above_zero(problem.max_force, "max_force");
   expect_above_zero(problem.acceleration, "acceleration");
   if (problem.dx.size() != problem.truth.size() || problem.dx.empty()) {
-    throw std::invalid_argument("a floor needs as many forces as travels, and one at least: got " +
+    throw std::invalid_argument("a floor requires as many forces as travels, at least one: got " +
                                 std::to_string(problem.truth.size()) + " and " + std::to_string(problem.dx.size()));
   }
   const auto finite = [](double value) { return std::isfinite(value); };
@@ -173,7 +173,7 @@ Floor floor_of(const FloorProblem& problem, Passive sense) {
     throw std::invalid_argument("dx and truth: expected finite numbers");
   }
   if (std::ranges::all_of(problem.truth, [](double force) { return force == 0; })) {
-    throw std::invalid_argument("truth: expected a force that is not zero, or every error is 0 of 0");
+    throw std::invalid_argument("truth: expected a force other than zero, because errors are relative to it");
   }
   return Programme(problem, sense).solve();
 }
@@ -236,8 +236,7 @@ void floors(const FloorOptions& options, std::ostream& out) {
     csv << "b_n_s_per_m,fc_n,stiffness_n_per_m,hand,passive,floor_percent,at_least_percent,commit\n";
   }
   if (!options.json) {
-    out << "The least error that any law can have, % of the true force, loose / firm hand on the perfect spring, 2 s; "
-           "commit "
+    out << "Least error of any law, % of the true force, for a loose / firm hand on the ideal spring, 2 s; commit "
         << kCommit << "\n\npassive          b N s/m";
     for (const double stiffness : kSprings) {
       std::array<char, 32> text{};

@@ -35,7 +35,7 @@ FrictionTable friction_table(double damping) {
 }
 
 void write(std::ostream& out, const std::vector<FrictionTable>& tables) {
-  out << "II, III  friction from ramps of force, 30 runs of a device whose friction is known (seed " << kSeed << ")\n"
+  out << "II, III  friction from ramps of force, 30 runs of a device with known friction (seed " << kSeed << ")\n"
       << "       true b, N s/m   Kelly b   integral b   at least   true f_c, N   Kelly f_c   integral f_c   trust\n";
   for (const FrictionTable& table : tables) {
     const PlaceEstimate& place = table.found.places.front();
@@ -46,7 +46,7 @@ void write(std::ostream& out, const std::vector<FrictionTable>& tables) {
                   std::string(to_string(table.found.trust)).c_str());
     out << line.data() << "       " << table.found.reason << "\n";
   }
-  out << "     assumed: Tables II and III are lost; ramps, travel, encoder and noise are chosen here\n";
+  out << "     assumed: ramps, travel, encoder and noise, because Tables II and III are not available\n";
 }
 
 JsonLine json_of(const FrictionTable& table) {

@@ -101,7 +101,7 @@ Delays netem_table(const NetemOptions& options) {
 /// A simulator that copies the recursion and treats x as uniform.
 Delays mixed_uniforms(const NetemOptions& options) {
   NetemRandom random(kRho, options.seed);
-  Delays result{"netem's x taken as uniform", kOrange, {}};
+  Delays result{"x of netem as uniform", kOrange, {}};
   for (std::size_t i = 0; i < options.count; ++i) {
     result.ms.push_back(exponential_quantile((random.next() + 0.5) * 0x1p-32));
   }

@@ -74,13 +74,13 @@ std::vector<PaperExperiment> make_experiments() {
   all.back().k_op = 180;
   all.back().uncontrolled = with(spring(100), milliseconds(1), milliseconds(300));
   all.back().improved.stiffness = [](double, const Vec3&) { return Mat3(2000 * Mat3::Identity()); };
-  all.back().better = "a local model comes with the late force";
+  all.back().better = "a local model with the late force";
 
   all.push_back(
       same_for_all("D", "low rate: F = -5000 N/m x, 25 Hz", "nothing", with(spring(5000), milliseconds(40), {})));
   all.back().k_op = 16;
   all.back().period = milliseconds(40);
-  all.back().better = "the limiter runs at 1 kHz, though the force comes at 25 Hz";
+  all.back().better = "a limiter at 1 kHz, with forces at 25 Hz";
 
   all.push_back(same_for_all("E", "stiff: F = -4000 N/m x", "nothing", spring(4000)));
   all.back().k_op = 500;
@@ -369,8 +369,10 @@ void paper(const PaperOptions& options, std::ostream& out) {
     for (const FrictionTable& table : friction) out << json_of(table).str() << "\n";
   } else {
     write(out, friction);
-    out << "\nK_op, largest force and share limited on the prescribed motion; vibration (rms faster than 50 ms, last "
-           "second) and stable on a\nhand that is free to move (400 N/m, 0.3 N s/m). Stable: at most 8 mm/s.\n";
+    out << "\n"
+           "K_op, largest force and share limited are for the prescribed motion; vibration (rms faster than 50 ms, "
+           "last second) and\n"
+           "stable for a hand that is free to move (400 N/m, 0.3 N s/m). stable: at most 8 mm/s.\n";
     for (const auto& picture : pictures) out << "picture: " << picture.string() << "\n";
   }
   if (!out.flush()) throw std::runtime_error("cannot write the table: is the disk full?");

@@ -65,7 +65,7 @@ Solid graded(const PressedBlock& block, softbody::Law law, double cells) {
 
 Patch patch_of(const TouchSurface& top, const PressedBlock& block) {
   const auto patch = top.patch(top.across(block.touch_point()));
-  if (!patch) throw std::invalid_argument("--patch-center-mm: less than half of the patch is on the block");
+  if (!patch) throw std::invalid_argument("--patch-center-mm: expected at least half of the patch on the block");
   return *patch;
 }
 
@@ -81,12 +81,12 @@ void PressedBlock::check() const {
   const auto expect = [](bool good, const char* what) {
     if (!good) throw std::invalid_argument(what);
   };
-  expect(size.allFinite() && size.minCoeff() > 0, "--block-mm: expected three lengths above 0, as in 100x100x50");
+  expect(size.allFinite() && size.minCoeff() > 0, "--block-mm: expected three lengths above 0, for example 100x100x50");
   softbody::check(material);
   expect(patch_radius > 0 && std::isfinite(patch_radius), "--patch-radius-mm: expected more than 0");
   expect(patch_centre.allFinite() && 2 * std::abs(patch_centre.x()) < size.x() &&
              2 * std::abs(patch_centre.y()) < size.y(),
-         "--patch-center-mm: expected a place on the top, counted from its middle");
+         "--patch-center-mm: expected a point on the top, relative to its center");
   expect(loads[0] > 0 && loads[1] > loads[0] && std::isfinite(loads[1]),
          "--loads-n: expected a small force above 0 and a larger one");
 }
@@ -110,7 +110,7 @@ Truth::~Truth() = default;
 Truth::Truth(const PressedBlock& block, const Config& config) : block_(block), config_(config) {
   block.check();
   if (!(config.cells >= 1.5 && config.cells_for_large >= 1.5)) {
-    throw std::invalid_argument("the truth needs 1.5 cells or more to a patch's radius");
+    throw std::invalid_argument("the reference requires 1.5 cells or more per radius of the patch");
   }
   fine_ = std::make_unique<Fine>(block, config.cells);
   linear_ = fine_->model.press(patch_of(fine_->top, block), Given::kForce, block.loads[0]).stiffness;
@@ -118,7 +118,7 @@ Truth::Truth(const PressedBlock& block, const Config& config) : block_(block), c
 
 Stiffness Truth::stiffness(std::size_t load) {
   const auto found = limit(softbody::Law::kNeoHookean, load);
-  if (!found) throw std::invalid_argument("--loads-n: the block collapses under so large a force");
+  if (!found) throw std::invalid_argument("--loads-n: the block collapses under this force");
   return *found;
 }
 

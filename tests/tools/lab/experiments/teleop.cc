@@ -96,7 +96,7 @@ TeleopRow row_of(CouplingMethod method, int round_trip_ms, std::span<const Trial
   std::vector<double> first;
   std::vector<double> second;
   for (const Trial& one : trials) {
-    if (!one.live) throw std::runtime_error(std::string(to_string(method)) + " did not stay engaged");
+    if (!one.live) throw std::runtime_error(std::string(to_string(method)) + ": the coupling did not stay engaged");
     first.push_back(one.first);
     second.push_back(one.second);
     row.buzz = std::max(row.buzz, one.buzz);
@@ -205,7 +205,7 @@ void draw(const std::vector<TeleopRow>& rows, const TeleopOptions& options, std:
                               std::to_string(options.seed) + "; each way varies by 20 %, 10 % lost; every pair passive";
   for (const auto& file : draw_panels(*options.out / "teleop", "What a hand feels of a wall behind a network", figures,
                                       {press[0], press[1]})) {
-    out << "drew " << file.string() << '\n';
+    out << "picture: " << file.string() << '\n';
   }
 }
 

@@ -113,7 +113,7 @@ GoldenTable read_golden(const std::filesystem::path& file) {
   std::ifstream in = open_regular_file(file, "golden table");
   std::string line;
   if (!std::getline(in, line) || !line.starts_with("law,situation,")) {
-    throw std::runtime_error(file.string() + ": expected a table that begins with law,situation,");
+    throw std::runtime_error(file.string() + ": expected a table that starts with law,situation,");
   }
   GoldenTable table;
   table.columns = cells_of(line);
@@ -208,7 +208,7 @@ bool golden_costs(const GoldenOptions& options, std::ostream& out) {
   const CostTable is = count_law_costs(options.law_cost);
   const std::string found = cost_differences(was, is);
   if (found.empty()) {
-    out << is.rows.size() << " laws cost what " << file.string() << " says, within 2 %\n";
+    out << is.rows.size() << " laws have the costs in " << file.string() << ", within 2 %\n";
   } else {
     out << found;
   }
@@ -224,9 +224,9 @@ bool golden(const GoldenOptions& options, std::ostream& out) {
   if (!options.write) {
     const auto found = differences(read_golden(file), is);
     if (found.empty()) {
-      out << is.rows.size() << " rows of " << file.string() << " are the same bit for bit\n";
+      out << is.rows.size() << " rows of " << file.string() << " are identical\n";
     } else {
-      out << to_text(found) << found.size() << " figures differ from " << file.string() << "\n";
+      out << to_text(found) << found.size() << " values differ from " << file.string() << "\n";
     }
     return found.empty();
   }

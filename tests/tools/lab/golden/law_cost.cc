@@ -77,7 +77,7 @@ CostTable read_costs(const std::filesystem::path& file) {
 
 std::string why_not_comparable(const CostTable& was, const CostTable& is) {
   if (was.built_with == is.built_with) return {};
-  return "the committed costs were counted with " + was.built_with + "; this build is of " + is.built_with;
+  return "the committed costs are for " + was.built_with + "; this build uses " + is.built_with;
 }
 
 std::string cost_differences(const CostTable& was, const CostTable& is) {
@@ -85,16 +85,16 @@ std::string cost_differences(const CostTable& was, const CostTable& is) {
   for (const CostTable::Row& row : is.rows) {
     const CostTable::Row* const before = find(was, row.law);
     if (before == nullptr) {
-      text += row.law + ": not in the table, " + tenths(row.instructions) + " instructions a step now\n";
+      text += row.law + ": not in the table; now " + tenths(row.instructions) + " instructions per step\n";
     } else if (std::abs(row.instructions - before->instructions) > kCostTolerance * before->instructions) {
       std::array<char, 32> share{};
       std::snprintf(share.data(), share.size(), "%+.1f %%", 100 * (row.instructions / before->instructions - 1));
-      text += row.law + ": committed " + tenths(before->instructions) + " instructions a step, " +
+      text += row.law + ": committed " + tenths(before->instructions) + " instructions per step, " +
               tenths(row.instructions) + " now, " + share.data() + "\n";
     }
   }
   for (const CostTable::Row& row : was.rows) {
-    if (find(is, row.law) == nullptr) text += row.law + ": in the table, but no law now\n";
+    if (find(is, row.law) == nullptr) text += row.law + ": in the table, but the law does not exist\n";
   }
   return text;
 }

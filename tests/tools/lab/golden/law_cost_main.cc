@@ -36,10 +36,10 @@ int main(int argc, char** argv) {
   const PlainUsage usage{
       .help =
           "Usage: law-cost\n\n"
-          "Steps every law of the limiter, so that callgrind can count the instructions, and prints\n"
-          "the laws' names.\n\n"
+          "Run the steps of each law of the limiter, so that callgrind can count the instructions, and print\n"
+          "the names of the laws.\n\n"
           "Example: tendon-lab golden --cost\n"
-          "Exit: 0 done; 2 wrong usage.\n"};
+          "Exit: 0 success; 2 wrong usage.\n"};
   if (const auto code = answer(usage, argc, argv)) return *code;
   for (const LawInfo& law : laws()) {
     LimiterConfig config = lab::measured_limiter(law.law);

@@ -47,17 +47,17 @@ TEST(LawCostTable, ADifferenceOfMoreThanTwoPercentNamesTheLawAndBothFigures) {
   const CostTable was{"gcc", {{"aol", 100}, {"aol+", 200}, {"clamp", 50}, {"gone", 9}}};
   const CostTable is{"gcc", {{"aol", 101.9}, {"aol+", 210}, {"clamp", 48.5}, {"new", 7}}};
   EXPECT_EQ(cost_differences(was, is),
-            "aol+: committed 200.0 instructions a step, 210.0 now, +5.0 %\n"
-            "clamp: committed 50.0 instructions a step, 48.5 now, -3.0 %\n"
-            "new: not in the table, 7.0 instructions a step now\n"
-            "gone: in the table, but no law now\n");
+            "aol+: committed 200.0 instructions per step, 210.0 now, +5.0 %\n"
+            "clamp: committed 50.0 instructions per step, 48.5 now, -3.0 %\n"
+            "new: not in the table; now 7.0 instructions per step\n"
+            "gone: in the table, but the law does not exist\n");
   EXPECT_EQ(cost_differences(was, was), "");
 }
 
 TEST(LawCostTable, IsNotComparedWithThatOfAnotherCompiler) {
   EXPECT_EQ(why_not_comparable({"GNU 12", {}}, {"GNU 12", {}}), "");
   EXPECT_EQ(why_not_comparable({"GNU 12", {}}, {"GNU 13", {}}),
-            "the committed costs were counted with GNU 12; this build is of GNU 13");
+            "the committed costs are for GNU 12; this build uses GNU 13");
 }
 
 }  // namespace

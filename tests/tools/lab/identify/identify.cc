@@ -43,14 +43,14 @@ struct Source {
 
 std::string inertia_bounds(const FreedomInfo& freedom) {
   return "expected " + shortest(freedom.bounds.least_inertia) + " to " + shortest(freedom.bounds.most_inertia) + " " +
-         std::string(freedom.inertia_unit) + ", as every handle has";
+         std::string(freedom.inertia_unit) + ", which is the range of handles";
 }
 
 void check(const IdentifyOptions& options) {
   const int sources =
       (options.files.empty() ? 0 : 1) + (options.profile ? 1 : 0) + (options.simulated_friction ? 1 : 0);
   if (sources == 0) throw std::invalid_argument("expected a CSV file, --simulate or --simulate-friction, found none");
-  if (sources > 1) throw std::invalid_argument("expected CSV files or one simulation, found more than one of them");
+  if (sources > 1) throw std::invalid_argument("expected either CSV files or one simulation, found several of them");
   if (!options.places.empty() && options.places.size() != options.files.size()) {
     throw std::invalid_argument("expected --axis once for each of " + std::to_string(options.files.size()) +
                                 " files, found " + std::to_string(options.places.size()));
@@ -74,8 +74,8 @@ void check(const IdentifyOptions& options) {
                                 "; is it in " + std::string(freedom.wrong_step_unit) + "?");
   }
   if (options.profile && options.freedom != Freedom::kMovement) {
-    throw std::invalid_argument("--simulate " + *options.profile + ": expected --of movement: no profile has motors " +
-                                "that turn or grip; --simulate-friction simulates them");
+    throw std::invalid_argument("--simulate " + *options.profile + ": expected --of movement, because no profile " +
+                                "has motors for rotation or a gripper; use --simulate-friction for them");
   }
 }
 
@@ -175,7 +175,7 @@ std::string impossible(const FreedomInfo& freedom, const RampRun& run) {
   if (travel <= freedom.bounds.travel) return "";
   const std::string unit(freedom.position_unit);
   return "the travel is " + rounded(travel, 4) + " " + unit + ", expected at most " +
-         rounded(freedom.bounds.travel, 4) + " " + unit + ", which no handle exceeds; are the positions in " +
+         rounded(freedom.bounds.travel, 4) + " " + unit + " for a handle; are the positions in " +
          std::string(freedom.wrong_position_unit) + "?";
 }
 
@@ -214,7 +214,7 @@ void refuse_impossible(const Source& source, const Identification& result) {
     if (std::abs(found) <= most) return;
     throw std::runtime_error("the runs fit a friction of " + rounded(found, 4) + " " + std::string(unit) +
                              ", expected at most " + shortest(most) + " " + std::string(unit) +
-                             ", which no handle exceeds; are all columns in s, " + position + " and " + effort +
+                             " for a handle; are all columns in s, " + position + " and " + effort +
                              ", and the mass in " + std::string(freedom.inertia_unit) + "?");
   };
   check_friction(result.estimate.viscous, bounds.friction.viscous, freedom.viscous_unit);
@@ -280,7 +280,7 @@ void write_table(const Source& source, const Identification& result, std::ostrea
   out << formatted("%s %.4g %s%s, noise %.2g %s\n\n", turns ? "inertia" : "mass", result.mass,
                    std::string(freedom.inertia_unit).c_str(), source.config.mass ? " (given)" : " (fitted)",
                    result.force_noise, std::string(freedom.effort_unit).c_str())
-      << "Trusted: " << to_string(result.trust) << ". " << result.reason << ".\n";
+      << "Valid: " << to_string(result.trust) << ". " << result.reason << ".\n";
   for (const std::string& warning : result.warnings) out << "Warning: " << warning << ".\n";
   if (result.trust == Trust::kNeither) return;
   const Friction bound = bound_of(source, result);

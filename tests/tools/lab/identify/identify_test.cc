@@ -80,12 +80,12 @@ TEST_F(Identify, EndsWithAFragmentOfAScene) {
   ASSERT_NE(fragment, std::string::npos) << text;
   EXPECT_NEAR(value_after(text.substr(fragment), "coulomb_friction_n = "), 0.0497, 0.0003);
   EXPECT_NEAR(value_after(text.substr(fragment), "viscous_friction_n_s_per_m = "), 0.0042, 0.0008);
-  EXPECT_TRUE(holds(text, "Trusted: integral. Kelly's fit is not valid at x: the slide of")) << text;
+  EXPECT_TRUE(holds(text, "Valid: integral. Kelly's fit is not valid at x: the slide of")) << text;
 }
 
 TEST_F(Identify, TrustsBothOnMuchFriction) {
   const std::string text = output_of({.simulated_friction = Friction{.coulomb = 0.05, .viscous = 0.26}});
-  EXPECT_TRUE(holds(text, "Trusted: both.")) << text;
+  EXPECT_TRUE(holds(text, "Valid: both.")) << text;
 }
 
 TEST_F(Identify, ReadsRecordedRunsAndGivesOneObjectForEachAndOneForTheResult) {
@@ -185,21 +185,22 @@ TEST_F(Identify, RefusesWhatNoHandleHasAndNamesTheUnitThatWasMeant) {
             ms[0].string() + ": the samples are 1 s apart, expected at most 0.05 s; are the times in ms?");
   const std::string mm = error_of({.files = recorded_runs({.position = 1000})});
   EXPECT_TRUE(holds(mm, "0.csv: the travel is ")) << mm;
-  EXPECT_TRUE(holds(mm, " m, expected at most 3 m, which no handle exceeds; are the positions in mm?")) << mm;
+  EXPECT_TRUE(holds(mm, " m, expected at most 3 m for a handle; are the positions in mm?")) << mm;
   const std::string mn = error_of({.files = recorded_runs({.force = 1000})});
   EXPECT_TRUE(holds(mn, "the runs fit an inertia of 7")) << mn;
-  EXPECT_TRUE(holds(mn, "kg, expected 0.001 to 20 kg, as every handle has; are the times in ms, or the efforts in mN?"))
+  EXPECT_TRUE(holds(
+      mn, "kg, expected 0.001 to 20 kg, which is the range of handles; are the times in ms, or the efforts in mN?"))
       << mn;
   const auto runs = recorded_runs();
   EXPECT_EQ(error_of({.files = runs, .mass = 75}),
-            "--mass 75: expected 0.001 to 20 kg, as every handle has; is it in g?");
+            "--mass 75: expected 0.001 to 20 kg, which is the range of handles; is it in g?");
   EXPECT_EQ(error_of({.files = runs, .encoder_step = 30}), "--encoder-step 30: expected at most 0.001 m; is it in µm?");
 }
 
 TEST_F(Identify, GivesNoBoundsWhereNothingIsTrusted) {
   IdentifyOptions options{.simulated_friction = Friction{.coulomb = 0.05, .viscous = 0.26}, .mass = 0.0375};
   const std::string text = output_of(options);
-  EXPECT_TRUE(holds(text, "Trusted: neither.")) << text;
+  EXPECT_TRUE(holds(text, "Valid: neither.")) << text;
   EXPECT_FALSE(holds(text, "ower bound")) << text;
   options.json = true;
   EXPECT_FALSE(holds(output_of(options), "lower_bound"));
@@ -217,7 +218,7 @@ TEST_F(Identify, NamesTheFileWhoseRunCannotBeUsed) {
 
 TEST_F(Identify, RefusesOptionsThatMakeNoSense) {
   EXPECT_TRUE(holds(error_of({}), "expected a CSV file"));
-  EXPECT_TRUE(holds(error_of({.files = {"a.csv"}, .profile = "touch"}), "more than one"));
+  EXPECT_TRUE(holds(error_of({.files = {"a.csv"}, .profile = "touch"}), "found several"));
   EXPECT_TRUE(holds(error_of({.files = {"a.csv"}, .places = {"x", "y"}}), "--axis once for each of 1 files, found 2"));
   EXPECT_EQ(error_of({.profile = "tuch"}),
             "--simulate tuch: expected one of phantom-premium, touch, falcon; did you mean touch?");

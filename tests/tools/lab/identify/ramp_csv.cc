@@ -24,7 +24,7 @@ RampRun read_ramp_csv(std::istream& in, const std::string& name, Freedom freedom
   while (table.next_row()) {
     const RampSample sample{table.needed_number(t), table.needed_number(position), table.needed_number(effort)};
     if (!run.samples.empty() && !(sample.t > run.samples.back().t)) {
-      table.fail("expected a time after that of the row before, found '" + std::string(table.text(t.index)) + "'");
+      table.fail("expected a time after that of the previous row, found '" + std::string(table.text(t.index)) + "'");
     }
     if (run.samples.size() == kMaxRows)
       table.fail("expected at most " + std::to_string(kMaxRows) + " rows, found more");

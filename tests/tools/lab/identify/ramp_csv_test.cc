@@ -41,7 +41,7 @@ TEST(RampCsv, SaysInWhichLineWhatIsWrong) {
   EXPECT_EQ(error_of(good + "1,2 m,3\n"), "run.csv:3: expected a finite number as x_m, found '2 m'");
   EXPECT_EQ(error_of(good + "1,nan,3\n"), "run.csv:3: expected a finite number as x_m, found 'nan'");
   EXPECT_EQ(error_of(good + "1,,3\n"), "run.csv:3: expected a finite number as x_m, found ''");
-  EXPECT_EQ(error_of(good + "0,1,1\n"), "run.csv:3: expected a time after that of the row before, found '0'");
+  EXPECT_EQ(error_of(good + "0,1,1\n"), "run.csv:3: expected a time after that of the previous row, found '0'");
 }
 
 TEST(RampCsv, ConvertsTheUnitsThatItsColumnsName) {

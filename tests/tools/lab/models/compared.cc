@@ -21,43 +21,43 @@ constexpr std::array kModels{
     Info{.kind = Kind::kStVenantKirchhoff,
          .law = Law::kStVenantKirchhoff,
          .name = "stvk",
-         .what = "large rotations; it collapses under a hard press",
+         .what = "large rotations; collapses under large loads",
          .has_time = false,
          .tetrahedra = false},
     Info{.kind = Kind::kMassSpring,
          .law = Law::kLinear,
          .name = "mass-spring",
-         .what = "springs along the edges, which know no Poisson ratio",
+         .what = "springs along the edges, without a Poisson ratio",
          .has_time = false,
          .tetrahedra = true},
     Info{.kind = Kind::kTensorMass,
          .law = Law::kLinear,
          .name = "tensor-mass",
-         .what = "small strains in explicit steps",
+         .what = "small strains with explicit time steps",
          .has_time = true,
          .tetrahedra = false},
     Info{.kind = Kind::kTled,
          .law = Law::kStVenantKirchhoff,
          .name = "tled",
-         .what = "stvk in explicit steps",
+         .what = "stvk with explicit time steps",
          .has_time = true,
          .tetrahedra = false},
     Info{.kind = Kind::kXpbd,
          .law = Law::kNeoHookean,
          .name = "xpbd",
-         .what = "as stiff as its step and its iterations make it",
+         .what = "stiffness depends on the step and the iterations",
          .has_time = true,
          .tetrahedra = true},
     Info{.kind = Kind::kProjective,
          .law = Law::kCorotational,
          .name = "projective",
-         .what = "elements as rigid as possible, a few rounds for each answer",
+         .what = "elements as rigid as possible, a few iterations per answer",
          .has_time = false,
          .tetrahedra = false},
     Info{.kind = Kind::kModal,
          .law = Law::kLinear,
          .name = "modal",
-         .what = "a few swings of the body, too stiff where it is touched",
+         .what = "a few vibration modes, too stiff near the contact",
          .has_time = false,
          .tetrahedra = false},
 };
@@ -84,7 +84,7 @@ ModalModel::Config modal_config(const Config& config, const TouchSurface& surfac
 
 std::unique_ptr<Model> model_of(Kind kind, const Solid& solid, const TouchSurface& surface, const Vec3& middle,
                                 const Config& config) {
-  if (solid.law() != info(kind).law) throw std::invalid_argument("the solid has another law than the model");
+  if (solid.law() != info(kind).law) throw std::invalid_argument("the solid has a different law than the model");
   switch (kind) {
     case Kind::kStVenantKirchhoff:
       return std::make_unique<QuasiStaticModel>(solid, surface, QuasiStaticModel::Config{}, config.effects);
@@ -101,7 +101,7 @@ std::unique_ptr<Model> model_of(Kind kind, const Solid& solid, const TouchSurfac
       break;
   }
   if (config.effects.gravity || config.effects.has_time()) {
-    throw std::invalid_argument("this model simulates no effect on the whole body");
+    throw std::invalid_argument("this model does not simulate effects on the whole body");
   }
   return std::make_unique<ModalModel>(solid, surface, modal_config(config, surface, middle));
 }

@@ -40,7 +40,7 @@ ExplicitModel::ExplicitModel(const Solid& solid, const TouchSurface& surface, co
   const double limit = largest_step(solid, effects.density);
   if (!(dt_ <= limit)) {
     std::ostringstream text;
-    text << "an explicit step of " << 1e3 * dt_ << " ms is not stable: this mesh of this material wants at most "
+    text << "an explicit step of " << 1e3 * dt_ << " ms is not stable: this mesh and material require at most "
          << 1e3 * limit << " ms";
     throw std::invalid_argument(text.str());
   }

@@ -24,7 +24,7 @@ std::vector<double> factors_of(const Solid& solid) {
 
 SpringNet::SpringNet(const Mesh& at_rest, double young, const Fixed& fixed, const std::vector<double>& factors)
     : Elastic(at_rest, fixed) {
-  if (mesh().shape != Shape::kTet4) throw std::invalid_argument("a net of springs wants a mesh of tetrahedra");
+  if (mesh().shape != Shape::kTet4) throw std::invalid_argument("a spring network requires a mesh of tetrahedra");
   std::map<std::pair<int, int>, double> volumes;  // the volumes around each edge, multiplied by the factors
   for (int e = 0; e < mesh().element_count(); ++e) {
     const auto nodes = mesh().element(e);

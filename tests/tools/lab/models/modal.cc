@@ -24,7 +24,7 @@ ModalModel::ModalModel(const Solid& solid, const TouchSurface& surface, const Co
   MatrixXd shapes = swings.shapes * swings.squares.cwiseSqrt().cwiseInverse().asDiagonal();  // xᵀ K x = 1
   for (const Vec2& middle : config.patches) {
     const auto patch = surface.patch(middle);
-    if (!patch) throw std::invalid_argument("a static mode's patch is not on the body");
+    if (!patch) throw std::invalid_argument("the patch of a static mode is not on the body");
     // Gram-Schmidt; the second pass removes rounding errors of the first.
     VectorXd shape = linear.displacements(*patch);
     shape /= std::sqrt(shape.dot(stiffness.times(shape)));

@@ -40,7 +40,8 @@ Spectra::SymEigsSolver<Operator<Apply>> largest(Operator<Apply>& op, int count) 
   Spectra::SymEigsSolver<Operator<Apply>> solver(op, count, std::min<Eigen::Index>(size, std::max(2 * count, 20)));
   solver.init();
   if (solver.compute(Spectra::SortRule::LargestAlge, kMostRestarts, kPrecision) < count) {
-    throw std::runtime_error("the swings of the body were not found: Lanczos' method did not converge");
+    throw std::runtime_error(
+        "the vibration modes of the body were not found, because the Lanczos method did not converge");
   }
   return solver;
 }
@@ -62,7 +63,7 @@ double fastest_swing(const SymmetricMatrix& stiffness, const VectorXd& mass) {
 
 Swings slowest_swings(const SymmetricMatrix& stiffness, const VectorXd& mass, int count) {
   expect(count >= 1 && count <= stiffness.size, "count", count,
-         "1 to " + std::to_string(stiffness.size) + ", the number of the body's displacements");
+         "1 to " + std::to_string(stiffness.size) + ", the number of displacements of the body");
   const VectorXd root = mass.cwiseSqrt();
   const VectorXd scale = root.cwiseInverse();
   Swings swings;

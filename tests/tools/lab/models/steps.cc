@@ -9,7 +9,7 @@ namespace tendon::softbody::compared {
 
 void check_only_with_inertia(const EffectsConfig& config) {
   check(config);
-  if (!config.inertia) throw std::invalid_argument("this model is made of steps of time: it wants inertia");
+  if (!config.inertia) throw std::invalid_argument("this model uses time steps and requires inertia");
   if (config.viscosity) throw std::invalid_argument("this model does not simulate viscosity");
 }
 

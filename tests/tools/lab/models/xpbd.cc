@@ -20,7 +20,7 @@ XpbdModel::XpbdModel(const Solid& solid, const TouchSurface& surface, int iterat
       u_(VectorXd::Zero(solid.size())),
       velocity_(VectorXd::Zero(solid.size())) {
   check_only_with_inertia(effects);
-  if (solid.mesh().shape != Shape::kTet4) throw std::invalid_argument("xpbd wants a mesh of tetrahedra");
+  if (solid.mesh().shape != Shape::kTet4) throw std::invalid_argument("xpbd requires a mesh of tetrahedra");
   expect(iterations >= 1, "iterations", iterations, "1 or more");
   for (int e = 0; e < solid.mesh().element_count(); ++e) {
     const auto nodes = solid.mesh().element(e);

@@ -73,7 +73,7 @@ void check_picture_name(const std::filesystem::path& path) {
   if (path.extension() != ".svg" && path.extension() != ".png")
     throw std::invalid_argument(path.string() + ": expected a name that ends with .svg or .png");
   if (std::ranges::any_of(path.string(), [](char c) { return static_cast<unsigned char>(c) < 0x20; }))
-    throw std::invalid_argument("the name of the picture has control characters in it");
+    throw std::invalid_argument("the file name of the picture contains control characters");
   expect_replaceable(path, {path.extension() == ".svg" ? kSvgBegins : kPngBegins});
 }
 
@@ -91,11 +91,11 @@ void run_gnuplot(const std::string& script, const std::filesystem::path& path) {
     if (is_whole(path)) return;
     std::error_code ignored;
     if (std::filesystem::is_regular_file(path, ignored)) std::filesystem::remove(path, ignored);
-    throw std::runtime_error("cannot write " + path.string() + ": the picture has no end; is the disk full?");
+    throw std::runtime_error("cannot write " + path.string() + ": the picture is truncated; is the disk full?");
   }
   if (WIFEXITED(status) && WEXITSTATUS(status) == 127)
     throw std::runtime_error("cannot draw " + path.string() + ": gnuplot is not installed (package gnuplot-nox)");
-  throw std::runtime_error("cannot draw " + path.string() + ": gnuplot failed; what it says is above");
+  throw std::runtime_error("cannot draw " + path.string() + ": gnuplot failed, see its messages above");
 }
 
 }  // namespace tendon::lab

@@ -205,11 +205,11 @@ class Script {
     label(left(i), kHeading, drawing.label) << "font ':Bold,20' tc rgb '" << kInk << "'\n";
 
     const std::string given_out = with_unit(run.energy_given_out, "J");
-    std::string verdict = "active: gave out " + given_out + " that nobody had put in";
+    std::string verdict = "active: gave out " + given_out + " that was never put in";
     if (run.passive()) {
-      verdict = "passive: gave out nothing that the hand had not put in";
+      verdict = "passive: gave out no energy that was never put in";
     } else if (run.kept_its_promise()) {
-      verdict = "gave out " + given_out + ", all in holds beyond the limiter's bound";
+      verdict = "gave out " + given_out + ", only in holds longer than the limiter's bound";
     }
     label(left(i), kFigures, verdict) << "tc rgb '" << (run.kept_its_promise() ? kGreen : kVermilion) << "'\n";
 
@@ -325,7 +325,7 @@ class Script {
 
 void check_picture(const std::filesystem::path& path, std::size_t drawings) {
   if (drawings == 0 || drawings > kMostDrawings)
-    throw std::invalid_argument("a picture holds 1 to " + std::to_string(kMostDrawings) + " runs, got " +
+    throw std::invalid_argument("a picture has 1 to " + std::to_string(kMostDrawings) + " runs, got " +
                                 std::to_string(drawings));
   check_picture_name(path);
 }

@@ -26,20 +26,20 @@ struct ReasonName {
   const char* meaning;
 };
 constexpr std::array kReasonNames = {
-    ReasonName{Reason::kEnergy, "energy", "the limiter: energy was not earned"},
-    ReasonName{Reason::kMaxForce, "max_force", "above the largest force"},
-    ReasonName{Reason::kSlew, "slew", "force may not jump that fast"},
-    ReasonName{Reason::kRampIn, "ramp_in", "forces just began: ramped in"},
-    ReasonName{Reason::kHeld, "held", "late: last force held"},
-    ReasonName{Reason::kDecaying, "decaying", "later: fading it out"},
+    ReasonName{Reason::kEnergy, "energy", "limiter: not enough energy"},
+    ReasonName{Reason::kMaxForce, "max_force", "limit of the force"},
+    ReasonName{Reason::kSlew, "slew", "limit of the force rate"},
+    ReasonName{Reason::kRampIn, "ramp_in", "forces ramp in at the start"},
+    ReasonName{Reason::kHeld, "held", "late: last force is held"},
+    ReasonName{Reason::kDecaying, "decaying", "later: last force decays"},
     ReasonName{Reason::kSafeStop, "safe_stop", "too late: safe stop"},
     ReasonName{Reason::kNotFinite, "not_finite", "not a number"},
-    ReasonName{Reason::kFault, "fault", "latched fault"},
-    ReasonName{Reason::kDeviceClamp, "device_clamp", "the device gave less"},
-    ReasonName{Reason::kUnseen, "unseen", "the device gave no position"},
-    ReasonName{Reason::kDisarmed, "disarmed", "the operator disarmed"},
-    ReasonName{Reason::kDamped, "damped", "the limiter: a vibration is damped"},
-    ReasonName{Reason::kAcceleration, "acceleration", "no limit: the hand accelerated too hard"},
+    ReasonName{Reason::kFault, "fault", "fault"},
+    ReasonName{Reason::kDeviceClamp, "device_clamp", "limit of the device"},
+    ReasonName{Reason::kUnseen, "unseen", "device provided no position"},
+    ReasonName{Reason::kDisarmed, "disarmed", "operator disarmed"},
+    ReasonName{Reason::kDamped, "damped", "limiter: a vibration is damped"},
+    ReasonName{Reason::kAcceleration, "acceleration", "no limit: acceleration of the hand was too large"},
 };
 
 // ---- For people -------------------------------------------------------------------------------------------------
@@ -63,13 +63,13 @@ std::string percent(double share) {
 }
 
 std::string spread(const std::optional<Spread>& times) {
-  if (!times) return "none seen";
+  if (!times) return "none";
   return digits(ms(times->p50), "%.1f") + " / " + digits(ms(times->p99), "%.1f ms");
 }
 
 std::string kept(const Run& run) {
   if (run.summary.passive()) return "yes";
-  return run.summary.kept_its_promise() ? "but for those holds" : "NO";
+  return run.summary.kept_its_promise() ? "yes, except in these holds" : "NO";
 }
 
 std::string felt(const RunSummary& run) {
@@ -85,7 +85,7 @@ std::string apart(const RunSummary& run) {
 }
 
 std::string limited(const RunSummary& run) {
-  return run.served_steps == 0 ? "no force came" : percent(run.share_limited());
+  return run.served_steps == 0 ? "no forces" : percent(run.share_limited());
 }
 
 /// Width on a terminal, for text without combining or wide characters.
@@ -108,32 +108,32 @@ std::vector<Row> rows(std::span<const Run> runs) {
   std::vector<Row> rows = {
       {"recording", [](const Run& run) { return run.recording; }},
       {"Energy", {}},
-      {"  given out beyond what was put in",
+      {"  energy given out but never put in",
        [](const Run& run) { return with_unit(run.summary.energy_given_out, "J"); }},
-      {"  holds beyond the limiter's bound", [](const Run& run) { return count(run.summary.holds_beyond_bound); }},
-      {"  least energy owed, without them", [](const Run& run) { return with_unit(run.summary.least_energy, "J"); }},
+      {"  holds longer than the limiter's bound", [](const Run& run) { return count(run.summary.holds_beyond_bound); }},
+      {"  least energy, without these holds", [](const Run& run) { return with_unit(run.summary.least_energy, "J"); }},
       {"  promise kept: never below −1 nJ", kept},
       {"Touch", {}},
-      {"  stiffness that was felt", [](const Run& run) { return felt(run.summary); }},
+      {"  felt stiffness", [](const Run& run) { return felt(run.summary); }},
       {"  peak speed", [](const Run& run) { return digits(run.summary.peak_speed, "%.2f m/s"); }},
       {"  peak force", [](const Run& run) { return digits(run.summary.peak_force, "%.2f N"); }},
-      {"Force is not the one asked for in", [](const Run& run) { return limited(run.summary); }},
-      {"  there it differs by, p50 / p95", [](const Run& run) { return apart(run.summary); }},
+      {"Force differs from the requested one in", [](const Run& run) { return limited(run.summary); }},
+      {"  difference, p50 / p95", [](const Run& run) { return apart(run.summary); }},
   };
   if (std::ranges::any_of(runs, [](const Run& run) { return run.summary.torque_work.has_value(); })) {
     const auto work = [](const Run& run) {
-      return run.summary.torque_work ? with_unit(*run.summary.torque_work, "J") : "does not turn";
+      return run.summary.torque_work ? with_unit(*run.summary.torque_work, "J") : "no rotation";
     };
-    rows.insert(rows.begin() + 3, {"  work of torques on the hand, at most", work});
+    rows.insert(rows.begin() + 3, {"  work of torques on the hand, maximum", work});
   }
   if (std::ranges::any_of(runs, [](const Run& run) { return run.summary.grip_energy_given_out.has_value(); })) {
     const auto given_out = [](const Run& run) {
       return run.summary.grip_energy_given_out ? with_unit(*run.summary.grip_energy_given_out, "J") : "no gripper";
     };
-    rows.insert(rows.begin() + 3, {"  … by the gripper, which has its own account", given_out});
+    rows.insert(rows.begin() + 3, {"  energy given out by the gripper", given_out});
   }
   if (std::ranges::any_of(runs, [](const Run& run) { return run.summary.share_careful > 0; })) {
-    rows.insert(rows.begin() + 1, {"limiter more careful, after overruns, for",
+    rows.insert(rows.begin() + 1, {"limiter more careful after overruns, for",
                                    [](const Run& run) { return percent(run.summary.share_careful); }});
   }
   if (std::ranges::any_of(runs, [](const Run& run) { return !run.device.empty(); })) {
@@ -172,40 +172,41 @@ std::string notes(std::span<const Run> runs) {
   const auto note = [&text](const std::string& line) { text += line + "\n"; };
   const auto some = [&runs](auto&& holds) { return std::ranges::any_of(runs, holds); };
   if (some([](const Run& run) { return !run.summary.stable; })) {
-    note("not stable: the device gave out energy and the hand was shaken (most of its motion was faster than 3 Hz),");
-    note("            so a stiffness would mean nothing.");
+    note("not stable: the device gave out energy and shook the hand (most of its motion was faster than 3 Hz),");
+    note("            so a stiffness is meaningless.");
   }
   if (some([](const Run& run) {
         return run.summary.stable && run.summary.pushed && !run.summary.operational_stiffness;
       })) {
-    note("not measurable: the forces do not depend on the place alone, or where they begin is not known well enough");
-    note("            to tell a stiffness within 5 %.");
+    note(
+        "not measurable: the forces do not only depend on the position, or the start of contact is not known well "
+        "enough");
+    note("            for a stiffness within 5 %.");
   }
   if (some([](const Run& run) { return run.summary.overruns > 0; })) {
     note("overrun: the computer paused the haptic loop for longer than the scene's longest_hold.");
   }
   if (some([](const Run& run) { return run.summary.share_careful > 0; })) {
-    note("more careful: after an overrun the limiter allows for another one as long, and permits less force.");
-    note("            To compare what was felt, repeat the run on a machine that has less to do.");
+    note("more careful: after an overrun, the limiter expects another one of the same length, and permits less force.");
+    note("            To compare the felt stiffness, repeat the run on a less busy machine.");
   }
   if (some([](const Run& run) { return run.summary.holds_beyond_bound > 0; })) {
+    note("holds longer than the bound: the limiter guarantees E ≥ −1 nJ if no force is held longer than the bound.");
     note(
-        "holds beyond the bound: the limiter promises E ≥ −1 nJ while no force is held longer than the bound in "
-        "force.");
-    note("         A longer hold can give out (T_act − T)(‖F‖ − f_c)²/(4b); it is in the energy given out.");
+        "         A longer hold can give out (T_act − T)(‖F‖ − f_c)²/(4b), which is included in the energy given out.");
   }
   for (const Run& run : runs) {
     if (&run != &*std::ranges::find(runs, run.recording, &Run::recording)) continue;  // once per recording
     if (run.truncated)
       note(run.recording +
-           ": has no end mark (the server was killed, or the disk was full). All that is there was read.");
+           ": has no end mark (the server was killed, or the disk was full). All existing data was read.");
     if (run.lost_steps + run.lost_datagrams > 0)
       note(run.recording + ": lacks " + count(run.lost_steps) + " steps and " + count(run.lost_datagrams) +
            " datagrams, which were not written in time or are damaged.");
     constexpr std::size_t kMostSentences = 5;
     for (std::size_t i = 0; i < std::min(run.damage.size(), kMostSentences); ++i) note(run.damage[i]);
     if (run.damage.size() > kMostSentences)
-      note(run.recording + ": " + count(run.damage.size() - kMostSentences) + " more places are damaged (--json)");
+      note(run.recording + ": " + count(run.damage.size() - kMostSentences) + " more damaged places (see --json)");
   }
   return text;
 }

@@ -41,10 +41,9 @@ TEST(WithUnit, HasThreeDigitsAndAPrefix) {
 TEST(Table, TellsANewcomerWhichRunWasStable) {
   const std::vector runs = {run_of(Law::kNone, "off"), run_of(Law::kAol, "on")};
   const std::string table = to_table(runs);
-  for (const char* text :
-       {"off.mcap", "on.mcap", "not stable", "N/m", "NO", "yes", "the limiter: energy was not earned"})
+  for (const char* text : {"off.mcap", "on.mcap", "not stable", "N/m", "NO", "yes", "limiter: not enough energy"})
     EXPECT_NE(table.find(text), std::string::npos) << text << " in\n" << table;
-  EXPECT_EQ(table.find("device gave no position"), std::string::npos) << "a reason that never occurred";
+  EXPECT_EQ(table.find("device provided no position"), std::string::npos) << "a reason that never occurred";
   EXPECT_EQ(table.find('\x1b'), std::string::npos) << "colour codes";
 }
 
@@ -54,10 +53,10 @@ TEST(Table, TellsOfTheWorkOfTorquesWhereAHandleTurns) {
   EXPECT_NE(to_json(runs[0]).find(R"("torque_work_j":null)"), std::string::npos);
   runs[0].summary.torque_work = 8.95;
   const std::string table = to_table(runs);
-  const std::size_t row = table.find("  work of torques on the hand, at most  ");
+  const std::size_t row = table.find("  work of torques on the hand, maximum  ");
   ASSERT_NE(row, std::string::npos) << table;
   const std::string line = table.substr(row, table.find('\n', row) - row);
-  EXPECT_TRUE(line.find("8.95 J ") < line.find("does not turn")) << line;
+  EXPECT_TRUE(line.find("8.95 J ") < line.find("no rotation")) << line;
   EXPECT_NE(to_json(runs[0]).find(R"("torque_work_j":8.95)"), std::string::npos);
 }
 
@@ -78,7 +77,7 @@ TEST(Table, SaysAtTheTopThatOverrunsMadeTheLimiterMoreCareful) {
   EXPECT_EQ(to_table(std::vector{run}).find("more careful"), std::string::npos);
   run.summary.share_careful = 0.413;
   const std::string table = to_table(std::vector{run});
-  const std::size_t row = table.find("limiter more careful, after overruns, for");
+  const std::size_t row = table.find("limiter more careful after overruns, for");
   ASSERT_NE(row, std::string::npos) << table;
   EXPECT_LT(row, table.find("\nEnergy"));
   EXPECT_LT(table.find("41.3 %", row), table.find('\n', row));
@@ -89,7 +88,7 @@ TEST(Table, SaysByHowMuchTheForceDiffersBesideTheShare) {
   lab::Run run = run_of(Law::kAol, "on");
   run.summary.difference = Difference{0.031, 1.9};
   const std::string table = to_table(std::vector{run});
-  const std::size_t row = table.find("  there it differs by, p50 / p95");
+  const std::size_t row = table.find("  difference, p50 / p95");
   ASSERT_NE(row, std::string::npos) << table;
   EXPECT_LT(table.find("0.03 / 1.90 N", row), table.find('\n', row)) << table;
 }

@@ -134,7 +134,7 @@ int filter(const FilterOptions& options, std::istream& in, std::ostream& out, st
       if (!next_row(table, in, out)) break;
       for (std::size_t i = 0; i < columns.size(); ++i) cells[i] = table.needed_number(columns[i]);
       row = row_of(cells, static_cast<std::size_t>(format->axes));
-      if (before && row.t <= before->t) table.fail("time does not go on");
+      if (before && row.t <= before->t) table.fail("time does not increase");
     } catch (const std::runtime_error& wrong) {
       if (in.fail()) throw;  // the rest of the input cannot be read
       errors << wrong.what() << "\n";

@@ -49,7 +49,7 @@ TEST(Filter, NamesTheLineOfABadRowAndWritesNothingForIt) {
             "stdin:4: expected 3 cells as in the first row, found 4; are these decimal commas? Use decimal points, or "
             "separate the cells by semicolons\n"
             "stdin:5: expected 3 cells as in the first row, found 2\n"
-            "stdin:6: time does not go on\n");
+            "stdin:6: time does not increase\n");
   EXPECT_EQ(result.out.substr(result.out.find('\n') + 1), "0,0,0,0,0.005,0,\n0.005,0,0,0,0.005,0,overrun\n");
 }
 

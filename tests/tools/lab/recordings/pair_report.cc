@@ -76,10 +76,10 @@ PairRun read_pair(const std::filesystem::path& path) {
     }
   }
   if (const auto damage = reader.damage(); !damage.empty()) {
-    throw std::runtime_error(damage.front() + "; the ledger of a pair needs every record");
+    throw std::runtime_error(damage.front() + "; the ledger of a pair requires all records");
   }
   if (!merged) {
-    throw std::runtime_error(path.string() + ": expected a file that `tendon-replay --merge` has written");
+    throw std::runtime_error(path.string() + ": expected a file from `tendon-replay --merge`");
   }
   PairRun run = observer.run();
   run.recording = path.filename().string();
@@ -88,9 +88,9 @@ PairRun read_pair(const std::filesystem::path& path) {
 
 std::string sentence(const PairRun& run) {
   if (run.least_pair < -kPromise) {
-    return run.label + ": the pair gave out " + with_unit(-run.least_pair, "J") + " that nobody had put in.";
+    return run.label + ": the pair gave out " + with_unit(-run.least_pair, "J") + " that was never put in.";
   }
-  return run.label + ": the pair gave out nothing that nobody had put in; its least value is " +
+  return run.label + ": the pair gave out no energy that was never put in; its least value is " +
          with_unit(std::max(run.least_pair, 0.0), "J") + ".";
 }
 
@@ -111,7 +111,8 @@ void write_table(const std::vector<PairRun>& runs, std::ostream& out) {
   };
   row("", [](const PairRun& run) { return run.label; });
   row("both ends, merged", [](const PairRun& run) { return run.recording; });
-  row("least value of the pair: both ledgers", [](const PairRun& run) { return with_unit(run.least_pair, "J"); });
+  row("least value of the pair (sum of both ledgers)",
+      [](const PairRun& run) { return with_unit(run.least_pair, "J"); });
   row("least account, leader and follower", [](const PairRun& run) {
     return with_unit(run.leader.least_account, "J") + ", " + with_unit(run.follower.least_account, "J");
   });
@@ -164,7 +165,7 @@ void share_range(std::span<Panel> row) {
   if (!(size > 0)) return;
   for (Panel& panel : row) {
     if (size > kOwnScaleBeyond * smallest) {
-      panel.title += " (a scale of its own)";
+      panel.title += " (separate scale)";
     } else {
       panel.y_range = {all.least - 0.05 * size, all.most + 0.05 * size};
     }
@@ -231,7 +232,7 @@ PairRun PairObserver::run() const {
   PairRun run;
   LocalTime start = LocalTime::max();
   for (const Seen& end : ends_) {
-    if (end.steps.empty()) throw std::runtime_error("one of the two ends holds no haptic step");
+    if (end.steps.empty()) throw std::runtime_error("one of the two ends has no haptic steps");
     start = std::min(start, end.steps.front().at);
   }
   const auto time = [&](LocalTime at) { return seconds(at - start); };
@@ -276,7 +277,7 @@ PairRun PairObserver::run() const {
 void report_pairs(const ReportOptions& options, std::ostream& out) {
   check(options);
   if (options.picture && options.recordings.size() > kMostPairs) {
-    throw std::invalid_argument("a picture holds 1 to 2 pairs, got " + std::to_string(options.recordings.size()));
+    throw std::invalid_argument("a picture has 1 to 2 pairs, got " + std::to_string(options.recordings.size()));
   }
   if (options.picture) check_picture_name(*options.picture);
   std::vector<PairRun> runs;

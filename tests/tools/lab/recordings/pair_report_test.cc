@@ -120,8 +120,8 @@ class PairReport : public ::testing::Test {
 
 TEST_F(PairReport, SaysInWordsWhatThePairGaveOut) {
   report_pairs({.recordings = {merged("off.mcap", -0.25), merged("on.mcap", 0.25)}, .labels = {"off", "on"}}, out_);
-  EXPECT_NE(out_.str().find("off: the pair gave out 500 mJ that nobody had put in."), std::string::npos) << out_.str();
-  EXPECT_NE(out_.str().find("on: the pair gave out nothing that nobody had put in; its least value is 0 J."),
+  EXPECT_NE(out_.str().find("off: the pair gave out 500 mJ that was never put in."), std::string::npos) << out_.str();
+  EXPECT_NE(out_.str().find("on: the pair gave out no energy that was never put in; its least value is 0 J."),
             std::string::npos)
       << out_.str();
 }

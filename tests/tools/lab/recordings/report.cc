@@ -52,7 +52,7 @@ std::vector<Source> read_runs(const std::filesystem::path& recording, std::strin
     run.summary = observers[device].summary();
     if (several) run.device = names[device];
     if (run.summary.steps == 0) {
-      if (several) not_examined += run.recording + ": device " + names[device] + " has no haptic step: not examined\n";
+      if (several) not_examined += run.recording + ": device " + names[device] + " has no haptic steps: not examined\n";
       continue;
     }
     run.label = run.summary.limiter_on ? "limiter on" : "limiter off";
@@ -92,7 +92,7 @@ void check_devices(const ReportOptions& options) {
   }
   for (const std::string& name : options.devices) {
     if (std::ranges::find(known, name) == known.end())
-      throw std::runtime_error("no device is called " + name + ": the recordings have " + list(known));
+      throw std::runtime_error("no device has the name " + name + "; expected one of " + list(known));
   }
 }
 
@@ -127,8 +127,8 @@ std::string others(const std::vector<Source>& sources, const std::vector<const S
   }
   if (shown.size() == sources.size()) return text;
   return "Columns for " + std::to_string(shown.size()) + " of " + std::to_string(sources.size()) +
-         " devices (--device NAME for another, --json for all). " + std::to_string(kept) + " of the others kept the " +
-         "promise.\n" + text;
+         " devices (use --device NAME for another, --json for all). " + std::to_string(kept) +
+         " of the others kept the " + "promise.\n" + text;
 }
 
 }  // namespace

@@ -156,14 +156,14 @@ TEST_F(ReportOfSeveral, ADeviceThatIsAskedForHasTheOnlyColumn) {
   EXPECT_NE(out_.str().find("Columns for 1 of 3 devices"), std::string::npos) << out_.str();
   EXPECT_NE(out_.str().find("of3.mcap fleet-1: promise NOT kept"), std::string::npos) << out_.str();
   EXPECT_EQ(error_of({.recordings = {file}, .devices = {"left"}}),
-            "no device is called left: the recordings have first, fleet-1, fleet-2");
+            "no device has the name left; expected one of first, fleet-1, fleet-2");
 }
 
 TEST_F(ReportOfSeveral, SaysWhichDeviceWasNotExamined) {
   const std::filesystem::path file = folder_.path() / "absent.mcap";
   testing::record_devices(file, {toy_run(Law::kAol, 2000), {}}, {"absent"});
   report({.recordings = {file}}, out_);
-  EXPECT_NE(out_.str().find("absent.mcap: device absent has no haptic step: not examined"), std::string::npos)
+  EXPECT_NE(out_.str().find("absent.mcap: device absent has no haptic steps: not examined"), std::string::npos)
       << out_.str();
 }
 
@@ -213,7 +213,7 @@ TEST_F(Report, ARecordingWithoutAStepIsNoRun) {
     Recorder recorder({}, sink);
     recorder.close();
   }
-  EXPECT_NE(error_of({.recordings = {on_}}).find("holds no haptic step"), std::string::npos);
+  EXPECT_NE(error_of({.recordings = {on_}}).find("contains no haptic step"), std::string::npos);
 }
 
 TEST_F(Report, RefusesOptionsThatMakeNoSenseBeforeItReadsAnything) {

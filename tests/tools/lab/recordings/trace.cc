@@ -27,8 +27,8 @@ void Extremes::observe(const Extremes& other) noexcept {
 }
 
 Trace::Trace(const Config& config) : config_(config), columns_(config.columns) {
-  if (config.span <= Duration::zero()) throw std::invalid_argument("a trace needs a span above zero");
-  if (config.columns == 0) throw std::invalid_argument("a trace needs at least one column");
+  if (config.span <= Duration::zero()) throw std::invalid_argument("a trace requires a span above zero");
+  if (config.columns == 0) throw std::invalid_argument("a trace requires at least one column");
 }
 
 void Trace::observe(const StepRecord& step) {

@@ -44,7 +44,7 @@ softbody::Vec3 lengths(const std::string& text) {
     const auto [next, error] = std::from_chars(at, end, mm);
     const bool last = axis == 2;
     if (error != std::errc() || (last ? next != end : next == end || *next != 'x')) {
-      throw std::invalid_argument("--block-mm " + text + ": expected three lengths, as in 100x100x50");
+      throw std::invalid_argument("--block-mm " + text + ": expected three lengths, for example 100x100x50");
     }
     size[axis] = 1e-3 * mm;
     at = next + (last ? 0 : 1);
@@ -69,79 +69,84 @@ void add(CLI::App& verb, int& /*exit*/) {
   AccuracyOptions& options = arguments.options;
   const std::string models = names_of_models();
   const std::string elements = names_of(softbody::elements());
-  verb.add_option("--block-mm", arguments.block_mm, "lengths of a block that is clamped below")
+  verb.add_option("--block-mm", arguments.block_mm, "Size of a block with a fixed bottom, mm")
       ->type_name("XxYxZ")
       ->capture_default_str();
-  verb.add_option("--young-pa", arguments.young_pa, "its Young's modulus")->capture_default_str();
-  verb.add_option("--poisson", arguments.poisson, "its Poisson's ratio, 0 to below 0.5")->capture_default_str();
-  verb.add_option("--patch-radius-mm", arguments.patch_radius_mm, "of what presses on its top")->capture_default_str();
-  verb.add_option("--patch-center-mm", arguments.patch_centre_mm, "… and its place, from the middle of the top")
+  verb.add_option("--young-pa", arguments.young_pa, "Young's modulus, Pa")->capture_default_str();
+  verb.add_option("--poisson", arguments.poisson, "Poisson's ratio, from 0 to below 0.5")->capture_default_str();
+  verb.add_option("--patch-radius-mm", arguments.patch_radius_mm, "Radius of the patch on its top, mm")
+      ->capture_default_str();
+  verb.add_option("--patch-center-mm", arguments.patch_centre_mm,
+                  "Position of the patch, mm, relative to the center of the top")
       ->type_name("X,Y")
       ->delimiter(',')
       ->expected(2)
       ->capture_default_str();
-  verb.add_option("--loads-n", arguments.loads_n, "a gentle press and a hard one")
+  verb.add_option("--loads-n", arguments.loads_n, "A small and a large force on the patch, N")
       ->type_name("N,N")
       ->delimiter(',')
       ->expected(2)
       ->capture_default_str();
-  verb.add_option("--n", options.resolutions, "cells along x, coarse to fine")
+  verb.add_option("--n", options.resolutions, "Numbers of cells along x, ascending")
       ->type_name("N,...")
       ->delimiter(',')
       ->capture_default_str();
-  verb.add_option("--models", arguments.models, models + "; left out: all")->type_name("NAME,...")->delimiter(',');
-  verb.add_option("--elements", arguments.elements, elements + "; left out: all")
-      ->type_name("NAME,...")
-      ->delimiter(',');
-  verb.add_option("--worker", options.worker, "command of a worker that answers for the linear block, too")
+  verb.add_option("--models", arguments.models, models + ". Default: all")->type_name("NAME,...")->delimiter(',');
+  verb.add_option("--elements", arguments.elements, elements + ". Default: all")->type_name("NAME,...")->delimiter(',');
+  verb.add_option("--worker", options.worker, "Command of a worker that also answers for the linear block")
       ->type_name("COMMAND");
   verb.add_flag("--learned", options.learned,
-                "bodies of the model near that have learned shapes, and that have a table of answers, as well");
+                "Also use bodies of the model near with learned shapes, and with a table of answers");
   CLI::Option* const slowest =
-      verb.add_option("--slowest-ms", options.slowest_ms, "a model is refined no further than this for an update")
+      verb.add_option("--slowest-ms", options.slowest_ms, "Refine a model up to this time of an update, ms")
           ->check(CLI::PositiveNumber)
           ->capture_default_str();
   CLI::Option* const setup = verb.add_option("--longest-setup-s", options.longest_setup_s,
-                                             "… and this for its set-up; left out: 30, with a budget 5")
+                                             "… and up to this set-up time, s. Default: 30, with --budget-ms 5")
                                  ->check(CLI::PositiveNumber);
   CLI::Option* const point =
-      verb.add_option("--longest-point-s", options.longest_point_s, "… and this to measure it, all in all")
+      verb.add_option("--longest-point-s", options.longest_point_s, "… and up to this time for its measurement, s")
           ->check(CLI::PositiveNumber)
           ->capture_default_str();
   verb.add_option("--network", arguments.network,
-                  "what is left at the hand behind it: " + injector::names_of_profiles())
+                  "Also measure the error at the hand with this network: " + injector::names_of_profiles())
       ->type_name("NAME|LINE");
-  verb.add_option("--seed", arguments.seed, "of the network")->capture_default_str();
+  verb.add_option("--seed", arguments.seed, "Seed of the network")->capture_default_str();
   verb.add_option("--budget-ms", options.budget_ms,
-                  "only say what is best at the hand in so long an update, "
-                  "of what is not there for comparison")
+                  "Only print the most accurate model at the hand with updates of this time, ms, without the models "
+                  "for comparison")
       ->check(CLI::PositiveNumber);
-  verb.add_option("--truth-cells", options.truth.cells, "of the mesh of the truth, to the patch's radius")
+  verb.add_option("--truth-cells", options.truth.cells, "Cells of the reference mesh per radius of the patch")
       ->check(CLI::Range(2.0, 8.0))
       ->capture_default_str();
   verb.add_flag("--errors-only", options.errors_only,
-                "no times: errors and sizes, which are the same each time, of every mesh, however long it takes")
+                "Measure no times, only errors and sizes, which are identical in each run, of all meshes")
       ->excludes(slowest, setup, point);
   add_part_options(verb, options.part,
-                   "the meshes, from 0 on: each n of each element of each model; has, and makes, --errors-only");
-  verb.add_option("--out", options.out, "write accuracy.csv and a figure there, SVG and PNG (needs gnuplot)")
+                   "the meshes, from 0: each n of each element of each model; implies --errors-only");
+  verb.add_option("--out", options.out,
+                  "Write accuracy.csv and a figure to this folder, as SVG and PNG (requires gnuplot)")
       ->type_name("DIR");
-  verb.add_flag("--json", options.json, "one JSON object for each model and mesh instead of the table");
+  verb.add_flag("--json", options.json, "Print JSON on stdout, one object per model and mesh, instead of the table");
   verb.footer(
-      "\nExample: which element, quickly\n"
+      "\n"
+      "Example: compare elements, fast\n"
       "  tendon-lab accuracy --models condensed --n 4,8,16 --longest-setup-s 5\n"
-      "all of it, in half an hour or more\n  tendon-lab accuracy --network wifi-good --out figures\n"
-      "what to take\n  tendon-lab accuracy --budget-ms 5 --network wifi-good --json\n"
-      "\nExample: a body on two ranks beside the same one in this process\n"
-      "  tendon-lab accuracy --models linear --elements hex27-sri --worker \"mpirun -n 2 tendon-fem-worker\"\n"
-      "\nExample: what learned answers are worth beside the model that they stand for\n"
-      "  tendon-lab accuracy --models near --elements hex8-sri --n 6,8 --learned\n"
-      "\nExample: errors of the finest meshes, by many machines\n"
-      "  tendon-sweep plan a --units 0:24 --per-shard 1 -- tendon-lab accuracy --models condensed --n 8,12,16,20\n"
-      "\nTimes are those of this machine, now. Exit: 0 done; 1 cannot write, or gnuplot failed; 2 wrong usage.");
+      "Example: run everything, which takes half an hour or more\n"
+      "  tendon-lab accuracy --network wifi-good --out figures\n"
+      "Example: find the best model\n"
+      "  tendon-lab accuracy --budget-ms 5 --network wifi-good --json\n\n"
+      "Example: compare a body on two ranks with the same body in this process\n"
+      "  tendon-lab accuracy --models linear --elements hex27-sri --worker \"mpirun -n 2 tendon-fem-worker\"\n\n"
+      "Example: compare learned answers with the model that they replace\n"
+      "  tendon-lab accuracy --models near --elements hex8-sri --n 6,8 --learned\n\n"
+      "Example: compute the errors of the finest meshes on many machines\n"
+      "  tendon-sweep plan a --units 0:24 --per-shard 1 -- tendon-lab accuracy --models condensed --n 8,12,16,20\n\n"
+      "Times are measured on this machine. Exit: 0 success; 1 failed, because of gnuplot or the files; 2 wrong usage.");
   verb.callback([models, elements, slowest, setup, point] {
     if ((options.part.units || options.part.from) && (*slowest || *setup || *point)) {
-      throw std::invalid_argument("--units, --from: not with a limit of time, since they look at no clock");
+      throw std::invalid_argument(
+          "--units, --from: cannot be used with a time limit, because they do not measure times");
     }
     options.models = named(arguments.models, any_model_named, models);
     options.elements = named(arguments.elements, softbody::element_named, elements);
@@ -156,7 +161,7 @@ void add(CLI::App& verb, int& /*exit*/) {
   });
 }
 
-const Verb kVerb("accuracy", "What the accuracy of a soft body costs in time", add);
+const Verb kVerb("accuracy", "Measure the accuracy of soft bodies over the time of an update", add);
 
 }  // namespace
 }  // namespace tendon::lab::accuracy_verb

@@ -15,18 +15,19 @@ namespace {
 void add(CLI::App& verb, int& /*exit*/) {
   static bench::BenchOptions options;
   const std::string names = names_of(bench::sections());
-  verb.add_option("--only", options.only, names + "; any number of times")->type_name("NAME")->allow_extra_args(false);
+  verb.add_option("--only", options.only, names + "; can be repeated")->type_name("NAME")->allow_extra_args(false);
   verb.add_option("--fifo", options.priority,
-                  "real-time priority of what is measured, on a machine with other work; it takes both cores from that")
+                  "Real-time priority of the measured code, for a busy machine; it uses both cores exclusively")
       ->type_name("PRIORITY")
       ->check(CLI::Range(1, 60));
-  verb.add_option("--seed", options.seed, "of worlds, keys and networks")->capture_default_str();
-  verb.add_option("--write", options.write, "write the table as a page in Markdown, too")->type_name("FILE.md");
+  verb.add_option("--seed", options.seed, "Seed of worlds, keys and networks")->capture_default_str();
+  verb.add_option("--write", options.write, "Also write the table as a Markdown file")->type_name("FILE.md");
   verb.add_option("--plot", options.plot,
-                  "draw what devices cost (section 512), as STEM.svg and STEM.png; needs gnuplot")
+                  "Draw the cost of devices (section 512), as STEM.svg and STEM.png (requires gnuplot)")
       ->type_name("STEM");
-  verb.add_flag("--quick", options.quick, "only that it runs: seconds, and the figures mean nothing");
-  verb.add_flag("--json", options.json, "one JSON object for each line of the table, and one for its circumstances");
+  verb.add_flag("--quick", options.quick, "Run only for seconds, as a test; the figures are meaningless");
+  verb.add_flag("--json", options.json,
+                "Print JSON on stdout, one object per line of the table, and one for the machine");
   verb.footer(
       "\nExample: all of it, some minutes, with its page\n"
       "  tendon-lab bench --fifo 50 --write bench.md\n"
@@ -41,7 +42,7 @@ void add(CLI::App& verb, int& /*exit*/) {
   });
 }
 
-const Verb kVerb("bench", "What things cost, each beside the machine's own floor", add);
+const Verb kVerb("bench", "Measure times and memory, each compared with the minimum of this machine", add);
 
 }  // namespace
 }  // namespace tendon::lab::bench_verb

@@ -11,18 +11,22 @@ namespace {
 
 void add(CLI::App& verb, int& /*exit*/) {
   static BoundaryOptions options;
-  verb.add_option("--mass", options.mass, "of the device, kg")->capture_default_str();
-  verb.add_option("--b", options.viscous, "viscous friction of the device, N s/m")->capture_default_str();
-  verb.add_option("--out", options.out, "draw the figure there, SVG and PNG (needs gnuplot)")->type_name("DIR");
+  verb.add_option("--mass", options.mass, "Mass of the device, kg")->capture_default_str();
+  verb.add_option("--b", options.viscous, "Viscous friction of the device, N s/m")->capture_default_str();
+  verb.add_option("--out", options.out, "Draw the figure in this folder, as SVG and PNG (requires gnuplot)")
+      ->type_name("DIR");
   add_part_options(verb, options.part, "0 to 17, the rows of the table");
-  verb.add_flag("--json", options.json, "one JSON object for each point instead of the table");
+  verb.add_flag("--json", options.json, "Print JSON on stdout, one object per point, instead of the table");
   verb.footer(
-      "\nExample\n  tendon-lab boundary --b 0.26 --out figures\n"
-      "\nNothing in it is random.\nExit: 0 done; 1 cannot write, or gnuplot failed; 2 wrong usage.");
+      "\n"
+      "Example\n"
+      "  tendon-lab boundary --b 0.26 --out figures\n\n"
+      "The result does not depend on random numbers.\n"
+      "Exit: 0 success; 1 failed, because of gnuplot or the files; 2 wrong usage.");
   verb.callback([] { boundary(options, std::cout); });
 }
 
-const Verb kVerb("boundary", "How stiff a spring may be over delay and rate: simulated, and as theory says", add);
+const Verb kVerb("boundary", "Find the stiffest stable spring over delay and rate, in simulation and theory", add);
 
 }  // namespace
 }  // namespace tendon::lab::boundary_verb

@@ -10,18 +10,21 @@ namespace {
 
 void add(CLI::App& verb, int& /*exit*/) {
   static CostOptions options;
-  verb.add_option("--batches", options.batches, "measured for each line; the median counts")
+  verb.add_option("--batches", options.batches, "Number of batches per line; the median is used")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
-  verb.add_option("--out", options.out, "draw the figure there, SVG and PNG (needs gnuplot)")->type_name("DIR");
-  verb.add_flag("--json", options.json, "one JSON object for each line instead of the table");
+  verb.add_option("--out", options.out, "Draw the figure in this folder, as SVG and PNG (requires gnuplot)")
+      ->type_name("DIR");
+  verb.add_flag("--json", options.json, "Print JSON on stdout, one object per line, instead of the table");
   verb.footer(
-      "\nExample\n  tendon-lab cost --out figures\n"
-      "\nTimes are those of this machine, now. Exit: 0 done; 1 cannot write, or gnuplot failed; 2 wrong usage.");
+      "\n"
+      "Example\n"
+      "  tendon-lab cost --out figures\n\n"
+      "Times are measured on this machine. Exit: 0 success; 1 failed, because of gnuplot or the files; 2 wrong usage.");
   verb.callback([] { cost(options, std::cout); });
 }
 
-const Verb kVerb("cost", "What accuracy costs in time inside the loop", add);
+const Verb kVerb("cost", "Measure the accuracy of laws and estimators over the time of one step", add);
 
 }  // namespace
 }  // namespace tendon::lab::cost_verb

@@ -21,25 +21,26 @@ void add(CLI::App& verb, int& exit) {
   static FilterArguments arguments;
   FilterLaw& law = arguments.law;
   verb.add_option("--law", law.name, names_of(laws()))->type_name("NAME")->capture_default_str();
-  verb.add_option("--b", law.viscous, "lower bound of the device's viscous friction, N s/m")->required();
-  verb.add_option("--fc", law.coulomb, "lower bound of its Coulomb friction, N")->required();
-  verb.add_option("--period-us", law.period_us, "the longest that a force is held, microseconds")
+  verb.add_option("--b", law.viscous, "Lower bound of the viscous friction of the device, N s/m")->required();
+  verb.add_option("--fc", law.coulomb, "Lower bound of its Coulomb friction, N")->required();
+  verb.add_option("--period-us", law.period_us, "Longest time for which a force is held, µs")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
   verb.add_option("--set", law.settings,
-                  "another value in the law's scene: limiter.clamp_n=8, limiter.robust_ledger.encoder_step_um=30, "
-                  "limiter.knee.start=0.8 (tendond --scene-help lists all)")
+                  "Set a key of the scene: limiter.clamp_n=8, limiter.robust_ledger.encoder_step_um=30, "
+                  "limiter.knee.start=0.8 (see tendond --scene-help for all)")
       ->type_name("TABLE.KEY=VALUE")
       ->allow_extra_args(false);
-  verb.add_flag("--json", arguments.json, "one JSON object for each row instead of CSV");
+  verb.add_flag("--json", arguments.json, "Print JSON on stdout, one object per row, instead of CSV");
   verb.footer(
-      "\nIn: t_s,x_m,wanted_n or t_s,x_m,y_m,z_m,wanted_x_n,wanted_y_n,wanted_z_n; forces on the hand.\n"
-      "Out: the same and applied_n,permitted_n,energy_j,reason.\n"
-      "\nExamples\n"
+      "\n"
+      "Input: t_s,x_m,wanted_n or t_s,x_m,y_m,z_m,wanted_x_n,wanted_y_n,wanted_z_n; forces on the hand.\n"
+      "Output: the same and applied_n,permitted_n,energy_j,reason.\n\n"
+      "Examples\n"
       "  tendon-lab filter --law aol --b 0.26 --fc 0.005 --period-us 1000 < in.csv > out.csv\n"
-      "  tendon-lab filter --b 0.26 --fc 0.005 --set limiter.knee.start=0.8 < in.csv > out.csv\n"
-      "\nNothing in it is random.\n"
-      "Exit: 0 done; 1 a row was bad (its line is named, nothing is written for it); 2 wrong usage.");
+      "  tendon-lab filter --b 0.26 --fc 0.005 --set limiter.knee.start=0.8 < in.csv > out.csv\n\n"
+      "The result does not depend on random numbers.\n"
+      "Exit: 0 success; 1 failed, because of a wrong row (which is reported, and not written); 2 wrong usage.");
   verb.callback([&exit] {
     const FilterOptions options{.limiter = limiter_of(arguments.law), .json = arguments.json};
     std::ios::sync_with_stdio(false);
@@ -48,7 +49,7 @@ void add(CLI::App& verb, int& exit) {
   });
 }
 
-const Verb kVerb("filter", "Runs any stability controller on your own recording, on a pipe", add);
+const Verb kVerb("filter", "Run a stability controller on your own recording, from stdin to stdout", add);
 
 }  // namespace
 }  // namespace tendon::lab::filter_verb

@@ -10,15 +10,13 @@ namespace {
 
 void add(CLI::App& verb, int& /*exit*/) {
   static FloorOptions options;
-  verb.add_option("--out", options.out, "write floor.csv there")->type_name("DIR");
-  verb.add_flag("--json", options.json, "one JSON object for each floor instead of the table");
-  verb.footer(
-      "\nExample: what no law can be better than\n  tendon-lab floor\n"
-      "\nExit: 0 done; 1 cannot write; 2 wrong usage.");
+  verb.add_option("--out", options.out, "Write floor.csv to this folder")->type_name("DIR");
+  verb.add_flag("--json", options.json, "Print JSON on stdout, one object per floor, instead of the table");
+  verb.footer("\nExample\n  tendon-lab floor\n\nExit: 0 success; 1 failed; 2 wrong usage.");
   verb.callback([] { floors(options, std::cout); });
 }
 
-const Verb kVerb("floor", "The least force error that any passive law can have, by a convex programme", add);
+const Verb kVerb("floor", "Compute the least force error of any passive law, by convex optimization", add);
 
 }  // namespace
 }  // namespace tendon::lab::floor_verb

@@ -10,17 +10,20 @@ namespace {
 
 void add(CLI::App& verb, int& /*exit*/) {
   static NetemOptions options;
-  verb.add_option("--count", options.count, "datagrams for each line")->capture_default_str();
-  verb.add_option("--seed", options.seed, "of both")->capture_default_str();
-  verb.add_option("--out", options.out, "draw the figure there, SVG and PNG (needs gnuplot)")->type_name("DIR");
-  verb.add_flag("--json", options.json, "one JSON object for each line instead of the table");
+  verb.add_option("--count", options.count, "Datagrams for each line")->capture_default_str();
+  verb.add_option("--seed", options.seed, "Seed of both")->capture_default_str();
+  verb.add_option("--out", options.out, "Draw the figure in this folder, as SVG and PNG (requires gnuplot)")
+      ->type_name("DIR");
+  verb.add_flag("--json", options.json, "Print JSON on stdout, one object per line, instead of the table");
   verb.footer(
-      "\nExample\n  tendon-lab netem --out figures\n"
-      "\nExit: 0 done; 1 cannot write, or gnuplot failed; 2 wrong usage.");
+      "\n"
+      "Example\n"
+      "  tendon-lab netem --out figures\n\n"
+      "Exit: 0 success; 1 failed, because of gnuplot or the files; 2 wrong usage.");
   verb.callback([] { netem(options, std::cout); });
 }
 
-const Verb kVerb("netem", "What is left of loss and delay asked for with a correlation: tc-netem beside tendon-inject",
+const Verb kVerb("netem", "Compare correlated losses and delays of tc-netem and tendon-inject with the requested ones",
                  add);
 
 }  // namespace

@@ -11,17 +11,22 @@ namespace {
 
 void add(CLI::App& verb, int& /*exit*/) {
   static PaperOptions options;
-  verb.add_option("--out", options.out, "draw a figure of each experiment there, SVG and PNG (needs gnuplot)")
+  verb.add_option("--out", options.out,
+                  "Draw a figure of each experiment in this folder, as SVG and PNG (requires gnuplot)")
       ->type_name("DIR");
   add_part_options(verb, options.part, "0 to 30, the rows of the table");
-  verb.add_flag("--json", options.json, "one JSON object for each experiment and law instead of the table");
+  verb.add_flag("--json", options.json,
+                "Print JSON on stdout, one object per experiment and law, instead of the table");
   verb.footer(
-      "\nExample: table and figures\n  tendon-lab paper --out figures\n"
-      "\nNothing in it is random.\nExit: 0 done; 1 cannot write, or gnuplot failed; 2 wrong usage.");
+      "\n"
+      "Example: print the table and draw the figures\n"
+      "  tendon-lab paper --out figures\n\n"
+      "The result does not depend on random numbers.\n"
+      "Exit: 0 success; 1 failed, because of gnuplot or the files; 2 wrong usage.");
   verb.callback([] { paper(options, std::cout); });
 }
 
-const Verb kVerb("paper", "The experiments of Lee & Lee 2009 without control, with AOL and with AOL+", add);
+const Verb kVerb("paper", "Run the experiments of Lee & Lee 2009 without control, with AOL and with AOL+", add);
 
 }  // namespace
 }  // namespace tendon::lab::paper_verb

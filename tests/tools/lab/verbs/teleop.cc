@@ -11,18 +11,22 @@ namespace {
 
 void add(CLI::App& verb, int& /*exit*/) {
   static TeleopOptions options;
-  verb.add_option("--hands", options.hands, "drawn for each method and round trip")->capture_default_str();
-  verb.add_option("--seed", options.seed, "of the first hand and its network")->capture_default_str();
-  verb.add_option("--out", options.out, "draw the figure there, SVG and PNG (needs gnuplot)")->type_name("DIR");
+  verb.add_option("--hands", options.hands, "Number of hands for each method and round trip")->capture_default_str();
+  verb.add_option("--seed", options.seed, "Seed of the first hand and its network")->capture_default_str();
+  verb.add_option("--out", options.out, "Draw the figure in this folder, as SVG and PNG (requires gnuplot)")
+      ->type_name("DIR");
   add_part_options(verb, options.part, "0 to 48 * HANDS - 1, the trials: each hand at each round trip of each method");
-  verb.add_flag("--json", options.json, "one JSON object for each line instead of the table");
+  verb.add_flag("--json", options.json, "Print JSON on stdout, one object per line, instead of the table");
   verb.footer(
-      "\nExample\n  tendon-lab teleop --hands 21 --out figures     three minutes\n"
-      "\nThe same seed gives the same figures. Exit: 0 done; 1 cannot write, or gnuplot failed; 2 wrong usage.");
+      "\n"
+      "Example\n"
+      "  tendon-lab teleop --hands 21 --out figures     takes three minutes\n\n"
+      "The same seed gives the same figures. Exit: 0 success; 1 failed, because of gnuplot or the files; 2 wrong "
+      "usage.");
   verb.callback([] { teleop(options, std::cout); });
 }
 
-const Verb kVerb("teleop", "How a wall behind a network is felt by each method of coupling, over the round trip", add);
+const Verb kVerb("teleop", "Compare the force from a remote wall for each coupling method, over the round trip", add);
 
 }  // namespace
 }  // namespace tendon::lab::teleop_verb
