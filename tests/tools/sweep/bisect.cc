@@ -35,9 +35,9 @@ Named by_halves(const Plan& plan, Units part, std::ostream& out) {
     part = differ ? left : right;
     if (!differ) differ = run_twice(plan, right);
     if (!differ) break;
-    out << "units " << text_of(part) << " come to another result each time";
+    out << "units " << text_of(part) << " give different results in each run";
     if (!differ->empty()) {
-      out << ", and differ in unit " << differ->front() << "\n";
+      out << "; they differ in unit " << differ->front() << "\n";
       return *differ;
     }
     out << "\n" << std::flush;
@@ -50,13 +50,13 @@ Named by_halves(const Plan& plan, Units part, std::ostream& out) {
 bool run_alone(const Plan& plan, std::uint64_t unit, const std::string& here, std::ostream& out) {
   std::set<std::string> ends;
   for (int i = 0; i < kAlone; ++i) ends.insert(output_of(plan, {.first = unit, .count = 1}));
-  out << "unit " << unit << ", run " << kAlone << " times by itself: ";
+  out << "unit " << unit << ", run " << kAlone << " times alone: ";
   if (ends.size() > 1) {
     out << ends.size() << " results\n" << std::flush;
     return false;
   }
   const std::string lines = lines_of(*ends.begin(), unit);
-  out << "the same each time" << (lines == lines_of(here, unit) ? "" : ", and not what it comes to in its shard")
+  out << "always the same result" << (lines == lines_of(here, unit) ? "" : ", which differs from that in its shard")
       << "\n"
       << std::flush;
   return true;
@@ -69,11 +69,11 @@ bool bisect(const std::filesystem::path& folder, const Plan& plan, std::uint64_t
   const std::optional<std::string> first = result_of(folder, plan, shard);
   const std::optional<std::string> second = other_result_of(folder, plan, shard);
   if (!first || !second) {
-    throw std::invalid_argument("shard " + std::to_string(shard) + ": has not had two results that differ");
+    throw std::invalid_argument("shard " + std::to_string(shard) + ": expected two results that differ");
   }
   const std::filesystem::path file = result_file(folder, shard);
   Named named = differing_units(*first, *second, units);
-  out << "shard " << shard << ", units " << text_of(units) << ": two results, which differ in "
+  out << "shard " << shard << ", units " << text_of(units) << ": two results that differ in "
       << difference(*first, *second, units) << "\n";
   const std::string lines = named.empty() ? "" : lines_of(*first, named.front());
   if (!lines.empty()) out << "first:  " << lines << "second: " << lines_of(*second, named.front());
@@ -81,7 +81,7 @@ bool bisect(const std::filesystem::path& folder, const Plan& plan, std::uint64_t
 
   const std::string here = output_of(plan, units);
   const bool third = here != *first && here != *second;
-  out << "here and now the shard comes to "
+  out << "on this node, the shard gives "
       << (third            ? "a third"
           : here == *first ? "the first, " + file.string()
                            : "the second, " + std::filesystem::path(file).replace_extension(".differs").string())
@@ -94,15 +94,16 @@ bool bisect(const std::filesystem::path& folder, const Plan& plan, std::uint64_t
   for (std::size_t i = 0; i < named.size() && i < kMost; ++i) same = run_alone(plan, named[i], here, out) && same;
 
   if (!same) {
-    out << "The program comes to another result each time: it depends on more than its units.\n";
+    out << "The program gives different results in each run: it depends on more than its units.\n";
   } else if (third) {
-    out << "That makes three results. Run this command again: a fourth is the program's fault, not a node's.\n";
+    out << "There are three results. Run this command again: a fourth result is an error of the program, not of a "
+           "node.\n";
   } else {
-    out << "This node stays with its result. The other is of another node, or of a fault: run this command there,\n"
-           "take the wrong file away, and give the right one the name "
+    out << "This node always gives the same result. The other result is from another node, or from an error.\n"
+           "Run this command there, remove the wrong file, and give the right one the name "
         << file.string() << "\n";
   }
-  if (named.empty()) out << "No unit is named: several differ that have no lines, or none does.\n";
+  if (named.empty()) out << "The differing units are unknown: several units without lines differ, or none.\n";
   return !named.empty();
 }
 

@@ -84,7 +84,7 @@ pid_t start(const Child& child, const Pipe* output, const Pipe* errors) {
   pid_t pid = 0;
   const int failed = posix_spawnp(&pid, arguments[0], &files, nullptr, arguments.data(), environment.data());
   posix_spawn_file_actions_destroy(&files);
-  if (failed != 0) throw std::system_error(failed, std::generic_category(), child.command[0] + " cannot be started");
+  if (failed != 0) throw std::system_error(failed, std::generic_category(), child.command[0] + ": cannot start");
   return pid;
 }
 

@@ -42,7 +42,7 @@ void write_plan(const std::filesystem::path& folder, const Plan& plan) {
   std::filesystem::create_directories(folder);
   const std::filesystem::path file = folder / "plan.json";
   if (keep(file, text_of(plan)) == Kept::kOther) {
-    throw std::runtime_error(file.string() + " is another plan: a sweep needs a folder of its own");
+    throw std::runtime_error(file.string() + " is a different plan: each sweep requires its own folder");
   }
 }
 
@@ -61,7 +61,7 @@ Plan read_plan(const std::filesystem::path& folder) {
     if (plan.per_shard == 0) throw std::invalid_argument("per_shard = 0");
     return plan;
   } catch (const std::exception& error) {
-    throw std::runtime_error(file.string() + ": no plan of a sweep: " + error.what());
+    throw std::runtime_error(file.string() + ": expected a plan of a sweep: " + error.what());
   }
 }
 

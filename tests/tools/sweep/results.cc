@@ -27,7 +27,7 @@ class Draft {
     path_ = beside.parent_path() / ("." + beside.filename().string() + "." + host + "." + std::to_string(getpid()) +
                                     "." + std::to_string(count++));
     file_ = open(path_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644);
-    if (file_ < 0) fail("cannot be written");
+    if (file_ < 0) fail("cannot write");
   }
   ~Draft() {
     if (file_ >= 0) close(file_);
@@ -40,13 +40,13 @@ class Draft {
     while (!text.empty()) {
       const ssize_t written = ::write(file_, text.data(), text.size());
       if (written < 0 && errno == EINTR) continue;
-      if (written < 0) fail("cannot be written");
+      if (written < 0) fail("cannot write");
       text.remove_prefix(static_cast<std::size_t>(written));
     }
   }
 
   void sync() const {
-    if (fsync(file_) != 0) fail("cannot be synced");
+    if (fsync(file_) != 0) fail("cannot sync");
   }
 
   /// Returns whether the file now has this name. Over NFS the reply to a successful link may be lost, so the link count
@@ -58,12 +58,12 @@ class Draft {
     if (fstat(file_, &now) == 0 && now.st_nlink == 2) return true;
     if (reason == EEXIST) return false;
     errno = reason;
-    fail("cannot be linked to " + name.string());
+    fail("cannot link it to " + name.string());
   }
 
  private:
   [[noreturn]] void fail(const std::string& what) const {
-    throw std::system_error(errno, std::generic_category(), path_.string() + " " + what);
+    throw std::system_error(errno, std::generic_category(), path_.string() + ": " + what);
   }
 
   std::filesystem::path path_;
@@ -75,7 +75,7 @@ void sync_folder(const std::filesystem::path& folder) {
   if (file < 0 || fsync(file) != 0) {
     const int reason = errno;
     if (file >= 0) close(file);
-    throw std::system_error(reason, std::generic_category(), folder.string() + " cannot be synced");
+    throw std::system_error(reason, std::generic_category(), folder.string() + ": cannot sync");
   }
   close(file);
 }
@@ -182,7 +182,8 @@ std::vector<std::uint64_t> differing_units(std::string_view one, std::string_vie
 std::string difference(std::string_view one, std::string_view other, const Units& units) {
   const std::vector<std::uint64_t> differing = differing_units(one, other, units);
   if (differing.empty()) {
-    return end_of(one, units).digest == end_of(other, units).digest ? "no unit, but in their ends" : "several units";
+    return end_of(one, units).digest == end_of(other, units).digest ? "no unit, but in their last lines"
+                                                                    : "several units";
   }
   constexpr std::size_t kMost = 8;
   std::string text = differing.size() == 1 ? "unit " : "units ";
@@ -194,7 +195,7 @@ std::string difference(std::string_view one, std::string_view other, const Units
 }
 
 ShardEnd end_of(std::string_view output, const Units& units) {
-  if (output.empty() || output.back() != '\n') throw std::invalid_argument("the output breaks off");
+  if (output.empty() || output.back() != '\n') throw std::invalid_argument("the output is truncated");
   output.remove_suffix(1);
   const auto last = output.rfind('\n');
   const ShardEnd end = ShardEnd::parse(last == std::string_view::npos ? output : output.substr(last + 1));

@@ -62,19 +62,20 @@ Fingerprint fingerprint_of(Arithmetic arithmetic, const std::filesystem::path& s
 
 void expect_as_planned(const Plan& plan, const std::filesystem::path& self) {
   if (const std::string here = sha256_of(plan.program); here != plan.sha256) {
-    throw std::runtime_error(plan.program.string() + " is not the program of the plan: its SHA-256 is " + here +
-                             ", the plan's " + plan.sha256 + "; plan anew in another folder");
+    throw std::runtime_error(plan.program.string() + " is not the program of the plan: SHA-256 " + here +
+                             ", expected " + plan.sha256 + "; create a new plan in another folder");
   }
   const Fingerprint here = fingerprint_of(plan.arithmetic, self);
   if (here == plan.fingerprint) return;
   const auto text = [](const Fingerprint& print) {
     return print.c_library + ", functions " + print.functions.substr(0, 8) + ", BLAS " + print.blas;
   };
-  throw std::runtime_error("this node computes otherwise than the plan (" + text(here) +
-                           "; the plan: " + text(plan.fingerprint) + "): " +
-                           (plan.arithmetic == Arithmetic::kNative
-                                ? "plan with --arithmetic portable, which is for nodes of several kinds"
-                                : "its C library or OpenBLAS is another version; run on nodes with the same packages"));
+  throw std::runtime_error(
+      "the arithmetic of this node differs from the plan (" + text(here) + "; the plan: " + text(plan.fingerprint) +
+      "): " +
+      (plan.arithmetic == Arithmetic::kNative
+           ? "use --arithmetic portable in the plan for nodes of different types"
+           : "its C library or OpenBLAS has a different version; use nodes with the same packages"));
 }
 
 std::string text_of(const Units& units) { return std::to_string(units.first) + ":" + std::to_string(units.count); }
@@ -94,7 +95,7 @@ bool run_shard(const std::filesystem::path& folder, const Plan& plan, std::uint6
   if (!why.empty()) {
     std::filesystem::create_directories(folder / "failed");
     std::ofstream(failure_file(folder, shard)) << why << "\n" << end.errors;
-    out << name << why << "; not done\n";
+    out << name << why << "; failed\n";
     return false;
   }
   switch (keep_result(folder, shard, end.output)) {
@@ -102,12 +103,12 @@ bool run_shard(const std::filesystem::path& folder, const Plan& plan, std::uint6
       out << name << "done\n";
       return true;
     case Kept::kSame:
-      out << name << "done before, with the same result\n";
+      out << name << "already done, with the same result\n";
       return true;
     case Kept::kOther:
       break;
   }
-  out << name << "done before, with another result; both are kept\n";
+  out << name << "already done, with a different result; both are kept\n";
   return false;
 }
 
@@ -153,8 +154,8 @@ int merge(const std::filesystem::path& folder, const Plan& plan, std::ostream& o
     const Units units = plan.shard(shard);
     const std::string where = difference(*result_of(folder, plan, shard), *other_result_of(folder, plan, shard), units);
     throw std::runtime_error("shard " + std::to_string(shard) + ", units " + text_of(units) +
-                             ", has had two results, which differ in " + where + ": tendon-sweep run " +
-                             folder.string() + " --shard " + std::to_string(shard) + " --bisect tells more");
+                             ", has two results that differ in " + where + ": tendon-sweep run " + folder.string() +
+                             " --shard " + std::to_string(shard) + " --bisect examines them");
   }
   std::string lines;
   std::optional<ShardEnd> whole;
@@ -168,11 +169,11 @@ int merge(const std::filesystem::path& folder, const Plan& plan, std::ostream& o
       whole = end;
     }
   }
-  if (whole->units != plan.units) throw std::runtime_error("the shards do not make up the units of the plan");
+  if (whole->units != plan.units) throw std::runtime_error("the shards do not have all units of the plan");
   lines += whole->line() + "\n";
   const std::filesystem::path merged = folder / "merged.jsonl";
   if (keep(merged, lines) == Kept::kOther) {
-    throw std::runtime_error(merged.string() + " is there, and is not what the shards make up");
+    throw std::runtime_error(merged.string() + ": the file exists, and differs from the result of the shards");
   }
   if (!has_from(plan)) {
     out << whole->line() << "\n" << merged.string() << ": all lines\n" << std::flush;

@@ -18,7 +18,7 @@ std::string quoted(const std::string& text) {
 
 std::vector<std::uint64_t> missing(const std::filesystem::path& folder, const Plan& plan) {
   std::vector<std::uint64_t> shards = status_of(folder, plan).missing;
-  if (shards.empty()) throw std::invalid_argument("a job needs something that is missing");
+  if (shards.empty()) throw std::invalid_argument("no shards are missing");
   return shards;
 }
 
@@ -86,11 +86,11 @@ std::string kubernetes_job(const std::filesystem::path& folder, const Plan& plan
          "  podReplacementPolicy: Failed\n"
          "  podFailurePolicy:\n"
          "    rules:\n"
-         "      - action: Ignore  # a node that is drained is no fault of the shard's\n"
+         "      - action: Ignore  # draining a node is not an error of the shard\n"
          "        onPodConditions:\n"
          "          - type: DisruptionTarget\n"
          "            status: \"True\"\n"
-         "      - action: FailIndex  # wrong usage stays wrong\n"
+         "      - action: FailIndex  # repeating cannot help with wrong usage\n"
          "        onExitCodes:\n"
          "          operator: In\n"
          "          values: [2]\n"

@@ -55,7 +55,7 @@ std::filesystem::path found(const std::string& program) {
     const auto file = std::filesystem::path(folder) / program;
     if (access(file.c_str(), X_OK) == 0) return std::filesystem::canonical(file);
   }
-  throw std::runtime_error(program + ": found neither beside tendon-sweep nor in PATH");
+  throw std::runtime_error(program + ": found neither in the folder of tendon-sweep nor in PATH");
 }
 
 int plan(const Arguments& arguments) {
@@ -102,7 +102,7 @@ int here(const Arguments& arguments) {
 int submit(const Arguments& arguments) {
   const Plan plan = read_plan(arguments.folder);
   if (status_of(arguments.folder, plan).missing.empty()) {
-    std::cout << "nothing is missing: tendon-sweep merge " << arguments.folder.string() << "\n";
+    std::cout << "no shards are missing; run tendon-sweep merge " << arguments.folder.string() << "\n";
     return 0;
   }
   if (arguments.to == "kubernetes") {
@@ -142,8 +142,7 @@ int status(const Arguments& arguments) {
     std::cout << "shard " << shard << " failed: " << std::ifstream(failure_file(arguments.folder, shard)).rdbuf();
   }
   for (const std::uint64_t shard : now.differing) {
-    std::cout << "shard " << shard
-              << " has had two results that differ: " << result_file(arguments.folder, shard).string()
+    std::cout << "shard " << shard << " has two results that differ: " << result_file(arguments.folder, shard).string()
               << " and .differs\n";
   }
   return 0;
@@ -159,95 +158,100 @@ int arithmetic() {
 
 CLI::App* add_verb(CLI::App& app, Arguments& arguments, const std::string& name, const std::string& what) {
   CLI::App* const verb = app.add_subcommand(name, what);
-  verb->add_option("FOLDER", arguments.folder, "of the sweep; all nodes see it")->required();
+  verb->add_option("FOLDER", arguments.folder, "Folder of the sweep, accessible from all nodes")->required();
   return verb;
 }
 
 int main_of(int argc, char** argv) {
-  CLI::App app("A long computation in shards: on this machine, by Slurm or by Kubernetes, with one result",
+  CLI::App app("Run a long computation in shards, on this machine, with Slurm or with Kubernetes, with one result",
                "tendon-sweep");
   usage::dress(app);
   app.set_version_flag("--version", version_text());
   app.require_subcommand(1);
   app.footer(
-      "\nExample: 20 000 worlds on this machine\n"
+      "\n"
+      "Example: run 20 000 worlds on this machine\n"
       "  tendon-sweep plan w --units 1:20000 --per-shard 500 -- tendon-worlds run\n"
       "  tendon-sweep here w\n"
-      "  tendon-sweep merge w\n"
-      "\nExit: 0 done, and with merge every promise was kept; 1 a shard failed or a promise was broken; 2 wrong "
-      "usage.");
+      "  tendon-sweep merge w\n\n"
+      "Exit: 0 success; 1 failed, or with merge, a guarantee was violated; 2 wrong usage.");
   Arguments arguments;
 
-  CLI::App* const plan_verb = add_verb(app, arguments, "plan", "Says once what is to be run, in which shards");
-  plan_verb->add_option("--units", arguments.units, "seeds, situations, … of the program's")
+  CLI::App* const plan_verb = add_verb(app, arguments, "plan", "Define what to run, and in which shards");
+  plan_verb->add_option("--units", arguments.units, "Units of the program: seeds, situations, …")
       ->type_name("FIRST:COUNT")
       ->required();
-  plan_verb->add_option("--per-shard", arguments.per_shard, "units; a shard should take 1 to 10 minutes")
+  plan_verb->add_option("--per-shard", arguments.per_shard, "Units per shard; a shard should take 1 to 10 minutes")
       ->type_name("N")
       ->check(CLI::PositiveNumber)
       ->required();
   plan_verb
       ->add_option("--arithmetic", arguments.arithmetic,
-                   "portable: the same bytes on any x86-64 node; native: for nodes of one kind")
+                   "portable: identical results on all x86-64 nodes; native: for nodes of one type")
       ->check(usage::one_of({"portable", "native"}))
       ->capture_default_str();
-  plan_verb->add_option("COMMAND", arguments.command, "after --: a program with --units, and its other arguments")
+  plan_verb
+      ->add_option("COMMAND", arguments.command, "After --: a program that supports --units, and its other arguments")
       ->required();
   plan_verb->footer("\nExample:\n  tendon-sweep plan w --units 1:1000000 --per-shard 5000 -- tendon-worlds run\n");
 
-  CLI::App* const run_verb = add_verb(app, arguments, "run", "Runs one shard, or every Tth");
+  CLI::App* const run_verb = add_verb(app, arguments, "run", "Run one shard, or every Tth");
   CLI::Option* const shard =
-      run_verb->add_option("--shard", arguments.shard, "this one, even if it is done")->type_name("N");
+      run_verb->add_option("--shard", arguments.shard, "Run this shard, even if it is done")->type_name("N");
   run_verb
-      ->add_flag("--bisect", arguments.bisect,
-                 "of a shard that has had two results: in which units do they differ, and is it the program or a node?")
+      ->add_flag(
+          "--bisect", arguments.bisect,
+          "Find the units in which the two results of a shard differ, and whether the program or a node is the cause")
       ->needs(shard);
-  run_verb->add_option("--task", arguments.task, "with --of: shards I, I+T, I+2T …, but for those that are done")
+  run_verb->add_option("--task", arguments.task, "With --of: run shards I, I+T, I+2T …, except those that are done")
       ->type_name("I");
-  run_verb->add_option("--of", arguments.of, "tasks in all")->type_name("T");
+  run_verb->add_option("--of", arguments.of, "Total number of tasks")->type_name("T");
   run_verb->footer("\nExample:\n  tendon-sweep run w --shard 17\n  tendon-sweep run w --shard 17 --bisect\n");
 
-  CLI::App* const here_verb = add_verb(app, arguments, "here", "Runs all that is missing on this machine");
-  here_verb->add_option("--jobs", arguments.jobs, "shards at a time")
+  CLI::App* const here_verb = add_verb(app, arguments, "here", "Run all missing shards on this machine");
+  here_verb->add_option("--jobs", arguments.jobs, "Number of simultaneous shards")
       ->type_name("J")
       ->check(CLI::Range(1U, 1024U))
       ->default_str("one for each core");
   here_verb->footer("\nExample:\n  tendon-sweep here w --jobs 2\n");
 
-  CLI::App* const submit_verb =
-      add_verb(app, arguments, "submit", "Writes the job that runs what is missing on a cluster, and says the command");
+  CLI::App* const submit_verb = add_verb(
+      app, arguments, "submit", "Write a job that runs the missing shards on a cluster, and print its command");
   submit_verb->add_option("--to", arguments.to, "where")->check(usage::one_of({"slurm", "kubernetes"}))->required();
-  submit_verb->add_flag("--go", arguments.go, "slurm: also carries it out");
-  submit_verb->add_option("--partition", arguments.slurm.partition, "slurm: of the site's")->type_name("NAME");
-  submit_verb->add_option("--time", arguments.slurm.time, "slurm: the most that a task may take")
+  submit_verb->add_flag("--go", arguments.go, "slurm: also submit the job");
+  submit_verb->add_option("--partition", arguments.slurm.partition, "slurm: partition")->type_name("NAME");
+  submit_verb->add_option("--time", arguments.slurm.time, "slurm: time limit of a task")
       ->type_name("HH:MM:SS")
       ->capture_default_str();
-  submit_verb->add_option("--max-array", arguments.slurm.most, "slurm: the most tasks of an array (MaxArraySize - 1)")
+  submit_verb
+      ->add_option("--max-array", arguments.slurm.most, "slurm: maximum number of tasks in an array (MaxArraySize - 1)")
       ->type_name("N")
       ->capture_default_str();
-  submit_verb->add_option("--image", arguments.kubernetes.image, "kubernetes: with the program and tendon-sweep")
+  submit_verb->add_option("--image", arguments.kubernetes.image, "kubernetes: image with the program and tendon-sweep")
       ->type_name("IMAGE");
-  submit_verb->add_option("--volume", arguments.kubernetes.volume, "kubernetes: the claim that holds FOLDER")
+  submit_verb->add_option("--volume", arguments.kubernetes.volume, "kubernetes: volume claim with FOLDER")
       ->type_name("CLAIM");
-  submit_verb->add_option("--parallel", arguments.kubernetes.parallel, "kubernetes: pods at a time")
+  submit_verb->add_option("--parallel", arguments.kubernetes.parallel, "kubernetes: number of simultaneous pods")
       ->type_name("N")
       ->capture_default_str();
   submit_verb->footer(
-      "\nExample: again after failures, only what is missing is run\n"
+      "\n"
+      "Example: submit a job, and repeat this after failures for the missing shards\n"
       "  tendon-sweep submit w --to slurm --go\n"
       "  tendon-sweep submit w --to kubernetes --image REGISTRY/tendon:TAG --volume sweep | kubectl apply -f -\n");
 
-  CLI::App* const status_verb = add_verb(app, arguments, "status", "Which shards are done, missing, failed");
-  status_verb->add_flag("--missing", arguments.missing, "only these, as Slurm's --array takes them: 0-3,17");
-  status_verb->add_flag("--json", arguments.json, "one JSON object");
+  CLI::App* const status_verb = add_verb(app, arguments, "status", "Print which shards are done, missing or failed");
+  status_verb->add_flag("--missing", arguments.missing,
+                        "Only print missing shards, in the format of Slurm's --array: 0-3,17");
+  status_verb->add_flag("--json", arguments.json, "Print one JSON object on stdout");
   status_verb->footer("\nExample:\n  tendon-sweep status w\n");
 
-  CLI::App* const merge_verb =
-      add_verb(app, arguments, "merge", "Puts the shards together: what one process would have said that had run all");
+  CLI::App* const merge_verb = add_verb(
+      app, arguments, "merge", "Merge the shards to the result that one process would have printed for all units");
   merge_verb->footer("\nExample:\n  tendon-sweep merge w\n");
 
-  CLI::App* const arithmetic_verb =
-      app.add_subcommand("arithmetic", "By what the numbers of this node can be told: C library, functions, BLAS");
+  CLI::App* const arithmetic_verb = app.add_subcommand(
+      "arithmetic", "Print the properties on which the results of this node depend: C library, functions, BLAS");
   arithmetic_verb->footer("\nExample:\n  tendon-sweep arithmetic\n");
 
   return run_tool(app, argc, argv, [&] {

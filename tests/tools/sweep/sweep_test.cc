@@ -89,8 +89,7 @@ TEST_F(Sweep, AShardThatLeavesOutAUnitIsRefused) {
   fault("skip-11");
   const ChildEnd end = sweep({"run", folder(), "--shard", "1"});
   EXPECT_EQ(end.status, 1);
-  EXPECT_NE(end.output.find("the end of units 11:9, expected that of 11:10; not done"), std::string::npos)
-      << end.output;
+  EXPECT_NE(end.output.find("the end of units 11:9, expected that of 11:10; failed"), std::string::npos) << end.output;
 }
 
 TEST_F(Sweep, AShardThatRanTwiceCountsOnce) {
@@ -98,7 +97,7 @@ TEST_F(Sweep, AShardThatRanTwiceCountsOnce) {
   EXPECT_EQ(sweep({"here", folder()}).status, 0);
   const ChildEnd again = sweep({"run", folder(), "--shard", "1"});
   EXPECT_EQ(again.status, 0);
-  EXPECT_NE(again.output.find("done before, with the same result"), std::string::npos) << again.output;
+  EXPECT_NE(again.output.find("already done, with the same result"), std::string::npos) << again.output;
   EXPECT_EQ(sweep({"merge", folder()}).status, 0);
   EXPECT_EQ(sweep({"merge", folder()}).status, 0) << "a second merge changes nothing";
   EXPECT_EQ(merged(), toy("1:20"));
@@ -113,7 +112,7 @@ TEST_F(Sweep, TwoResultsThatDifferAreBothKeptAndMergeNamesTheUnit) {
   EXPECT_EQ(contents(folder() + "/done/000001.json"), before) << "nothing that exists is overwritten";
   const ChildEnd end = sweep({"merge", folder()});
   EXPECT_EQ(end.status, 1);
-  EXPECT_NE(end.errors.find("shard 1, units 11:10, has had two results, which differ in unit 13: tendon-sweep run " +
+  EXPECT_NE(end.errors.find("shard 1, units 11:10, has two results that differ in unit 13: tendon-sweep run " +
                             folder() + " --shard 1 --bisect"),
             std::string::npos)
       << end.errors;
@@ -130,8 +129,8 @@ TEST_F(Sweep, BisectNamesTheUnitWithALineAndWithoutOne) {
     const ChildEnd end = sweep({"run", folder(), "--shard", "1", "--bisect"});
     EXPECT_EQ(end.status, 0) << end.errors;
     for (const char* said :
-         {"two results, which differ in unit 13\n", "here and now the shard comes to a third\n",
-          "unit 13, run 3 times by itself: 3 results\n", "The program comes to another result each time"}) {
+         {"two results that differ in unit 13\n", "on this node, the shard gives a third\n",
+          "unit 13, run 3 times alone: 3 results\n", "The program gives different results in each run"}) {
       EXPECT_NE(end.output.find(said), std::string::npos) << said << " in " << end.output;
     }
     EXPECT_EQ(end.output.find("second: {\"unit\":13,\"value\":170}") == std::string::npos, quiet) << end.output;
@@ -150,8 +149,8 @@ TEST_F(Sweep, BisectNamesAUnitThatDifferedOnceAndSaysThatThisNodeIsSure) {
   const ChildEnd end = sweep({"run", folder(), "--shard", "1", "--bisect"});
   EXPECT_EQ(end.status, 0) << end.errors;
   for (const char* said :
-       {"two results, which differ in unit 13\n", "here and now the shard comes to the second, ",
-        "unit 13, run 3 times by itself: the same each time\n", "This node stays with its result."}) {
+       {"two results that differ in unit 13\n", "on this node, the shard gives the second, ",
+        "unit 13, run 3 times alone: always the same result\n", "This node always gives the same result."}) {
     EXPECT_NE(end.output.find(said), std::string::npos) << said << " in " << end.output;
   }
 }
@@ -165,9 +164,9 @@ TEST_F(Sweep, BisectFindsOneOfSeveralUnitsWithoutLinesByHalves) {
   const ChildEnd end = sweep({"run", folder(), "--shard", "1", "--bisect"});
   EXPECT_EQ(end.status, 0) << end.errors;
   for (const char* said :
-       {"two results, which differ in several units\n", "units 11:5 come to another result each time\n",
-        "units 11:2 come to another result each time, and differ in unit 12\n",
-        "unit 12, run 3 times by itself: 3 results\n"}) {
+       {"two results that differ in several units\n", "units 11:5 give different results in each run\n",
+        "units 11:2 give different results in each run; they differ in unit 12\n",
+        "unit 12, run 3 times alone: 3 results\n"}) {
     EXPECT_NE(end.output.find(said), std::string::npos) << said << " in " << end.output;
   }
 }
@@ -184,7 +183,7 @@ TEST_F(Sweep, AnotherPlanAnotherProgramOrNoneIsRefused) {
   EXPECT_EQ(plan("1:20", "10").status, 0) << "the same plan again is no other";
   const ChildEnd other = plan("1:20", "5");
   EXPECT_EQ(other.status, 1);
-  EXPECT_NE(other.errors.find("plan.json is another plan"), std::string::npos) << other.errors;
+  EXPECT_NE(other.errors.find("plan.json is a different plan"), std::string::npos) << other.errors;
   EXPECT_EQ(sweep({"plan", faults() + "/b", "--units", "1:0", "--per-shard", "1", "--", TENDON_TOY}).status, 2);
   EXPECT_EQ(sweep({"plan", faults() + "/b", "--units", "1:5", "--per-shard", "1", "--", "no-such-program"}).status, 1);
   EXPECT_EQ(sweep({"here", faults() + "/b"}).status, 1);
@@ -220,7 +219,7 @@ TEST_F(Sweep, SameBytesWithAndWithoutFma) {
   EXPECT_EQ(sweep({"run", native, "--shard", "0"}).status, 0);
   const ChildEnd refused = sweep({"run", native, "--shard", "0"}, old_processor);
   EXPECT_EQ(refused.status, 1);
-  EXPECT_NE(refused.errors.find("plan with --arithmetic portable"), std::string::npos) << refused.errors;
+  EXPECT_NE(refused.errors.find("use --arithmetic portable in the plan"), std::string::npos) << refused.errors;
 }
 
 /// Compares a sharded sweep of one of our programs with a run in one process.
@@ -323,7 +322,7 @@ TEST_F(Sweep, TwoResultsMayDifferInTheirEndsAlone) {
   const std::string one = toy("1:5");
   std::string other = one;
   other.replace(other.find("\"broken\":0"), 10, "\"broken\":1");
-  EXPECT_EQ(difference(one, other, {1, 5}), "no unit, but in their ends");
+  EXPECT_EQ(difference(one, other, {1, 5}), "no unit, but in their last lines");
   EXPECT_EQ(difference(one, one.substr(one.find('\n') + 1), {1, 5}), "unit 1") << "a line is missing";
 }
 
@@ -347,7 +346,7 @@ TEST_F(Sweep, AJobForSlurmRunsWhatIsMissingAndNoMore) {
   EXPECT_EQ(sweep({"here", folder()}).status, 0);
   const ChildEnd done = sweep({"submit", folder(), "--to", "slurm"});
   EXPECT_EQ(done.status, 0);
-  EXPECT_NE(done.output.find("nothing is missing"), std::string::npos) << done.output;
+  EXPECT_NE(done.output.find("no shards are missing"), std::string::npos) << done.output;
 }
 
 TEST_F(Sweep, AJobForKubernetesIsIndexedAndForgivesADrainedNode) {

@@ -142,7 +142,8 @@ void add(CLI::App& verb, int& /*exit*/) {
       "  tendon-lab accuracy --models near --elements hex8-sri --n 6,8 --learned\n\n"
       "Example: compute the errors of the finest meshes on many machines\n"
       "  tendon-sweep plan a --units 0:24 --per-shard 1 -- tendon-lab accuracy --models condensed --n 8,12,16,20\n\n"
-      "Times are measured on this machine. Exit: 0 success; 1 failed, because of gnuplot or the files; 2 wrong usage.");
+      "Times are measured on this machine.\n"
+      "Exit: 0 success; 1 failed, because of gnuplot or the files; 2 wrong usage.");
   verb.callback([models, elements, slowest, setup, point] {
     if ((options.part.units || options.part.from) && (*slowest || *setup || *point)) {
       throw std::invalid_argument(

@@ -20,7 +20,8 @@ void add(CLI::App& verb, int& /*exit*/) {
       "\n"
       "Example\n"
       "  tendon-lab cost --out figures\n\n"
-      "Times are measured on this machine. Exit: 0 success; 1 failed, because of gnuplot or the files; 2 wrong usage.");
+      "Times are measured on this machine.\n"
+      "Exit: 0 success; 1 failed, because of gnuplot or the files; 2 wrong usage.");
   verb.callback([] { cost(options, std::cout); });
 }
 

@@ -21,8 +21,8 @@ void add(CLI::App& verb, int& /*exit*/) {
       "\n"
       "Example\n"
       "  tendon-lab teleop --hands 21 --out figures     takes three minutes\n\n"
-      "The same seed gives the same figures. Exit: 0 success; 1 failed, because of gnuplot or the files; 2 wrong "
-      "usage.");
+      "The same seed gives the same figures.\n"
+      "Exit: 0 success; 1 failed, because of gnuplot or the files; 2 wrong usage.");
   verb.callback([] { teleop(options, std::cout); });
 }
 
