@@ -207,8 +207,8 @@ class Day {
     const std::uint64_t states = world_.client(kX).stats().states;
     if (std::exchange(states_of_x_, states) != states) x_served_ = world_.now();
     const Known& x = known_[kX];
-    if (world_.now() - x_served_ > DayConfig::kPromise) broken("X is not served any more");
-    if (x.sessions > x.expired + 1) broken("a session of X has ended before its age");
+    if (world_.now() - x_served_ > DayConfig::kPromise) broken("X is no longer served");
+    if (x.sessions > x.expired + 1) broken("a session of X ended before its maximum age");
   }
 
   void see_server() {
@@ -229,8 +229,8 @@ class Day {
     report_.clock_error = std::max(report_.clock_error, error);
     report_.clock_bound = std::max(report_.clock_bound, server.controller_clock->error_bound);
     if (error > server.controller_clock->error_bound + kClockRounding) {
-      broken("Z's clock is wrong by " + us(error) + ", and " + us(server.controller_clock->error_bound) +
-             " is the bound");
+      broken("the error of Z's clock is " + us(error) + ", and " + us(server.controller_clock->error_bound) +
+             " is the limit");
     }
   }
   static std::string us(Duration duration) { return std::to_string(duration.count() / 1000) + " µs"; }
@@ -238,8 +238,8 @@ class Day {
   void see_receipts() {
     const auto compare = [&](const std::string& who, std::uint64_t expected, const LinkStats& counted) {
       if (expected == counted.datagrams_received) return;
-      broken(who + " has accepted " + std::to_string(counted.datagrams_received) + " datagrams of " +
-             std::to_string(expected) + " genuine ones");
+      broken(who + " accepted " + std::to_string(counted.datagrams_received) + " datagrams of " +
+             std::to_string(expected) + " genuine datagrams");
     };
     compare("A", up_[z_].accepted(up_[z_].newest()), world_.server().stats().controller);
     for (const std::size_t handle : {z_, kY, kX}) {
@@ -263,18 +263,18 @@ class Day {
 
   std::string requests_of_z() const {
     return std::to_string(known_[z_].asked) + " requests of Z in this session, " + std::to_string(rearmed_) +
-           " carried out";
+           " executed";
   }
 
   /// An observer is not allowed to rearm, so a denial counts as an execution.
   void see_requests_of_x() {
     const std::uint64_t denied = world_.server().stats().denied;
     for (; denied_ < denied; ++denied_, ++report_.carried_out) {
-      if (asked_by_x_.empty()) return broken("a request of X was carried out twice");
+      if (asked_by_x_.empty()) return broken("a request of X was executed twice");
       asked_by_x_.pop_front();
     }
     if (!asked_by_x_.empty() && world_.now() - asked_by_x_.front() > DayConfig::kPatience) {
-      broken("a request of X was not carried out");
+      broken("a request of X was not executed");
     }
   }
 
@@ -349,7 +349,7 @@ class Day {
     recover(world_.now());
     const ForceClient::Stats stats = world_.client(before).stats();
     if (stats.phase != ForceClient::Phase::kStopped || stats.code != Code::kReplaced) {
-      broken("a controller was replaced and does not know it: " + stats.reason);
+      broken("a controller was replaced without a message: " + stats.reason);
     }
     world_.kill(before);
   }
@@ -405,10 +405,10 @@ class Day {
       if (std::max(known_[z_].expired_at, known_[kY].expired_at) >= world_.now() - std::chrono::seconds(1)) {
         recover(world_.now());
       } else if (!served_since(before, std::chrono::seconds(1))) {
-        broken("not served any more, in fair weather: " + world_.client(z_).stats().reason + "; " +
+        broken("no longer served on a good network: " + world_.client(z_).stats().reason + "; " +
                world_.client(kY).stats().reason);
       } else if (rearmed_ != known_[z_].asked) {
-        broken("in fair weather: " + requests_of_z());
+        broken("on a good network: " + requests_of_z());
       }
       see_receipts();
     }
@@ -419,8 +419,8 @@ class Day {
     std::size_t& most = second_half ? report_.heap_second_half : report_.heap_first_half;
     most = std::max(most, mallinfo2().uordblks);
     if (second_half && report_.heap_second_half > report_.heap_first_half + DayConfig::kGrowth) {
-      broken("the heap grows: " + std::to_string(report_.heap_first_half) +
-             " bytes were the most in the first half, now " + std::to_string(report_.heap_second_half));
+      broken("the heap grows: " + std::to_string(report_.heap_first_half) + " bytes at most in the first half, now " +
+             std::to_string(report_.heap_second_half));
     }
   }
 

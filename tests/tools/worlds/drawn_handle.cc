@@ -150,9 +150,9 @@ std::string describe_handle(const DrawnWorld& world) {
   const auto* const simulated = std::get_if<SimulatedDevice::Config>(&world.device);
   const auto* const adversary = std::get_if<AdversaryDevice::Config>(&world.device);
   if (control.rotation) {
-    text += ", turned by motors of " + number(1e3 * control.rotation->max_torque) + " mN·m";
+    text += ", rotation with motors of " + number(1e3 * control.rotation->max_torque) + " mN·m";
   } else if (simulated != nullptr ? simulated->rotation.has_value() : adversary->turn.has_value()) {
-    text += ", turned by the hand alone";
+    text += ", rotation without motors";
   }
   if (control.grip) {
     text += ", a gripper of " + number(control.grip->max_force) + " N";

@@ -393,8 +393,8 @@ std::string describe(const DrawnWorld& world) {
   const HapticController::Config& control = config.loop.control;
   std::string text = "world " + std::to_string(world.seed) + ": ";
   if (const auto* device = std::get_if<SimulatedDevice::Config>(&world.device)) {
-    text += "a hand on " + number(device->mass) + " kg";
-    if (device->encoder_step) text += ", counts of " + number(*device->encoder_step * 1e6) + " µm";
+    text += "a hand with " + number(device->mass) + " kg";
+    if (device->encoder_step) text += ", encoder steps of " + number(*device->encoder_step * 1e6) + " µm";
     if (device->amplifier_bandwidth) text += ", an amplifier of " + number(*device->amplifier_bandwidth) + " Hz";
     if (device->watchdog) text += ", a watchdog of " + ms(*device->watchdog);
     if (device->joint_friction) text += ", friction in its joints";
@@ -415,9 +415,9 @@ std::string describe(const DrawnWorld& world) {
   text += ", b " + number(control.limiter.friction.viscous) + " N·s/m, f_c " +
           number(control.limiter.friction.coulomb) + " N, at most " + number(control.max_force) + " N; every " +
           ms(config.loop.period);
-  if (config.latest_wake > Duration::zero()) text += ", woken up to " + ms(config.latest_wake) + " late";
+  if (config.latest_wake > Duration::zero()) text += ", wakes up to " + ms(config.latest_wake) + " late";
   if (world.pauses()) text += ", pauses of " + ms(config.pause);
-  if (world.port.unseen > 0) text += ", readings fail";
+  if (world.port.unseen > 0) text += ", readings can fail";
   const bool aes = contains(config.suites, Suite::kAesGcm);
   text += world.sealed() ? (aes ? "; by " + names_of(config.suites) : "; suite 1") + ", a key for " +
                                std::to_string(config.rekey.datagrams) + " datagrams or " + ms(config.rekey.age)
@@ -437,14 +437,14 @@ std::string describe(const DrawnWorld& world) {
                 " until " + ms(client.rogue.quits.time_since_epoch());
         break;
     }
-    if (aes && !contains(client.config.suites, Suite::kAesGcm)) text += ", older than suite 2";
+    if (aes && !contains(client.config.suites, Suite::kAesGcm)) text += ", does not support suite 2";
     text += ", from " + ms(client.joins);
     if (client.killed) text += ", killed at " + ms(*client.killed);
-    if (client.restarted) text += ", again at " + ms(*client.restarted);
+    if (client.restarted) text += ", restarted at " + ms(*client.restarted);
   }
   if (world.garbage_hz > 0) text += "\n  garbage: " + number(world.garbage_hz) + " Hz";
   const auto tell = [&](Duration from, const Network::Weather& weather) {
-    text += "\n  weather from " + ms(from) + "\n    up   " + to_string(weather.up) + "\n    down " +
+    text += "\n  network from " + ms(from) + "\n    up   " + to_string(weather.up) + "\n    down " +
             to_string(weather.down);
   };
   tell(Duration::zero(), config.weather);

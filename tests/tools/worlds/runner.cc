@@ -122,15 +122,15 @@ void tell(const Broken& broken, bool json, std::ostream& out) {
         << '\n';
     return;
   }
-  out << "seed " << broken.seed << " breaks \"" << oracle.name << "\" at " << at << " s: " << broken.breach.what
-      << "\n  the promise: " << oracle.sentence << "\n  again with:  " << reproduce(broken.seed) << '\n';
+  out << "seed " << broken.seed << " violates \"" << oracle.name << "\" at " << at << " s: " << broken.breach.what
+      << "\n  expected: " << oracle.sentence << "\n  repeat with: " << reproduce(broken.seed) << '\n';
 }
 
 void tell_events(const Tally& tally, std::ostream& out) {
-  out << tally.steps << " haptic steps, " << tally.datagrams << " datagrams; forces felt in " << tally.felt
+  out << tally.steps << " haptic steps, " << tally.datagrams << " datagrams; forces rendered in " << tally.felt
       << " worlds, limited in " << tally.limited << ", torques in " << tally.turned << ", grips in " << tally.gripped
-      << "; " << tally.presses << " presses shown; recovery checked in " << tally.recovered << "; least energy "
-      << tally.least_energy << " J\n";
+      << "; " << tally.presses << " button presses received; recovery checked in " << tally.recovered
+      << "; least energy " << tally.least_energy << " J\n";
 }
 
 void tell(const Tally& tally, double elapsed, bool json, std::ostream& out) {
@@ -208,7 +208,7 @@ void expect_events(const Tally& tally) {
       (tally.felt < tally.worlds * 8 / 10 || tally.limited < tally.worlds * 6 / 10 ||
        tally.turned < tally.worlds / 20 || tally.gripped < tally.worlds / 20 || tally.presses < tally.worlds / 20 ||
        tally.recovered < tally.worlds * 8 / 10)) {
-    throw std::runtime_error("too little happens in these worlds for them to prove anything");
+    throw std::runtime_error("too few events in these worlds for a result");
   }
 }
 
@@ -269,7 +269,8 @@ void explore_units(const Units& seeds, unsigned jobs, std::ostream& out) {
 
 bool judge(std::istream& lines, std::ostream& out) {
   const ShardEnd end = read_to_end(lines, [&out](const std::string& line) {
-    if (!line.starts_with(R"({"kind":"broken",)")) throw std::invalid_argument("expected a broken world or the end");
+    if (!line.starts_with(R"({"kind":"broken",)"))
+      throw std::invalid_argument("expected a world with a violation, or the end");
     out << line << '\n';
   });
   const Tally tally{.worlds = end.total("worlds"),
@@ -286,11 +287,11 @@ bool judge(std::istream& lines, std::ostream& out) {
       << end.units.first + end.units.count - 1 << "; digest " << end.digest.text() << '\n';
   tell_events(tally, out);
   if (end.total("broken") > 0) {
-    out << end.total("broken") << " broke a promise: tendon-worlds run --seed N --verbose\n";
+    out << end.total("broken") << " violated a guarantee: tendon-worlds run --seed N --verbose\n";
     return false;
   }
   expect_events(tally);
-  out << "every promise was kept\n";
+  out << "no violation\n";
   return true;
 }
 
@@ -302,12 +303,12 @@ bool run_one(std::uint64_t seed, bool verbose, std::ostream& out) {
     const Network::Counts& counts = outcome.network;
     out << "  " << outcome.steps << " haptic steps; network: " << counts.sent << " sent, " << counts.copies
         << " copies, " << counts.delivered << " delivered, " << counts.lost << " lost, " << counts.nowhere
-        << " to nobody; least energy " << outcome.least_energy << " J\n";
+        << " to unknown addresses; least energy " << outcome.least_energy << " J\n";
   }
   if (outcome.breach) {
     tell(Broken{seed, *outcome.breach}, false, out);
   } else {
-    out << "seed " << seed << " keeps every promise\n";
+    out << "seed " << seed << ": no violation\n";
   }
   return !outcome.breach;
 }
@@ -322,7 +323,7 @@ std::vector<std::uint64_t> read_seeds(const std::filesystem::path& file) {
     const auto [end, error] = std::from_chars(line.data(), line.data() + line.size(), seed);
     if (error != std::errc() || (end != line.data() + line.size() && *end != ' ')) {
       throw std::runtime_error(file.string() + ":" + std::to_string(number) +
-                               ": expected a seed and why, or a comment");
+                               ": expected a seed and a reason, or a comment");
     }
     seeds.push_back(seed);
   }

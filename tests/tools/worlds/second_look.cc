@@ -84,7 +84,7 @@ void second_look(const SecondLookOptions& options, std::ostream& out) {
   const Scene scene = read_scene(options.scene);
   const injector::Trace trace = injector::read_trace(options.trace);
   const Duration length = options.length_s ? from_seconds(*options.length_s) : length_of(trace);
-  if (length <= Duration::zero()) throw std::invalid_argument("--for-s: nothing to run: the trace is empty");
+  if (length <= Duration::zero()) throw std::invalid_argument("--for-s: expected a time, because the trace is empty");
   std::vector<lab::Run> runs;
   for (const Law law : asked) runs.push_back(run(scene, trace, law, length, options));
   if (!options.json) {

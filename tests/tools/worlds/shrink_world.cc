@@ -41,7 +41,7 @@ bool shrink_world(std::uint64_t seed, const std::filesystem::path& file, std::os
   const DrawnWorld world = draw_world(seed);
   const Outcome outcome = run(world);
   if (!outcome.breach) {
-    out << "seed " << seed << " keeps every promise: there is nothing to shrink\n";
+    out << "seed " << seed << ": no violation, nothing to shrink\n";
     return false;
   }
   const Oracle oracle = outcome.breach->oracle;
@@ -54,11 +54,11 @@ bool shrink_world(std::uint64_t seed, const std::filesystem::path& file, std::os
   std::ofstream stream(file, std::ios::binary);
   injector::write_trace(stream, shrunk.trace);
   if (!stream.flush()) throw std::runtime_error("cannot write " + file.string());
-  out << "seed " << seed << " breaks \"" << info(oracle).name << "\" still with " << shrunk.trace.records.size()
+  out << "seed " << seed << " violates \"" << info(oracle).name << "\" still with " << shrunk.trace.records.size()
       << " of " << shrunk.from << " datagrams that were not benign (" << shrunk.runs << " runs"
-      << (shrunk.minimal ? ", none of them can be left out" : ", and there may be fewer") << "): " << file.string()
+      << (shrunk.minimal ? ", none of them can be omitted" : ", and a smaller set may exist") << "): " << file.string()
       << '\n';
-  if (shrunk.trace.records.empty()) out << "the network is not to blame\n";
+  if (shrunk.trace.records.empty()) out << "the network is not the cause\n";
   return !shrunk.trace.records.empty();
 }
 

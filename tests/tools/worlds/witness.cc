@@ -20,26 +20,26 @@ constexpr Duration kClockRounding{4};
 constexpr Duration kServed = std::chrono::milliseconds(400);
 
 constexpr std::array kOracles = {
-    OracleInfo{
-        Oracle::kLedger, "ledger",
-        "the device gives out no energy that it was not given, −1 nJ for rounding, and in a hold beyond the law's "
-        "bound no more than the law says"},
-    OracleInfo{Oracle::kTruth, "truth", "the hand has really done at least the work that the account of the port says"},
-    OracleInfo{Oracle::kBound, "bound", "no force, torque or grip is larger than the scene's bound, or than the law's"},
-    OracleInfo{Oracle::kFinite, "finite", "only numbers reach the device"},
-    OracleInfo{Oracle::kFresh, "fresh", "a force is rendered as fresh only while one came within its validity"},
-    OracleInfo{Oracle::kStopped, "stopped", "long after the last force there is none, and none during a fault"},
+    OracleInfo{Oracle::kLedger, "ledger",
+               "the device gives out no energy that it did not receive, except 1 nJ for rounding, and in a hold longer "
+               "than the bound of the law, at most the amount of the law"},
+    OracleInfo{Oracle::kTruth, "truth", "the hand has done at least the work in the account of the port"},
+    OracleInfo{Oracle::kBound, "bound", "no force, torque or grip exceeds the bound of the scene or of the law"},
+    OracleInfo{Oracle::kFinite, "finite", "only finite numbers reach the device"},
+    OracleInfo{Oracle::kFresh, "fresh", "a force counts as fresh only during its validity"},
+    OracleInfo{Oracle::kStopped, "stopped",
+               "there is no force long after the last one arrived, and none during a fault"},
     OracleInfo{Oracle::kNewest, "newest",
-               "the motion that the rendered force answers never is older than the one before"},
-    OracleInfo{Oracle::kDrained, "drained", "who has had its turn has left no datagram unread"},
+               "the motion that the rendered force answers is never older than the previous one"},
+    OracleInfo{Oracle::kDrained, "drained", "after its turn, a server or client has no unread datagram"},
     OracleInfo{Oracle::kCounters, "counters", "sent = received + lost + in flight; every datagram is counted once"},
     OracleInfo{Oracle::kRoundTrip, "round-trip",
-               "the round trip measured is that of the network, whatever the clocks say"},
-    OracleInfo{Oracle::kClock, "clock",
-               "what the server says of a controller's clock is within the bound it publishes"},
-    OracleInfo{Oracle::kRecovery, "recovery", "after bad weather everybody is served again within the promised time"},
-    OracleInfo{Oracle::kCalm, "calm", "nobody wants to be called again and again"},
-    OracleInfo{Oracle::kPress, "press", "an observer is shown every press of a button, however short"},
+               "the measured round trip is that of the network, whatever the clocks show"},
+    OracleInfo{Oracle::kClock, "clock", "the error of a controller's clock offset is within its published bound"},
+    OracleInfo{Oracle::kRecovery, "recovery",
+               "after the network has recovered, all clients are served again within the guaranteed time"},
+    OracleInfo{Oracle::kCalm, "calm", "no loop asks to be called again without end"},
+    OracleInfo{Oracle::kPress, "press", "an observer receives every press of a button"},
 };
 
 std::string number(double value) {
@@ -145,7 +145,7 @@ void Witness::see_bounds(const StepRecord& step) {
   const Effort& told = port_.told();
   const auto within = [&](double size, double bound, const char* unit) {
     if (size > bound * (1 + 1e-12) + 1e-12) {
-      report(Oracle::kBound, number(size) + " " + unit + ", where " + number(bound) + " " + unit + " are the bound");
+      report(Oracle::kBound, number(size) + " " + unit + " exceed the bound of " + number(bound) + " " + unit);
     }
   };
   const double by_law = control.limiter.law == Law::kAolPerAxis ? told.force.cwiseAbs().maxCoeff() : told.force.norm();
@@ -164,7 +164,7 @@ void Witness::see_account(const char* whose, double& last, double now, double ma
   const double before = std::exchange(last, now);
   const double may_leave = std::min(before, 0.0) - may_take;
   if (now < may_leave - kRounding) {
-    report(Oracle::kLedger, whose + number(now) + " J, where the hold may leave " + number(may_leave) + " J");
+    report(Oracle::kLedger, whose + number(now) + " J, expected at least " + number(may_leave) + " J after the hold");
   }
   if (before >= 0 && may_take == 0) least_energy_ = std::min(least_energy_, now);
 }
@@ -191,19 +191,19 @@ void Witness::see_energy(const StepRecord& step) {
 void Witness::see_age(const StepRecord& step) {
   const LocalTime now = step.hand.at;
   if (step.mode == Mode::kActive && (!last_force_ || now - *last_force_ > valid_)) {
-    report(Oracle::kFresh, last_force_
-                               ? "the last force came " + ms(now - *last_force_) + " ago, fresh are " + ms(valid_)
-                               : "no force has ever come");
+    report(Oracle::kFresh, last_force_ ? "the last force arrived " + ms(now - *last_force_) +
+                                             " ago, but is only valid for " + ms(valid_)
+                                       : "no force has arrived yet");
   }
   const bool over = !last_force_ || now - *last_force_ > valid_ + safe_stop_;
   const bool wants = !step.wanted.isZero(0) || (step.turn() != nullptr && !step.turn()->wanted.isZero(0)) ||
                      (step.grip() != nullptr && step.grip()->wanted != 0);
   if (over && wants) {
-    report(Oracle::kStopped, number(step.wanted.norm()) + " N are wanted" +
+    report(Oracle::kStopped, number(step.wanted.norm()) + " N requested" +
                                  (last_force_ ? ", " + ms(now - *last_force_) + " after the last force" : ""));
   }
   if (step.reasons.has(Reason::kUnseen)) {
-    if (port_.told() != Effort{}) report(Oracle::kStopped, words(port_.told()) + ", and nobody sees the hand");
+    if (port_.told() != Effort{}) report(Oracle::kStopped, words(port_.told()) + " without a position of the hand");
     return;
   }
   // The slew limit reduces the force by at most the amount for the longest hold in each interval, even if there is a
@@ -216,13 +216,14 @@ void Witness::see_age(const StepRecord& step) {
     *silent_for_ += std::min(step.held, drawn_.config.loop.control.limiter.longest_hold);
   }
   if (aol_ && silent_for_ && *silent_for_ > slew_time_ && port_.told() != Effort{}) {
-    report(Oracle::kStopped, words(port_.told()) + " are given out, " + ms(*silent_for_) +
-                                 " after there should be none, pauses left out");
+    report(Oracle::kStopped,
+           words(port_.told()) + " rendered, " + ms(*silent_for_) + " after the end of all forces, without pauses");
   }
   if (may_replay_ticks_ || step.force_sequence == 0) return;
   const LocalTime answered = now - step.loop_age;
   if (answered < answered_) {
-    report(Oracle::kNewest, "a force that answers a motion " + ms(answered_ - answered) + " older than the one before");
+    report(Oracle::kNewest,
+           "a force for a motion that is " + ms(answered_ - answered) + " older than the previous one");
   }
   answered_ = answered;
 }
@@ -233,7 +234,8 @@ void Witness::see(const World::Turn& turn) {
     const bool more = std::exchange(server_wants_more_, turn.wants_more);
     if (std::exchange(arrived_, arrived) != arrived || more) see_server();
     if (!turn.wants_more && world_.network().unread_by_server() > 0) {
-      report(Oracle::kDrained, "the server has left " + std::to_string(world_.network().unread_by_server()));
+      report(Oracle::kDrained,
+             "unread datagrams at the server: " + std::to_string(world_.network().unread_by_server()));
     }
   } else if (const auto link = static_cast<std::uint32_t>(*turn.client);
              world_.alive(link) && !turn.wants_more && world_.network().unread_by(link) > 0) {
@@ -256,7 +258,7 @@ void Witness::see_clock(const NetworkLoop::Stats& server) {
     const Duration truth = world_.clock(i).reading(world_.now()) - world_.now();
     const Duration error = std::chrono::abs(server.controller_clock->offset - truth);
     if (error > server.controller_clock->error_bound + kClockRounding) {
-      report(Oracle::kClock, "the clock of " + holder + " is " + ms(truth) + " ahead, and not " +
+      report(Oracle::kClock, "the clock of " + holder + " is " + ms(truth) + " ahead, but the server has " +
                                  ms(server.controller_clock->offset) + " ± " +
                                  ms(server.controller_clock->error_bound));
     }
@@ -301,30 +303,29 @@ void Witness::see_served() {
     }
     open_controllers += controller ? 1 : 0;
     if (stats.sessions != marks_[i].sessions) {
-      report(Oracle::kRecovery, drawn.config.name + " began a new session in fair weather, after: " + stats.reason);
+      report(Oracle::kRecovery, drawn.config.name + " started a new session on a good network, after: " + stats.reason);
     } else if (stats.states <= marks_[i].states) {
-      report(Oracle::kRecovery, drawn.config.name + " has a session, and no states come");
+      report(Oracle::kRecovery, drawn.config.name + " has a session, but receives no states");
     }
     const double least_rate = drawn.bad_days > 0 ? 100 : 10;
     const bool sends = drawn.config.rate_hz == 0 || drawn.config.rate_hz >= least_rate;
     if (controller && sends && forces_ <= forces_then_) {
-      report(Oracle::kRecovery, drawn.config.name + " has a session, and its forces do not come");
+      report(Oracle::kRecovery, drawn.config.name + " has a session, but its forces do not arrive");
     }
   }
   if (controllers > 0 && open_controllers != 1) {
-    report(Oracle::kRecovery, std::to_string(controllers) + " controllers live, " + std::to_string(open_controllers) +
-                                  " of them are served" + others);
+    report(Oracle::kRecovery, std::to_string(controllers) + " controllers exist, " + std::to_string(open_controllers) +
+                                  " of them have a session" + others);
   }
   if (open_controllers == 1 && world_.haptic().stats().fault != HapticController::Fault::kNone) {
-    report(Oracle::kRecovery, "the fault is still there, though a controller has asked to clear it");
+    report(Oracle::kRecovery, "the fault persists, although a controller has requested to clear it");
   }
 }
 
 void Witness::see_round_trip(const char* whose, Duration round_trip) {
   const Duration expected = drawn_.one_way_up + drawn_.one_way_down;
   if (std::chrono::abs(round_trip - expected) > kRoundTripError) {
-    report(Oracle::kRoundTrip,
-           std::string(whose) + " measures " + ms(round_trip) + ", the network takes " + ms(expected));
+    report(Oracle::kRoundTrip, std::string(whose) + " measures " + ms(round_trip) + ", expected " + ms(expected));
   }
 }
 
@@ -337,7 +338,7 @@ void Witness::see_counters() {
     if (world_.network().arrived_at(link) - marks_[i].arrived != accounted - marks_[i].accounted) {
       report(Oracle::kCounters, drawn_.clients[i].config.name + " received " +
                                     std::to_string(world_.network().arrived_at(link) - marks_[i].arrived) +
-                                    " datagrams and counted " + std::to_string(accounted - marks_[i].accounted));
+                                    " datagrams, but counted " + std::to_string(accounted - marks_[i].accounted));
     }
     see_round_trip("a client", stats.link.round_trip);
     if (drawn_.clients[i].kind != DrawnClient::Kind::kController) continue;
@@ -358,7 +359,8 @@ void Witness::see_end() {
   const std::uint64_t in = counts.sent + counts.copies;
   const std::uint64_t out = counts.delivered + counts.lost + counts.nowhere + world_.network().in_flight();
   if (in != out) {
-    report(Oracle::kCounters, "the network: " + std::to_string(in) + " went in, " + std::to_string(out) + " are known");
+    report(Oracle::kCounters,
+           "the network: " + std::to_string(in) + " entered, " + std::to_string(out) + " are accounted for");
   }
   if (simulated_ != nullptr && drawn_.exact()) {
     double work = simulated_->truth().hand_work;
@@ -393,7 +395,7 @@ void Witness::see_presses() {
     for (std::size_t i = 0; i < drawn_.clients.size(); ++i) {
       if (!world_.alive(i) || drawn_.clients[i].kind != DrawnClient::Kind::kObserver) continue;
       if ((seen_[i] >> press.button & 1) == 0) {
-        report(Oracle::kPress, "observer " + drawn_.clients[i].config.name + " was not shown a press of " +
+        report(Oracle::kPress, "observer " + drawn_.clients[i].config.name + " did not receive a press of " +
                                    ms(press.length) + " at " + ms(press.from));
       } else {
         ++presses_;

@@ -191,7 +191,7 @@ void World::run_for(Duration duration) {
       since = now_;
       wakes = 0;
     } else if (++wakes > kMostWakes) {
-      throw std::runtime_error("somebody wants to be called again and again");
+      throw std::runtime_error("a loop asks to be called again without end");
     }
 
     network_.deliver(now_);

@@ -62,38 +62,40 @@ int run(RunArguments& arguments) {
 }
 
 void add_run(CLI::App& app, RunArguments& arguments) {
-  CLI::App* const verb = app.add_subcommand("run", "Explores worlds, one for each seed, until one breaks a promise");
+  CLI::App* const verb = app.add_subcommand("run", "Run worlds, one for each seed, until one violates a guarantee");
   auto* const count =
       verb->add_option("--count", arguments.options.count, "worlds")->type_name("N")->capture_default_str();
-  verb->add_option("--for-s", arguments.for_s, "as many as there is time for")
+  verb->add_option("--for-s", arguments.for_s, "Run for this time, s, instead of --count")
       ->type_name("S")
       ->check(CLI::PositiveNumber)
       ->excludes(count);
-  verb->add_option("--first-seed", arguments.options.first_seed, "seed of the first; the others follow")
+  verb->add_option("--first-seed", arguments.options.first_seed,
+                   "Seed of the first world; the others use the following seeds")
       ->type_name("K")
       ->capture_default_str();
   verb->add_option("--jobs", arguments.options.jobs, "threads")
       ->type_name("J")
       ->check(CLI::Range(1U, 1024U))
       ->default_str("one for each core");
-  verb->add_option("--seeds", arguments.seeds_file,
-                   "seeds to run before all others: a number at the beginning of a line")
+  verb->add_option("--seeds", arguments.seeds_file, "Seeds to run first: a number at the start of each line")
       ->type_name("FILE");
-  auto* const seed = verb->add_option("--seed", arguments.seed, "this world and no other")->type_name("N");
-  verb->add_option("--units", arguments.units,
-                   "these seeds, all of them, as a shard of a sweep: lines of JSON that depend on nothing else")
+  auto* const seed = verb->add_option("--seed", arguments.seed, "Only run this world")->type_name("N");
+  verb->add_option("--units", arguments.units, "Run all of these seeds, as a shard of a sweep, and print JSON")
       ->type_name("FIRST:COUNT")
       ->excludes(seed, count);
-  verb->add_option("--from", arguments.from, "runs nothing; judges what shards of a sweep came to (tendon-sweep merge)")
+  verb->add_option("--from", arguments.from,
+                   "Run nothing, but print the result of the shards of a sweep (see tendon-sweep merge)")
       ->type_name("FILE")
       ->excludes(seed, count);
-  verb->add_flag("--verbose", arguments.verbose, "say what the world is like, and what happened")->needs(seed);
-  verb->add_flag("--json", arguments.options.json, "one JSON object for each broken world, and one at the end");
+  verb->add_flag("--verbose", arguments.verbose, "Describe the world and the events")->needs(seed);
+  verb->add_flag("--json", arguments.options.json,
+                 "Print JSON on stdout, one object per world with a violation, and one at the end");
   verb->footer(
-      "\nExample: ten minutes, then the world that it names\n"
+      "\n"
+      "Example: run for ten minutes, then one world with details\n"
       "  tendon-worlds run --for-s 600\n"
-      "  tendon-worlds run --seed 1234 --verbose\n"
-      "\nExit: 0 every promise was kept, or with --units all were run; 1 one was broken; 2 wrong usage.");
+      "  tendon-worlds run --seed 1234 --verbose\n\n"
+      "Exit: 0 success, without a violation, or with --units; 1 failed, or a violation; 2 wrong usage.");
 }
 
 struct ShrinkArguments {
@@ -103,14 +105,16 @@ struct ShrinkArguments {
 
 void add_shrink(CLI::App& app, ShrinkArguments& arguments) {
   CLI::App* const verb =
-      app.add_subcommand("shrink", "Reduces what the network did in a broken world to the few datagrams that matter");
-  verb->add_option("--seed", arguments.seed, "of the broken world")->type_name("N")->required();
-  verb->add_option("--out", arguments.out, "the network of the world, as a sparse trace: `replay` and tests load it")
+      app.add_subcommand("shrink", "Reduce the network events of a world with a violation to the relevant datagrams");
+  verb->add_option("--seed", arguments.seed, "Seed of the world")->type_name("N")->required();
+  verb->add_option("--out", arguments.out, "Output file, a sparse trace for `replay` and tests")
       ->type_name("FILE")
       ->required();
   verb->footer(
-      "\nExample:\n  tendon-worlds shrink --seed 1234 --out world-1234.csv\n"
-      "\nExit: 0 done; 1 that world breaks no promise, or not because of the network; 2 wrong usage.");
+      "\n"
+      "Example:\n"
+      "  tendon-worlds shrink --seed 1234 --out world-1234.csv\n\n"
+      "Exit: 0 success; 1 failed, because the world has no violation, or not because of the network; 2 wrong usage.");
 }
 
 struct DayArguments {
@@ -159,60 +163,64 @@ int day(const DayArguments& arguments) {
     if (!arguments.json) std::visit([key = name](auto number) { std::cout << key << ' ' << number << '\n'; }, value);
   }
   if (arguments.json) std::cout << line.add("broken", report.broken).str() << '\n';
-  if (report.broken && !arguments.json) std::cout << "broken at " << *report.broken << '\n';
+  if (report.broken && !arguments.json) std::cout << "violation at " << *report.broken << '\n';
   return report.broken ? kFailed : kDone;
 }
 
 void add_day(CLI::App& app, DayArguments& arguments) {
-  CLI::App* const verb = app.add_subcommand("day", "A day in suite 1, in which no session may ever be wedged");
-  verb->add_option("--seed", arguments.config.seed, "of weather, leave-takings and keys")
+  CLI::App* const verb = app.add_subcommand("day", "Run a day in suite 1, in which every session must stay usable");
+  verb->add_option("--seed", arguments.config.seed, "Seed of the network, disconnections and keys")
       ->type_name("N")
       ->capture_default_str();
-  verb->add_option("--hours", arguments.hours, "virtual hours; a session lives for 24")
+  verb->add_option("--hours", arguments.hours, "Virtual hours; a session has a maximum age of 24")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
-  verb->add_option("--loop-hz", arguments.config.loop_hz, "haptic steps, states and forces per second")
+  verb->add_option("--loop-hz", arguments.config.loop_hz, "Haptic steps, states and forces per second")
       ->check(CLI::Range(100U, 4000U))
       ->capture_default_str();
-  verb->add_flag("--json", arguments.json, "one JSON object instead of the lines");
+  verb->add_flag("--json", arguments.json, "Print one JSON object on stdout, instead of text");
   verb->footer(
-      "\nExample: an hour, in seconds\n  tendon-worlds day --seed 7 --hours 1\n"
-      "\nExit: 0 every promise was kept; 1 one was broken; 2 wrong usage.");
+      "\n"
+      "Example: run a virtual hour, which takes seconds\n"
+      "  tendon-worlds day --seed 7 --hours 1\n\n"
+      "Exit: 0 success, without a violation; 1 failed, or a violation; 2 wrong usage.");
 }
 
 void add_replay(CLI::App& app, SecondLookOptions& options) {
-  CLI::App* const verb = app.add_subcommand(
-      "replay", "A scene and a wall over a recorded network, in virtual time, with one law after the other");
-  verb->add_option("SCENE", options.scene,
-                   "scene file: the device, the hand, the loop; its law is one of those compared")
+  CLI::App* const verb =
+      app.add_subcommand("replay", "Run a scene and a wall with a recorded network, in virtual time, with each law");
+  verb->add_option("SCENE", options.scene, "Scene with the device, the hand and the loop. Its law is also compared")
       ->type_name("SCENE.toml")
       ->required();
-  verb->add_option("--trace", options.trace, "network recorded by tendon-inject --record")
+  verb->add_option("--trace", options.trace, "Network trace from tendon-inject --record")
       ->type_name("FILE")
       ->required();
-  verb->add_option("--law", options.laws, "law to try; any number of times (default: those that promise passivity)")
+  verb->add_option("--law", options.laws, "Law to compare; can be repeated. Default: those that guarantee passivity")
       ->type_name("NAME")
       ->allow_extra_args(false);
-  verb->add_option("--stiffness", options.stiffness, "of the wall at x = 0, N/m")->capture_default_str();
-  verb->add_option("--rate-hz", options.rate_hz, "forces per second of the wall's engine")->capture_default_str();
-  verb->add_option("--for-s", options.length_s, "virtual seconds (default: as long as the trace)");
-  verb->add_flag("--json", options.json, "one JSON object for each law on stdout instead of the table");
+  verb->add_option("--stiffness", options.stiffness, "Stiffness of the wall at x = 0, N/m")->capture_default_str();
+  verb->add_option("--rate-hz", options.rate_hz, "Forces per second of the wall")->capture_default_str();
+  verb->add_option("--for-s", options.length_s, "Virtual time, s. Default: length of the trace");
+  verb->add_flag("--json", options.json, "Print JSON on stdout, one object per law, instead of the table");
   verb->footer(
-      "\nExample: what would energy bounding have felt on that same network?\n"
-      "  tendon-worlds replay scene.toml --trace run.csv --law energy-bounding --law aol+\n"
-      "\nExit: 0 done; 1 the trace or the scene cannot be read; 2 wrong usage.");
+      "\n"
+      "Example: compare energy bounding with aol+ on the same network\n"
+      "  tendon-worlds replay scene.toml --trace run.csv --law energy-bounding --law aol+\n\n"
+      "Exit: 0 success; 1 failed, because the trace or the scene cannot be read; 2 wrong usage.");
 }
 
 int main_of(int argc, char** argv) {
-  CLI::App app("Simulated worlds: the whole server, its clients, the network, the device and the hand, from one seed",
+  CLI::App app("Simulate the whole server, its clients, the network, the device and the hand, from one seed",
                "tendon-worlds");
   usage::dress(app);
   app.set_version_flag("--version", version_text());
   app.require_subcommand(1);
   app.footer(
-      "\nExample: ten minutes of worlds\n  tendon-worlds run --for-s 600\n"
-      "\ntendon-worlds COMMAND --help tells more.\n\n"
-      "Exit: 0 every promise was kept; 1 one was broken, or something failed; 2 wrong usage.");
+      "\n"
+      "Example: run worlds for ten minutes\n"
+      "  tendon-worlds run --for-s 600\n\n"
+      "Use tendon-worlds COMMAND --help for more.\n\n"
+      "Exit: 0 success, without a violation; 1 failed, or a violation; 2 wrong usage.");
   RunArguments run_arguments;
   run_arguments.options.jobs = std::max(1U, std::thread::hardware_concurrency());
   ShrinkArguments shrink_arguments;
