@@ -88,13 +88,13 @@ Clocks compare_clocks(const End& leader, const End& follower, const MergeOptions
   const auto stepped =
       std::ranges::find_if(fast, [](const ClockBound& bound) { return bound.error < Duration::zero(); });
   if (stepped != fast.end()) {
-    throw std::runtime_error("a clock stepped: no offset explains the states around " +
+    throw std::runtime_error("a clock was stepped: no offset matches the states at " +
                              std::to_string(seconds(stepped->at - fast.front().at)) + " s of the coupling");
   }
   clocks.drift = drift_over(fast);
   if (!is_possible(clocks.bounds)) {
-    throw std::runtime_error("the clocks drift by " + text_of(clocks.drift) +
-                             " against each other; less than 200 ppm was expected");
+    throw std::runtime_error("the relative drift of the clocks is " + text_of(clocks.drift) +
+                             ", expected less than 200 ppm");
   }
   return clocks;
 }
@@ -176,7 +176,7 @@ std::vector<std::string> write(const MergeOptions& options, const std::vector<Cl
 
 void merge(const MergeOptions& options, std::ostream& out) {
   if (std::filesystem::exists(options.out)) {
-    throw std::runtime_error(options.out.string() + ": there is such a file; a merge overwrites none");
+    throw std::runtime_error(options.out.string() + ": the file exists and is not overwritten");
   }
   const End leader = read_end(options.leader);
   const End follower = read_end(options.follower);
@@ -202,10 +202,10 @@ void merge(const MergeOptions& options, std::ostream& out) {
         << '\n';
   } else {
     out << options.out.string() << ": the follower's clock is " << offset * 1e3
-        << " ms ahead of the leader's, proved to ± " << middle * 1e3 << " ms (p50), " << p99 * 1e3 << " ms (p99), over "
+        << " ms ahead of the leader's, proven to ± " << middle * 1e3 << " ms (p50), " << p99 * 1e3 << " ms (p99), over "
         << bounds.size() << " s, and drifts by " << text_of(drift) << "\n";
     if (std::abs(drift.rate) > kMostDrift && drift.error < kMostDrift) {
-      out << "warning: the clocks probably drift by more than the 200 ppm on which the proof of the offset rests\n";
+      out << "warning: the drift of the clocks probably exceeds the 200 ppm that the proof of the offset assumes\n";
     }
     for (const std::string& sentence : damage) out << sentence << '\n';
   }

@@ -69,7 +69,7 @@ class Repair {
 
 void repair(const RepairOptions& options, std::ostream& out) {
   if (std::filesystem::exists(options.out)) {
-    throw std::runtime_error(options.out.string() + ": there is such a file; a repair overwrites none");
+    throw std::runtime_error(options.out.string() + ": the file exists and is not overwritten");
   }
   McapReader reader = open_mcap(options.recording);
   reader.use_summary();
@@ -78,7 +78,7 @@ void repair(const RepairOptions& options, std::ostream& out) {
     if (!repair) repair.emplace(options.out);
     repair->copy(*message);
   }
-  if (!repair) throw std::runtime_error(options.recording.string() + ": holds no message that can be read");
+  if (!repair) throw std::runtime_error(options.recording.string() + ": contains no readable message");
   const Copied copied = repair->finish(reader);
   const std::vector<std::string> damage = reader.damage();
   if (options.json) {
@@ -95,7 +95,7 @@ void repair(const RepairOptions& options, std::ostream& out) {
   }
   out << options.out.string() << ": " << copied.messages << " messages; " << copied.lost_steps << " steps and "
       << copied.lost_datagrams << " datagrams are missing\n";
-  if (reader.truncated()) out << options.recording.string() << ": has no end; what came after its last chunk is lost\n";
+  if (reader.truncated()) out << options.recording.string() << ": truncated; data after the last chunk is lost\n";
   for (const std::string& sentence : damage) out << sentence << '\n';
 }
 

@@ -77,13 +77,13 @@ Chosen choose(const Options& options) {
   Chosen chosen{.names = lab::device_names(options.recording), .is_chosen = {}};
   for (const std::string& name : chosen.names) chosen.is_chosen.push_back(!options.device || name == *options.device);
   if (chosen.count() == 0) {
-    throw std::runtime_error(options.recording.string() + ": has no device " + *options.device + ", but " +
+    throw std::runtime_error(options.recording.string() + ": no device " + *options.device + "; expected one of " +
                              chosen.list());
   }
   const auto expect_at_most = [&chosen](std::size_t most, bool asked, const char* what) {
     if (asked && chosen.count() > most) {
-      throw std::invalid_argument(std::string(what) + " has room for " + std::to_string(most) +
-                                  (most == 1 ? " device" : " devices") + ": choose one by --device, of " +
+      throw std::invalid_argument(std::string(what) + " can only contain " + std::to_string(most) +
+                                  (most == 1 ? " device" : " devices") + ": select one with --device from " +
                                   chosen.list());
     }
   };
@@ -109,7 +109,7 @@ Gaps read_run(const Options& options, const Chosen& chosen, Rerun::Held held, co
       if (const auto* datagram = std::get_if<DatagramRecord>(&*record)) visit_datagram(*datagram);
       const std::size_t device = reader.device();
       if (device >= reruns.size())
-        throw std::runtime_error(file.string() + ": is no part of " + options.recording.string());
+        throw std::runtime_error(file.string() + ": is not a part of " + options.recording.string());
       if (!chosen.is_chosen[device]) continue;
       std::optional<Rerun>& rerun = reruns[device];
       const auto* scene = std::get_if<SceneRecord>(&*record);
@@ -117,7 +117,7 @@ Gaps read_run(const Options& options, const Chosen& chosen, Rerun::Held held, co
       const auto* step = std::get_if<StepRecord>(&*record);
       if (scene != nullptr && !rerun) rerun.emplace(control_of(*scene, options), held);
       if ((port != nullptr || step != nullptr) && !rerun)
-        throw std::runtime_error(file.string() + ": the scene is lost, so the law that was run is not known");
+        throw std::runtime_error(file.string() + ": the scene is missing, so the law of the run is unknown");
       if (port != nullptr) rerun->settled(*port);
       if (step != nullptr) visit(device, *step, rerun->step(*step));
     }
@@ -153,11 +153,11 @@ struct Comparison {
   bool held() const { return same > 0 && !differs_at; }
 
   std::string text() const {
-    std::string text = std::to_string(same) + " of " + std::to_string(steps) + " steps are the same bit for bit";
-    if (differs_at) text += "\nthe first that differs is step " + std::to_string(*differs_at) + ": " + how;
+    std::string text = std::to_string(same) + " of " + std::to_string(steps) + " steps are identical";
+    if (differs_at) text += "\nthe first difference is in step " + std::to_string(*differs_at) + ": " + how;
     if (gap_before) {
-      text += "\nthere is a gap before step " + std::to_string(*gap_before) +
-              ": what the law had learned in it is not known, so nothing after it was compared";
+      text += "\ngap before step " + std::to_string(*gap_before) +
+              ": the state of the law after it is unknown, so later steps were not compared";
     }
     return text + "\n";
   }
@@ -373,7 +373,7 @@ bool replay(const Options& options, std::ostream& out) {
     if (both.runs[0].summary.steps > 0) {
       examined.push_back(device);
     } else if (chosen.several()) {
-      not_examined += chosen.names[device] + (chosen.is_chosen[device] ? ": has no haptic step" : ": not asked for") +
+      not_examined += chosen.names[device] + (chosen.is_chosen[device] ? ": no haptic steps" : ": not selected") +
                       ", not examined\n";
     }
   }
@@ -392,9 +392,10 @@ bool replay(const Options& options, std::ostream& out) {
       columns.insert(columns.end(), devices[device].runs.begin(), devices[device].runs.end());
     out << lab::to_table(columns) << "\n";
     if (shown.size() < examined.size())
-      out << "columns for " << shown.size() << " of " << examined.size() << " devices (--device NAME for another)\n";
+      out << "columns for " << shown.size() << " of " << examined.size()
+          << " devices (use --device NAME for another)\n";
     out << (same_law ? comparisons(devices, chosen, examined)
-                     : "the hand moved as it was recorded; with other forces it would have moved otherwise\n")
+                     : "note: the motion of the hand is as recorded, although it would differ with other forces\n")
         << not_examined;
   }
   if (!out.flush()) throw std::runtime_error("cannot write the report: is the disk full?");

@@ -30,49 +30,51 @@ int main(int argc, char** argv) {
   std::string into;
   std::string mended;
   CLI::App app(
-      "A recording through the control law again: bit for bit as it was recorded, or with another law or other "
+      "Replay a recording through the control law, to verify the recorded forces, or with another law or other "
       "settings.",
       "tendon-replay");
   tendon::usage::dress(app);
   app.set_version_flag("--version", tendon::version_text());
-  app.add_option("RECORDING", recording, "a recording of tendond, or what its flight recorder left")
+  app.add_option("RECORDING", recording, "Recording of tendond or of its flight recorder")
       ->type_name("FILE.mcap")
       ->required();
-  app.add_option("PART", parts, "the parts that follow it, in order: run-2.mcap run-3.mcap")->type_name("FILE.mcap");
-  app.add_option("--law", law, "another limiter, with the scene's friction bounds: " + names)->type_name("NAME");
-  app.add_option("--set", options.settings,
-                 "another value in the scene: limiter.kind=aol, force.max_force_n=2; without a "
-                 "value the key or table is taken out")
+  app.add_option("PART", parts, "Following parts, in order: run-2.mcap run-3.mcap")->type_name("FILE.mcap");
+  app.add_option("--law", law, "Use another limiter, with the friction bounds of the scene: " + names)
+      ->type_name("NAME");
+  app.add_option(
+         "--set", options.settings,
+         "Set a key of the scene: limiter.kind=aol, force.max_force_n=2. Without a value: remove the key or table")
       ->type_name("TABLE.KEY=VALUE")
       ->allow_extra_args(false);
-  app.add_option("--files", files, "folder of the files that the scene names")->type_name("DIR")->default_val(".");
-  app.add_option("--device", device, "of a recording of several devices, this one only")->type_name("NAME");
-  app.add_option("--csv", csv, "write a row for each step there")->type_name("FILE.csv");
-  app.add_option("--out", picture, "draw both runs side by side (needs gnuplot)")->type_name("FILE.svg|FILE.png");
+  app.add_option("--files", files, "Folder of the files in the scene")->type_name("DIR")->default_val(".");
+  app.add_option("--device", device, "Only this device of the recording")->type_name("NAME");
+  app.add_option("--csv", csv, "Write a row for each step to this file")->type_name("FILE.csv");
+  app.add_option("--out", picture, "Draw both runs side by side (requires gnuplot)")->type_name("FILE.svg|FILE.png");
   auto* const merged = app.add_option("--merge", follower,
-                                      "RECORDING is a leader's, and this its follower's: write both into one, in the "
-                                      "leader's time, with a proved bound of the clocks")
+                                      "Merge the RECORDING of a leader with this recording of its follower, in the "
+                                      "time of the leader, with a proven bound of the clocks")
                            ->type_name("FILE.mcap");
-  auto* const one = app.add_option("--into", into, "the file that --merge writes")->type_name("FILE.mcap");
+  auto* const one = app.add_option("--into", into, "Output file of --merge")->type_name("FILE.mcap");
   merged->needs(one);
   one->needs(merged);
   auto* const repaired =
-      app.add_option("--repair", mended, "copy the valid part of a damaged or truncated RECORDING to this file")
+      app.add_option("--repair", mended, "Copy the valid part of a damaged or truncated RECORDING to this file")
           ->type_name("FILE.mcap")
           ->excludes(merged);
   for (const char* const other : {"PART", "--law", "--set", "--device", "--csv", "--out"}) {
     merged->excludes(app.get_option(other));
     repaired->excludes(app.get_option(other));
   }
-  app.add_flag("--json", options.json, "JSON objects on stdout, a line each, instead of the table");
+  app.add_flag("--json", options.json, "Print JSON on stdout, one object per line, instead of the table");
   app.footer(
-      "\nExamples\n"
-      "  tendon-replay run.mcap                          is what was recorded what the law decides?\n"
-      "  tendon-replay run.mcap run-2.mcap               … of a long run, which has parts\n"
-      "  tendon-replay run.mcap --law aol --out both.png  what would the law of 2009 have permitted?\n"
-      "  tendon-replay leader.mcap --merge follower.mcap --into pair.mcap    both ends of a coupling in one clock\n"
-      "  tendon-replay run.mcap --repair whole.mcap      copy the valid part of a damaged recording\n"
-      "\nExit: 0 done; 1 a step differs (it is named), or a file cannot be read or written; 2 wrong usage.");
+      "\n"
+      "Examples\n"
+      "  tendon-replay run.mcap                          verify the recorded forces\n"
+      "  tendon-replay run.mcap run-2.mcap               verify a recording with several parts\n"
+      "  tendon-replay run.mcap --law aol --out both.png  compare the recorded forces with those of another law\n"
+      "  tendon-replay leader.mcap --merge follower.mcap --into pair.mcap    merge both ends of a coupling\n"
+      "  tendon-replay run.mcap --repair whole.mcap      copy the valid part of a damaged recording\n\n"
+      "Exit: 0 success; 1 failed, or a step differs (and is printed); 2 wrong usage.");
 
   return tendon::run_tool(app, argc, argv, [&] {
     if (!follower.empty()) {
