@@ -64,7 +64,7 @@ void bench(const BenchOptions& options, std::ostream& out) {
   if (options.write) expect_replaceable(*options.write, {kPageBegins});
   const auto& only = options.only;
   if (options.plot && !only.empty() && std::find(only.begin(), only.end(), "512") == only.end()) {
-    throw std::invalid_argument("--plot: draws the section 512, which --only leaves out");
+    throw std::invalid_argument("--plot: requires the section 512, which --only excludes");
   }
   { const AtPriority may_we(options.priority); }  // fails now rather than an hour later
 
@@ -83,7 +83,7 @@ void bench(const BenchOptions& options, std::ostream& out) {
   Run run(options, [&](const Row& row) {
     if (options.progress) std::cerr << "\r\033[K" << std::flush;
     out << (options.json ? to_json(row) + "\n" : to_text(row)) << std::flush;
-    if (!out) throw std::runtime_error("nobody takes the lines any more: the run ends here");
+    if (!out) throw std::runtime_error("cannot write to stdout: it is closed");
     ++lines;
   });
   for (const Section& section : sections()) {

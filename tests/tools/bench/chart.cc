@@ -41,7 +41,7 @@ std::vector<std::filesystem::path> draw_devices(const std::filesystem::path& ste
                                                 const std::vector<Row>& all) {
   std::vector<Row> rows;
   std::ranges::copy_if(all, std::back_inserter(rows), is_of_devices);
-  if (rows.size() < 2) throw std::runtime_error("--plot: a chart needs two counts of devices; --quick has one");
+  if (rows.size() < 2) throw std::runtime_error("--plot: requires two counts of devices; --quick has one");
   const auto named = [](const char* name) { return [name](const Row& row) { return figure(row, name); }; };
   const auto level = [&](std::string name, double y) {
     return curve(

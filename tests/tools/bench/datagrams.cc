@@ -121,7 +121,7 @@ void codec(Run& run, std::size_t blocks, const std::string& name, const Message&
                        const auto header = decode_header(datagram);
                        const DataContent* content = reader.read(datagram.subspan(kHeaderSize));
                        if (!header || content == nullptr || content->frames.size() != messages) {
-                         throw std::runtime_error("a datagram was not read");
+                         throw std::runtime_error("a datagram cannot be decoded");
                        }
                        keep(content);
                      },
@@ -153,7 +153,7 @@ struct BareSeal {
                                                     header.size(), nonce.data(), &schedule)
             : crypto_aead_chacha20poly1305_ietf_decrypt(plain.data(), nullptr, nullptr, sealed.data(), whole,
                                                         header.data(), header.size(), nonce.data(), key.data());
-    if (refused != 0) throw std::runtime_error("libsodium did not open what it sealed");
+    if (refused != 0) throw std::runtime_error("libsodium cannot open its own ciphertext");
     keep(plain);
   }
   Suite suite;
@@ -194,7 +194,7 @@ void sealing(Run& run, std::size_t blocks, Suite suite, std::size_t size) {
                      blocks, kCalls,
                      [&](std::size_t) {
                        if (opener.open(now, fixed, datagram, body) != Opener::Verdict::kOpened) {
-                         throw std::runtime_error("a datagram did not open");
+                         throw std::runtime_error("a datagram cannot be opened");
                        }
                        keep(body);
                      },
@@ -222,7 +222,7 @@ void handshake(Run& run, std::size_t blocks) {
                      },
                      [&](std::size_t) {
                        if (crypto_scalarmult(product.data(), scalar.data(), point.data()) != 0) {
-                         throw std::runtime_error("libsodium does not multiply");
+                         throw std::runtime_error("the multiplication of libsodium failed");
                        }
                        keep(product);
                      }),

@@ -55,7 +55,7 @@ class OtherProcess {
       work();
       ::_exit(0);
     } catch (const std::exception& error) {
-      std::fprintf(stderr, "tendon-lab bench: another process: %s\n", error.what());
+      std::fprintf(stderr, "tendon-lab bench: helper process: %s\n", error.what());
       ::_exit(1);
     }
   }
@@ -66,7 +66,7 @@ class OtherProcess {
   /// Throws if the child has exited.
   void check() const {
     int status = 0;
-    if (::waitpid(pid_, &status, WNOHANG) == pid_) throw std::runtime_error("another process has ended");
+    if (::waitpid(pid_, &status, WNOHANG) == pid_) throw std::runtime_error("a helper process has ended");
   }
   void signal(int number) const { ::kill(pid_, number); }
   pid_t pid() const { return pid_; }

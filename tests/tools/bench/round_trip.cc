@@ -267,7 +267,7 @@ class RoundTrip {
         serve(*orders_, server, bare_.client(), udp_.client(), wait, suite ? std::optional(key_) : std::nullopt, suite);
         ::_exit(0);
       } catch (const std::exception& error) {
-        std::fprintf(stderr, "tendon-lab bench: the client: %s\n", error.what());
+        std::fprintf(stderr, "tendon-lab bench: client: %s\n", error.what());
         ::_exit(1);
       }
     }
@@ -303,7 +303,7 @@ class RoundTrip {
 
  private:
   static void check(LocalTime began) {
-    if (clock::now() - began > kGiveUp) throw std::runtime_error("the other process does not answer");
+    if (clock::now() - began > kGiveUp) throw std::runtime_error("the client process does not answer");
   }
 
   void ping_pong(Orders::Job job, std::vector<double>& times) {

@@ -113,7 +113,7 @@ std::string to_text(const Circumstances& c) {
          c.compiler + "; " + numbers.data() +
          (c.priority > 0 ? "; with real-time priority " + std::to_string(c.priority)
                          : std::string("; at normal priority")) +
-         (c.quick ? "; --quick: too short to mean anything" : "") + "\n";
+         (c.quick ? "; --quick: too short for valid figures" : "") + "\n";
 }
 
 std::string to_json(const Row& row) {

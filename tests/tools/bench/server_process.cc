@@ -62,7 +62,7 @@ void for_each_thread(pid_t process, Visit visit) {
 
 ServerProcess::ServerProcess(const fs::path& scene, int priority) : folder_(scene.parent_path()) {
   const fs::path program = fs::read_symlink("/proc/self/exe").parent_path() / "tendond";
-  if (!fs::exists(program)) throw std::runtime_error("there is no " + program.string());
+  if (!fs::exists(program)) throw std::runtime_error(program.string() + ": no such file");
   const LocalTime began = clock::now();
   process_ = std::make_unique<OtherProcess>([&] { run_tendond(program, scene); });
   const std::string before = "\"address\":\"";
@@ -117,7 +117,7 @@ std::string ServerProcess::stop() {
   process_.reset();
   const std::string said = output();
   const std::size_t last = said.rfind("{\"event\":\"stopped\"");
-  if (last == std::string::npos) throw std::runtime_error("tendond has not said how it went");
+  if (last == std::string::npos) throw std::runtime_error("tendond has not printed its summary");
   return said.substr(last);
 }
 

@@ -94,11 +94,11 @@ class Guests {
   /// Returns when all observers have joined or left.
   void let_observers_in(bool in) {
     const char order = in ? 'i' : 'o';
-    if (::write(orders_, &order, 1) != 1) throw std::runtime_error("the guests are gone");
+    if (::write(orders_, &order, 1) != 1) throw std::runtime_error("the guest processes have ended");
     pollfd fd{orders_, POLLIN, 0};
     char done = 0;
     if (::poll(&fd, 1, 30'000) != 1 || ::read(orders_, &done, 1) != 1) {
-      throw std::runtime_error("not all of the observers have come within 30 s");
+      throw std::runtime_error("not all observers were connected within 30 s");
     }
   }
 
@@ -470,7 +470,7 @@ void measure_wake_ups(Run& run) {
   line("… and " + std::to_string(options.observers) + " observers", of(Kind::kObservers));
   const Figures& dashboard = of(Kind::kDashboard);
   if (dashboard.late.empty()) return;  // tendon-dash is not built
-  if (dashboard.page_bytes == 0) throw std::runtime_error("tendon-dash told its page nothing");
+  if (dashboard.page_bytes == 0) throw std::runtime_error("tendon-dash sent no data to its page");
   line("… and tendon-dash with a page", dashboard);
 }
 

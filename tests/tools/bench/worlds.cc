@@ -33,7 +33,8 @@ void measure_worlds(Run& run) {
     const lab::Meter::Reading before = meter.read();
     const simulation::Outcome outcome = simulation::run(simulation::draw_world(run.options.seed + i));
     const lab::Meter::Reading after = meter.read();
-    if (outcome.breach) throw std::runtime_error("seed " + std::to_string(run.options.seed + i) + " breaks a promise");
+    if (outcome.breach)
+      throw std::runtime_error("seed " + std::to_string(run.options.seed + i) + " violates a guarantee");
     HapticController controller(config);
     Vec3 held = Vec3::Zero();
     LocalTime now{};

@@ -152,7 +152,7 @@ TEST(Replay, OfAFleetThoseThatDifferAreNamedAndTheOthersCounted) {
   const Outcome fleet = run({.recording = write_fleet(folder.path() / "fleet.mcap", 8, 700)});
   EXPECT_FALSE(fleet.held);
   for (const char* said :
-       {"7 devices: 14000 of 14000 steps are the same", "fleet-7: 700 of 2000", "columns for 3 of 8"})
+       {"7 devices: 14000 of 14000 steps are identical", "fleet-7: 700 of 2000", "columns for 3 of 8"})
     EXPECT_TRUE(contains(fleet.said, said)) << said << fleet.said;
 }
 
