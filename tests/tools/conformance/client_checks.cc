@@ -144,14 +144,14 @@ bool ClientJudge::check_hellos() {
   const double elapsed_ms = 1e3 * seconds(wire_.now() - begin);
   report_.judge("hello-repeated", same == 5 && elapsed_ms >= 250,
                 std::to_string(same) + " repetitions in " + std::to_string(elapsed_ms) + " ms",
-                "5 in 500 ms, one each 100 ms");
+                "5 in 500 ms, one every 100 ms");
   Sixteen foreign = first->random;
   foreign[0] ^= std::byte{1};
   const Sixteen foreign_cookie = random16();
   wire_.send(port_, retry(options_.suite(), foreign, foreign_cookie));
   for (const Greeting& next : hellos(milliseconds(220))) {
     report_.judge("foreign-retry", next.cookie != foreign_cookie, hex(next.cookie),
-                  "no cookie: the Retry was for another");
+                  "no cookie, because the Retry was for another random");
   }
 
   // Sends the correct Retry, followed by too many others.
@@ -169,8 +169,8 @@ bool ClientJudge::check_hellos() {
   }
   const double flood_ms = 1e3 * seconds(wire_.now() - flood);
   report_.judge("retry-no-ping-pong", static_cast<double>(count) <= 4 + flood_ms / 80,
-                std::to_string(count) + " Hellos while 20 Retries came in " + std::to_string(flood_ms) + " ms",
-                "one each 100 ms: only the first Retry is answered at once");
+                std::to_string(count) + " Hellos while 20 Retries were received in " + std::to_string(flood_ms) + " ms",
+                "one every 100 ms: only the first Retry is answered immediately");
   bool used = false;
   bool same_attempt = true;
   while (same_attempt && !used) {
@@ -225,7 +225,7 @@ void ClientJudge::check_bad_answers() {
   say("foreign-answer", foreign, 101);
   const std::uint32_t max = greeting->hello.version_max();
   if (max == std::numeric_limits<std::uint32_t>::max()) {
-    report_.not_applicable("version-not-offered", "it offers every version");
+    report_.not_applicable("version-not-offered", "the client offers all versions");
   } else {
     say("version-not-offered", good(changed([&](pb::Welcome& m) { m.set_version(max + 1); }), 102), 102);
   }
@@ -241,18 +241,18 @@ void ClientJudge::check_bad_answers() {
     say("bad-answer", damaged, 109);
     say("plain-answer", answer(0, 110, greeting->random, bytes_of(yes)), 110);
   } else {
-    report_.not_applicable("plain-answer", "this client was not given a key");
+    report_.not_applicable("plain-answer", "this client has no key");
   }
 
   strays_.clear();
   const bool goes_on = !hellos(milliseconds(400)).empty() || next_hello(kPatience).has_value();
   for (const auto& [id, check] : whose) {
-    report_.judge(check, goes_on, "no more Hellos", "the bad Answers are ignored, and the Hello is repeated");
+    report_.judge(check, goes_on, "no more Hellos", "wrong Answers are ignored, and the Hello is repeated");
   }
   for (const Bytes& data : strays_) {
     const auto believed = whose.find(read_head(data)->connection_id);
     if (believed != whose.end())
-      report_.judge(believed->second, false, hex(data), "no Data: that Answer was to be ignored");
+      report_.judge(believed->second, false, hex(data), "no Data, because this Answer must be ignored");
   }
 }
 
@@ -268,7 +268,7 @@ std::optional<ClientJudge::Session> ClientJudge::welcome() {
     report_.judge("suite-2", answered.suite == 2, greeting->hello.ShortDebugString(),
                   "a Hello that offers aes-256-gcm");
   } else {
-    report_.not_applicable("suite-2", "suite 2 was not asked for (--suite 2)");
+    report_.not_applicable("suite-2", "suite 2 is not selected (--suite 2)");
   }
   wire_.send(port_, answered.datagram);
   return Session{greeting->hello, Conversation(wire_, report_,
@@ -283,7 +283,7 @@ std::optional<ClientJudge::Session> ClientJudge::open() {
   auto session = welcome();
   const bool spoke = session && session->talk.listen_until(
                                     kPatience, [&] { return !session->talk.heard().empty(); }, false);
-  report_.judge("first-data", spoke, "nothing came after the Welcome", "Data 0");
+  report_.judge("first-data", spoke, "nothing after the Welcome", "Data 0");
   if (!spoke) return std::nullopt;
   session->talk.say();
   return session;
@@ -349,7 +349,7 @@ void ClientJudge::check_conversation(Session& session) {
   if (std::ranges::count(session.hello.features(), "channels") > 0) {
     check_bad_requests(talk, 1);
   } else {
-    report_.not_applicable("request-invalid", "this client names no feature that has requests of a server");
+    report_.not_applicable("request-invalid", "this client has no feature with requests of a server");
   }
   check_keep_alive(talk);
   check_old_key(talk, rekeyed);
@@ -369,7 +369,7 @@ void ClientJudge::check_requests(Conversation& talk) {
   if (times.empty()) {
     for (const std::string_view check :
          {"request-numbers", "request-repeated", "request-resend-rate", "request-stops"}) {
-      report_.not_applicable(check, "this client asks for nothing");
+      report_.not_applicable(check, "this client sends no requests");
     }
     return;
   }
@@ -379,13 +379,13 @@ void ClientJudge::check_requests(Conversation& talk) {
                     std::to_string(times.rbegin()->first),
                 "1, 2, 3 …, at most 16");
   for (const auto& [id, count] : times) {
-    report_.judge("request-repeated", count >= 2, "request " + std::to_string(id) + " came once",
-                  "until it is answered");
+    report_.judge("request-repeated", count >= 2, "request " + std::to_string(id) + " was sent once",
+                  "repeated until it is answered");
     // Resend intervals of 20, 40, 80 … 640 ms, then 1 s.
     const double open_s = seconds(talk.now() - talk.heard().front().at);
     const double most = 2 * (6 + open_s) + 2;
     report_.judge("request-resend-rate", static_cast<double>(count) <= most,
-                  "request " + std::to_string(id) + " came " + std::to_string(count) + " times in " +
+                  "request " + std::to_string(id) + " was sent " + std::to_string(count) + " times in " +
                       std::to_string(open_s) + " s",
                   "6 times in the first 1.3 s, then once a second");
   }
@@ -400,8 +400,7 @@ void ClientJudge::check_requests(Conversation& talk) {
   talk.listen(milliseconds(1200));
   const std::size_t after = talk.count_frames(
       before, [&](const pb::Frame& frame) { return frame.has_control() && times.contains(frame.control().id()); });
-  report_.judge("request-stops", after == 0, std::to_string(after) + " repetitions after the answer had arrived",
-                "none");
+  report_.judge("request-stops", after == 0, std::to_string(after) + " repetitions after the answer arrived", "none");
 }
 
 void ClientJudge::check_forces(const Session& session, const std::set<std::uint64_t>& ticks) {
@@ -420,12 +419,13 @@ void ClientJudge::check_forces(const Session& session, const std::set<std::uint6
     report_.judge(
         "force-answers",
         ticks.contains(force.based_on_tick()) && (force.based_on_tick() >= tick || report_.failed("newest-wins")),
-        force.ShortDebugString(), "the tick of a state that was said, not below " + std::to_string(tick));
+        force.ShortDebugString(), "the tick of a received state, at least " + std::to_string(tick));
     tick = std::max(tick, force.based_on_tick());
     report_.judge("force-bounds", within_bounds(force), force.ShortDebugString(),
                   "values within bounds, valid_for_us 1 … 10 000 000");
     report_.judge("force-granted", force.way() == 0 && !force.has_torque_nm() && !force.has_gripper_force_n(),
-                  force.ShortDebugString(), "no way, torque or gripper force: ways and handle were not granted");
+                  force.ShortDebugString(),
+                  "no way, torque or gripper force, because ways and handle were not granted");
   });
   if (observer) {
     for (const std::string_view check : {"forces", "force-answers", "force-bounds", "force-granted"}) {
@@ -447,7 +447,7 @@ void ClientJudge::check_refused() {
   if (!greeting) return;
   pb::Answer no;
   no.mutable_refused()->set_code(pb::CODE_DENIED);
-  no.mutable_refused()->set_detail("so that we see what you do");
+  no.mutable_refused()->set_detail("conformance test of refusals");
   no.mutable_refused()->set_version_min(1);
   no.mutable_refused()->set_version_max(1);
   Bytes32 ephemeral{};
@@ -459,7 +459,7 @@ void ClientJudge::check_refused() {
   const auto after = hellos(milliseconds(500));
   const bool again = std::ranges::any_of(after, [&](const Greeting& next) { return next.random == greeting->random; });
   report_.judge("refused", strays_.empty() && !again, strays_.empty() ? "the same Hello again" : "Data",
-                "the attempt is over: neither Data nor the same Hello");
+                "the attempt ends: neither Data nor the same Hello");
 }
 
 void ClientJudge::judge() {

@@ -24,13 +24,13 @@ Key renewed(std::uint8_t suite, const Key& key) {
   return suite == 2 ? crypto::AesGcm(key).renewed() : crypto::renewed(key);
 }
 
-std::string must_drop(const std::string& wrong) { return "dropped: its datagram had " + wrong; }
+std::string must_drop(const std::string& wrong) { return "dropped, because its datagram had " + wrong; }
 
 }  // namespace
 
 Conversation::Conversation(Wire& wire, Report& report, const Setup& setup)
     : wire_(wire), report_(report), setup_(setup), send_key_(setup.send), receive_key_(setup.receive) {
-  if (setup.suite == 0) report.not_applicable("data-opens", "suite 0 is in the clear");
+  if (setup.suite == 0) report.not_applicable("data-opens", "suite 0 is not encrypted");
 }
 
 // ---- Saying ----
@@ -185,7 +185,7 @@ void Conversation::hear(const Wire::Arrival& arrival) {
     report_.judge("data-opens", opened, [&] {
       return std::pair(
           packet(head->number) + " of epoch " + std::to_string(head->epoch) + ": " + hex(all),
-          "opens with this direction's key of epoch " + std::to_string(receive_epoch_) + " or the next one");
+          "encrypted with the key of this direction of epoch " + std::to_string(receive_epoch_) + " or the next one");
     });
     if (!opened) return;
     if (is_next) {
@@ -208,7 +208,7 @@ void Conversation::hear(const Wire::Arrival& arrival) {
   const std::int64_t sent = content.tx_time_ns();
   const bool goes_on = numbers_.empty() || sent >= heard_[numbers_.rbegin()->second].body.tx_time_ns();
   report_.judge("tx-time", goes_on && sent >= -kFarthest && sent <= kFarthest, std::to_string(sent) + " ns",
-                "not before that of the packet before, and within ± 2^60");
+                "not before that of the previous packet, and within ± 2^60");
   judge_echo(head->number, content);
   numbers_[head->number] = heard_.size();
   heard_.push_back({.number = head->number, .at = arrival.at, .body = std::move(content)});
@@ -216,7 +216,8 @@ void Conversation::hear(const Wire::Arrival& arrival) {
 
 void Conversation::judge_echo(std::uint64_t number, const pb::Datagram& body) {
   if (!body.has_echo()) {
-    report_.judge("echo-newest", !echoed_, packet(number) + " has no echo", "an echo, as the packet before had one");
+    report_.judge("echo-newest", !echoed_, packet(number) + " has no echo",
+                  "an echo, because the previous packet had one");
     return;
   }
   const pb::Echo& echo = body.echo();
@@ -226,7 +227,7 @@ void Conversation::judge_echo(std::uint64_t number, const pb::Datagram& body) {
     return;
   }
   const auto said = said_.find(told);
-  report_.judge("echo-newest", said != said_.end(), "an echo of " + packet(told), "that of a packet which was said");
+  report_.judge("echo-newest", said != said_.end(), "an echo of " + packet(told), "an echo of a sent packet");
   if (said == said_.end()) return;
   report_.judge("echo-newest", !echoed_ || told >= newest_echo_, [&] {
     return std::pair(packet(number) + " echoes " + packet(told) + " after one echoed " + packet(newest_echo_),
@@ -247,12 +248,12 @@ void Conversation::judge_echo(std::uint64_t number, const pb::Datagram& body) {
   report_.judge("echo-times", echo.rx_time_ns() <= body.tx_time_ns(), times("T2 ≤ T3"));
   if (!report_.failed("tx-time")) {
     report_.judge("echo-times", echo.rx_time_ns() >= said->second.heard_before_ns,
-                  times("T2 ≥ " + std::to_string(said->second.heard_before_ns) + ", which that packet answered"));
+                  times("T2 ≥ " + std::to_string(said->second.heard_before_ns) + ", which this packet answered"));
   }
   const auto [first, is_first] = arrivals_.try_emplace(told, echo.rx_time_ns());
   if (!repeated_.contains(told) || !report_.failed("echo-times")) {
     report_.judge(repeated_.contains(told) ? "replay" : "echo-times", first->second == echo.rx_time_ns(),
-                  times("T2 " + std::to_string(first->second) + ", as it was told before"));
+                  times("T2 " + std::to_string(first->second) + ", as before"));
   }
 
   auto known = said;  // the oldest packet sent at or after `other`
@@ -268,12 +269,12 @@ void Conversation::judge_echo(std::uint64_t number, const pb::Datagram& body) {
       continue;
     }
     report_.judge("echo-mask", !has || was_said,
-                  [&] { return std::pair(mask(), "bit " + std::to_string(i) + " clear: never said"); });
+                  [&] { return std::pair(mask(), "bit " + std::to_string(i) + " clear: never sent"); });
     const bool must = was_said && known->second.order < said->second.order;
     const auto owner = owners_.find(other);
     if (owner != owners_.end() && report_.failed("echo-mask")) continue;
     report_.judge(owner == owners_.end() ? "echo-mask" : owner->second, has || !must,
-                  [&] { return std::pair(mask(), "bit " + std::to_string(i) + " set: said before"); });
+                  [&] { return std::pair(mask(), "bit " + std::to_string(i) + " set: sent before"); });
   }
 }
 

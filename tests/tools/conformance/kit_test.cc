@@ -135,7 +135,7 @@ TEST_P(BrokenToy, FailsTheCheckOfTheRuleItBreaksAndNoOther) {
 
 TEST(Kit, SaysWhichForeignHeaderWasTaken) {
   const Report report = server_report(0, Fault::kTakesForeignHeaders);
-  EXPECT_NE(told(report).find("dropped: its datagram had "), std::string::npos) << told(report);
+  EXPECT_NE(told(report).find("dropped, because its datagram had "), std::string::npos) << told(report);
 }
 
 std::vector<Case> cases(Toy toy, const std::vector<Broken>& all) {

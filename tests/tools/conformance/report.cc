@@ -312,7 +312,7 @@ std::string text_of(const Verdict& verdict) {
     return out + "\n    rule      " + anchor(*verdict.check) + ": " + std::string(verdict.check->sentence) +
            "\n    expected  " + verdict.expected + "\n    seen      " + verdict.seen;
   }
-  return out + "  (" + (verdict.seen.empty() ? "the conversation did not come so far" : verdict.seen) + ')';
+  return out + "  (" + (verdict.seen.empty() ? "the session ended earlier" : verdict.seen) + ')';
 }
 
 std::string json_of(const Verdict& verdict) {

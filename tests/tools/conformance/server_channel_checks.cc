@@ -71,19 +71,19 @@ void ChannelChecks::check_claims() {
     return;
   }
   guest_.report.judge("claims-granted", welcome.grants().empty(), welcome.ShortDebugString(),
-                      "no grants to a Hello without claims");
+                      "no grants for a Hello without claims");
 
   pb::Hello lower_role = claiming({claim(pb::ROLE_CONTROLLER)});
   lower_role.set_role(pb::ROLE_OBSERVER);
   const std::vector<std::pair<std::string, pb::Hello>> all = {
-      {"a device that is not there", claiming({claim(pb::ROLE_OBSERVER, "no-server-has-this")})},
-      {"a channel that is not there", claiming({claim(pb::ROLE_CONTROLLER, "", "no-device-has-this")})},
+      {"an unknown device", claiming({claim(pb::ROLE_OBSERVER, "no-server-has-this")})},
+      {"an unknown channel", claiming({claim(pb::ROLE_CONTROLLER, "", "no-device-has-this")})},
       {"the same claim twice", claiming({claim(pb::ROLE_CONTROLLER), claim(pb::ROLE_CONTROLLER)})},
-      {"a role that is not the highest of the claims'", lower_role}};
+      {"a role that is not the highest of the claims", lower_role}};
   for (const auto& [what, words] : all) {
     const auto answered = guest_.ask(words);
     guest_.report.judge("claim-refused", answered && answered->body.refused().code() == pb::CODE_INVALID,
-                        answered ? answered->body.ShortDebugString() : "nothing", "Refused, CODE_INVALID, to " + what);
+                        answered ? answered->body.ShortDebugString() : "nothing", "Refused, CODE_INVALID, for " + what);
   }
 }
 
@@ -94,7 +94,7 @@ void ChannelChecks::check_from_outside(Conversation& observer, std::uint32_t id)
   take.mutable_take_lease();
   const auto denied = observer.ask(take);
   guest_.report.judge("lease-denied", denied && denied->code() == pb::CODE_DENIED,
-                      denied ? denied->ShortDebugString() : "nothing", "CODE_DENIED to an observer");
+                      denied ? denied->ShortDebugString() : "nothing", "CODE_DENIED for an observer");
 
   pb::Control describe;
   describe.set_id(id + 1);
@@ -102,7 +102,7 @@ void ChannelChecks::check_from_outside(Conversation& observer, std::uint32_t id)
   const auto described = observer.ask(describe);
   guest_.report.judge("describe", described && described->code() == pb::CODE_OK && described->has_device(),
                       described ? described->ShortDebugString() : "nothing",
-                      "CODE_OK with a description of device 0, to an observer too");
+                      "CODE_OK with a description of device 0, for an observer too");
   if (described && described->has_device()) about_ = described->device();
 }
 
@@ -116,7 +116,7 @@ std::optional<ServerGuest::Session> ChannelChecks::check_channels(std::uint32_t&
   if (!session) return session;
   guest_.report.judge(
       "claims-granted", first_of_both(session->welcome), session->welcome.ShortDebugString(),
-      "two grants, first an observer's of device 0, then the controller's of its channel 0, which is free");
+      "two grants: first for an observer of device 0, then for a controller of its channel 0, which is free");
   check_description(session->talk, session->welcome, id);
   check_lease(session->talk, id);
   check_deadband(session->talk, session->welcome, id);
@@ -160,7 +160,7 @@ void ChannelChecks::check_lease(Conversation& talk, std::uint32_t& id) {
     }
     const auto ack = talk.ask(control);
     guest_.report.judge("lease-kept", ack && ack->code() == pb::CODE_OK, ack ? ack->ShortDebugString() : "nothing",
-                        "CODE_OK to " + to);
+                        "CODE_OK for " + to);
   };
   const auto holder_is = [&](const std::string& name, const std::string& after) {
     pb::Control control;
@@ -175,7 +175,7 @@ void ChannelChecks::check_lease(Conversation& talk, std::uint32_t& id) {
   holder_is("conformance", "after take_lease");
   ok(false, "give_lease of the holder");
   holder_is("", "after give_lease");
-  ok(false, "give_lease of one who claimed it, but holds it no more");
+  ok(false, "give_lease of a client that claimed it, but no longer holds it");
   ok(true, "take_lease of a free channel");
   holder_is("conformance", "after take_lease");
 }
@@ -201,7 +201,7 @@ void ChannelChecks::check_deadband(Conversation& talk, const pb::Welcome& welcom
       {"20 001 µs of silence", set(kShare, kFloor, 20'001)}};
   for (const auto& [what, ack] : refused) {
     guest_.report.judge("deadband-bounds", ack.code() == pb::CODE_INVALID, ack.ShortDebugString(),
-                        "CODE_INVALID to " + what);
+                        "CODE_INVALID for " + what);
   }
 
   // Counts the states received from index `since` on, and those that their predecessor predicts. Uses only the states'
@@ -230,30 +230,31 @@ void ChannelChecks::check_deadband(Conversation& talk, const pb::Welcome& welcom
     return out;
   };
   const auto said = [](const Count& states) {
-    return std::to_string(states.all) + " states, " + std::to_string(states.foretold) + " of them foretold";
+    return std::to_string(states.all) + " states, " + std::to_string(states.foretold) + " of them predictable";
   };
 
   const pb::ControlAck on = set(kShare, kFloor, 20'000);
-  guest_.report.judge("deadband", on.code() == pb::CODE_OK, on.ShortDebugString(), "CODE_OK to what is within bounds");
+  guest_.report.judge("deadband", on.code() == pb::CODE_OK, on.ShortDebugString(), "CODE_OK for values within bounds");
   std::size_t before = talk.heard().size();
   talk.listen(milliseconds(500));
   const Count with = count(before);
   // One per 20 ms gives 25 states, or fewer at a low loop rate; requires about half.
   const std::size_t least = std::min<std::size_t>(12, welcome.loop_hz() / 4);
   guest_.report.judge("deadband", with.all >= least, said(with) + ", in 500 ms",
-                      "one at least each 20 ms; at least " + std::to_string(least));
+                      "at least one every 20 ms; at least " + std::to_string(least));
   // A state replaced before it was sent is not visible here, so its successor can look as if it was predicted.
-  guest_.report.judge("deadband", 10 * with.foretold <= with.all, said(with), "none that the one before foretells");
+  guest_.report.judge("deadband", 10 * with.foretold <= with.all, said(with),
+                      "no state that the previous one predicts");
 
   const pb::ControlAck off = set(0, 0, 0);
   guest_.report.judge("deadband", off.code() == pb::CODE_OK, off.ShortDebugString(),
-                      "CODE_OK to 0, every state is sent");
+                      "CODE_OK for 0, which sends all states");
   before = talk.heard().size();
   constexpr std::size_t kMany = 20;
   if (welcome.loop_hz() < 100) return;  // the states are too far apart to be predicted
   const bool all = talk.listen_until(kPatience, [&] { return count(before).foretold >= kMany; });
-  guest_.report.judge("deadband", all, said(count(before)) + ", after it was switched off",
-                      "every state, also " + std::to_string(kMany) + " that the one before foretells");
+  guest_.report.judge("deadband", all, said(count(before)) + ", after it was disabled",
+                      "all states, including " + std::to_string(kMany) + " that the previous one predicts");
 }
 
 void ChannelChecks::check_reports(const Conversation& talk) {
@@ -276,10 +277,10 @@ void ChannelChecks::check_reports(const Conversation& talk) {
                delays(report.to_client()) && report.words().size() <= 128,
            "values within bounds");
     expect(report.forces() <= report.received() && report.received() <= talk.next_number(),
-           "no more forces than datagrams, and no more datagrams than were sent");
+           "at most as many forces as datagrams, and as datagrams sent");
     expect(report.number() > (previous == nullptr ? 0 : previous->number()), "a higher number");
     if (previous != nullptr) {
-      expect(report.until_ns() - previous->until_ns() >= 500'000'000, "once a second, never more often");
+      expect(report.until_ns() - previous->until_ns() >= 500'000'000, "once per second, not more often");
     }
     ++count;
     forces += report.forces();
@@ -287,7 +288,7 @@ void ChannelChecks::check_reports(const Conversation& talk) {
   });
   guest_.report.judge("link-report", count >= 2 && forces > 0,
                       std::to_string(count) + " reports of " + std::to_string(forces) + " forces",
-                      "two at least: forces were sent in different seconds");
+                      "at least two: forces were sent in different seconds");
 }
 
 }  // namespace tendon::conformance

@@ -89,7 +89,7 @@ void check_columns(ServerGuest& guest, Conversation& whole, Conversation& contro
   auto session = guest.enter(words);
   if (!session) return;
   if (std::ranges::count(session->welcome.features(), kFeatureStateColumns) == 0) {
-    guest.report.not_applicable("columns", "this server does not know state-columns");
+    guest.report.not_applicable("columns", "this server does not support state-columns");
     return say_bye(session->talk);
   }
   constexpr int kEnough = 20;
@@ -117,8 +117,8 @@ void check_columns(ServerGuest& guest, Conversation& whole, Conversation& contro
                          "within single precision: " + at->second.ShortDebugString());
     });
   }
-  guest.report.judge("columns", compared > 0, "no state in columns at a step that another observer was told of",
-                     "states in columns: the feature was granted");
+  guest.report.judge("columns", compared > 0, "no state in columns for a step that another observer received",
+                     "states in columns, because the feature was granted");
   say_bye(session->talk);
 }
 
@@ -150,7 +150,7 @@ void check_observer(ServerGuest& guest, ChannelChecks& channels, Conversation& c
   rearm.mutable_rearm();
   const auto ack = talk.ask(rearm);
   guest.report.judge("rearm-by-controller", ack && ack->code() == pb::CODE_DENIED,
-                     ack ? ack->ShortDebugString() : "nothing", "CODE_DENIED to an observer");
+                     ack ? ack->ShortDebugString() : "nothing", "CODE_DENIED for an observer");
   pb::Control disarm;
   disarm.set_id(2);
   disarm.mutable_disarm();
@@ -158,7 +158,7 @@ void check_observer(ServerGuest& guest, ChannelChecks& channels, Conversation& c
   // An older server may not support this request.
   const bool not_done = refused && (refused->code() == pb::CODE_DENIED || refused->code() == pb::CODE_UNSUPPORTED);
   guest.report.judge("disarm-by-controller", not_done, refused ? refused->ShortDebugString() : "nothing",
-                     "CODE_DENIED to an observer");
+                     "CODE_DENIED for an observer");
   check_columns(guest, talk, controller);
   channels.check_from_outside(talk, 3);
   controller.say();
@@ -178,12 +178,12 @@ void check_roaming(ServerGuest& guest, Conversation& talk) {
     talk.move_to(before);
     const bool stays = talk.confirmed(talk.say());
     guest.report.judge("roaming", stays && guest.replies(elsewhere, kSilence).empty(),
-                       "it answers a plain datagram from elsewhere", "in suite 0 the address never changes");
+                       "it answers a plain datagram from another address", "in suite 0 the address never changes");
     return;
   }
   talk.move_to(elsewhere);
-  guest.report.judge("roaming", talk.confirmed(talk.say()), "nothing comes to the new address",
-                     "the session goes on there");
+  guest.report.judge("roaming", talk.confirmed(talk.say()), "nothing at the new address",
+                     "the session continues there");
   // A late datagram from the old address must not move the session back.
   talk.move_to(before);
   talk.attribute(late, "reordering");
@@ -191,11 +191,10 @@ void check_roaming(ServerGuest& guest, Conversation& talk) {
   talk.move_to(elsewhere);
   guest.replies(before, milliseconds(60));
   const auto strays = guest.replies(before, kSilence);
-  guest.report.judge("roaming", strays.empty(),
-                     "a datagram with a lower packet number brought it back to the old address",
+  guest.report.judge("roaming", strays.empty(), "a datagram with a lower packet number changed it to the old address",
                      "the address of the highest packet number");
-  guest.report.judge("roaming", talk.confirmed(talk.say()), "nothing comes to the new address",
-                     "the session goes on there");
+  guest.report.judge("roaming", talk.confirmed(talk.say()), "nothing at the new address",
+                     "the session continues there");
 }
 
 bool tells_of_the_handle(const pb::DeviceState& state) {
@@ -214,11 +213,11 @@ void check_states(Report& report, const Conversation& talk) {
     const bool diagnosed = frame.has_device_report() || frame.has_peer_report() || frame.state().has_force_wanted_n() ||
                            !frame.state().stiffness_wanted_npm().empty();
     report.judge("diagnostics-unasked", !diagnosed, frame.ShortDebugString(),
-                 "nothing of it: nobody named the feature");
+                 "none, because no client has this feature");
     report.judge("handle-unasked", !tells_of_the_handle(frame.state()), frame.ShortDebugString(),
-                 "nothing of the handle: nobody named the feature");
+                 "no handle, because no client has this feature");
     report.judge("columns-unasked", !frame.has_states(), frame.ShortDebugString(),
-                 "whole states: nobody named the feature");
+                 "states without columns, because no client has this feature");
     if (!frame.has_state()) return;
     const pb::DeviceState& state = frame.state();
     ++count;
@@ -310,8 +309,8 @@ void check_conversation(ServerGuest& guest, ChannelChecks& channels, ServerGuest
   check_old_key(talk, rekeyed);
   check_rekey_sent(talk, guest.options);
   if (session.welcome.timeout_ms() > 10'000) {
-    guest.report.not_applicable("timeout",
-                                "this server waits for " + std::to_string(session.welcome.timeout_ms()) + " ms");
+    guest.report.not_applicable(
+        "timeout", "the timeout of this server is " + std::to_string(session.welcome.timeout_ms()) + " ms");
   } else {
     check_timeout(talk, milliseconds(session.welcome.timeout_ms()));
     say_bye(talk);
@@ -327,7 +326,7 @@ void check_end(ServerGuest& guest, ChannelChecks& channels) {
   check_coupling(guest, *first, id + 1);
   if (guest.options.suite() == 0) {
     guest.report.not_applicable("replaced", "suite 0 has no keys");
-    guest.report.not_applicable("bye-thrice", "a server of suite 0 says Bye when it goes down");
+    guest.report.not_applicable("bye-thrice", "a server with suite 0 sends Bye when it stops");
     return check_bye_silence(first->talk);
   }
   auto second = guest.enter(pb::ROLE_CONTROLLER);
@@ -335,7 +334,7 @@ void check_end(ServerGuest& guest, ChannelChecks& channels) {
   check_byes(first->talk, 0);
   const std::size_t told = first->talk.count_frames(
       0, [](const pb::Frame& frame) { return frame.has_bye() && frame.bye().code() == pb::CODE_REPLACED; });
-  guest.report.judge("replaced", told > 0, "no Bye with CODE_REPLACED to the one before", "a Bye, CODE_REPLACED");
+  guest.report.judge("replaced", told > 0, "no Bye with CODE_REPLACED to the previous session", "a Bye, CODE_REPLACED");
   check_bye_silence(second->talk);
 }
 

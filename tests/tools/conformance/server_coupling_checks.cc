@@ -56,7 +56,7 @@ class Asker {
 
 void expect_code(Report& report, std::string_view check, const pb::ControlAck& ack, pb::Code code,
                  const std::string& to) {
-  report.judge(check, ack.code() == code, ack.ShortDebugString(), pb::Code_Name(code) + " to " + to);
+  report.judge(check, ack.code() == code, ack.ShortDebugString(), pb::Code_Name(code) + " for " + to);
 }
 
 bool has(const pb::Welcome& welcome, std::string_view feature) {
@@ -77,7 +77,7 @@ void check_outputs(ServerGuest& guest, Asker& asker, const pb::Welcome& welcome)
 
 /// Works for a device without a coupling and for a follower of one leader.
 void check_orders(ServerGuest& guest, Asker& asker) {
-  const std::string to = "a device that does not lead";
+  const std::string to = "a device that is not a leader";
   expect_code(guest.report, "engage-at-leader", asker.ask([](pb::Control& control) { control.mutable_engage(); }),
               pb::CODE_UNSUPPORTED, to);
   const pb::ControlAck scaled = asker.ask([](pb::Control& control) {
@@ -138,9 +138,9 @@ void check_couple(ServerGuest& guest, Asker& asker, Conversation& talk) {
     return talk.count_frames(before, [](const pb::Frame& frame) { return frame.has_port_state(); });
   };
   const bool come = talk.listen_until(kPatience, [&] { return ports() >= 20; });
-  guest.report.judge("couple", come, std::to_string(ports()) + " PortStates in 3 s", "one each period");
+  guest.report.judge("couple", come, std::to_string(ports()) + " PortStates in 3 s", "one per period");
   const std::size_t states = talk.count_frames(before, [](const pb::Frame& frame) { return frame.has_state(); });
-  guest.report.judge("couple", states == 0, std::to_string(states) + " states", "no states any more");
+  guest.report.judge("couple", states == 0, std::to_string(states) + " states", "no more states");
   judge_ports(guest.report, talk, before);
 }
 
@@ -168,13 +168,13 @@ void check_coupling(ServerGuest& guest, ServerGuest::Session& controller, std::u
     check_couple(guest, asker, controller.talk);
   } else {
     for (const std::string_view check : {"couple-differs", "couple"}) {
-      guest.report.not_applicable(check, "there is nothing to couple with: --follower was not given");
+      guest.report.not_applicable(check, "requires --follower");
     }
     if (asker.couple(fitting()).code() == pb::CODE_UNSUPPORTED) {
       check_orders(guest, asker);
     } else {
       for (const std::string_view check : {"engage-at-leader", "scale-at-leader", "share-of-several"}) {
-        guest.report.not_applicable(check, "device 0 is to be coupled, and --follower was not given");
+        guest.report.not_applicable(check, "requires a device 0 without coupling, but --follower is set");
       }
     }
   }

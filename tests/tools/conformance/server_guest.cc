@@ -17,7 +17,7 @@ void judge_welcome(const pb::Hello& words, const ServerGuest& guest, const Attem
   expect(head == wanted && head.connection_id != 0, hex(write(wanted)) + ", with a connection id");
   expect(answered.datagram.size() < kLargest, "shorter than a Hello");
   expect(sixteen(answered.datagram, 16) == attempt.random(), "the client random of the Hello");
-  expect(welcome.version() == 1, "a version within the client's range, 1");
+  expect(welcome.version() == 1, "a version within the range of the client, 1");
   expect(welcome.role() == pb::ROLE_OBSERVER || welcome.role() == pb::ROLE_CONTROLLER, "a role");
   expect(welcome.device_name().size() <= 64 && welcome.server().size() <= 64, "names of at most 64 bytes");
   expect(welcome.max_force_n() >= 0 && welcome.max_force_n() <= 1e12, "max_force_n in 0 … 1e12");
@@ -27,7 +27,7 @@ void judge_welcome(const pb::Hello& words, const ServerGuest& guest, const Attem
   expect(welcome.timeout_ms() >= 1 && welcome.timeout_ms() <= 3'600'000, "timeout_ms in 1 … 3 600 000");
   const auto offered = [&](const std::string& feature) { return std::ranges::count(words.features(), feature) > 0; };
   expect(welcome.features_size() <= words.features_size() && std::ranges::all_of(welcome.features(), offered),
-         "no feature that was not offered");
+         "only offered features");
 }
 
 }  // namespace
@@ -120,14 +120,14 @@ std::optional<ServerGuest::Session> ServerGuest::enter(const pb::Hello& words) {
     report.judge("suite-2", answered->suite == 2, answered->body.ShortDebugString(),
                  "a Welcome that names aes-256-gcm");
   } else {
-    report.not_applicable("suite-2", "suite 2 was not asked for (--suite 2)");
+    report.not_applicable("suite-2", "suite 2 is not selected (--suite 2)");
   }
   Session session{answered->body.welcome(), attempt, *cookie, Conversation(wire, report, setup(port, *answered))};
   const std::size_t before = session.talk.heard().size();
   session.talk.say();
   const bool spoke = session.talk.listen_until(
       kPatience, [&] { return session.talk.heard().size() > before; }, false);
-  report.judge("first-data", spoke, "nothing came", "Data 0");
+  report.judge("first-data", spoke, "nothing", "Data 0");
   session.talk.listen_until(kPatience, [&] {
     return session.talk.count_frames(
                0, [](const pb::Frame& frame) { return frame.has_state() || frame.has_states(); }) > 0;

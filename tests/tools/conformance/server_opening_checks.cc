@@ -64,8 +64,8 @@ void check_bad_hellos(ServerGuest& guest) {
       guest.expect_silence("bad-hello-silence", port, what);
     }
   }
-  guest.report.judge("bad-hello-silence", guest.cookie(port, good).has_value(), "no Retry to the good Hello after them",
-                     "a Retry");
+  guest.report.judge("bad-hello-silence", guest.cookie(port, good).has_value(),
+                     "no Retry to the valid Hello after them", "a Retry");
 }
 
 void check_bad_bodies(ServerGuest& guest) {
@@ -86,7 +86,7 @@ void check_bad_bodies(ServerGuest& guest) {
          for (int i = 0; i < 16; ++i) m.add_features("f");
        })},
       {"a name that is not UTF-8", bytes_of(guest.hello(pb::ROLE_OBSERVER)) + bytes_of("\x22\x02\xc3\x28")},
-      {"what is not protobuf", from_hex("ff ff ff")}};
+      {"data that is not protobuf", from_hex("ff ff ff")}};
   std::string named;
   std::vector<Bytes> hellos;
   for (const auto& [what, body] : all) {
@@ -95,7 +95,7 @@ void check_bad_bodies(ServerGuest& guest) {
     named += (named.empty() ? "" : ", ") + what;
   }
   guest.report.judge("bad-body-silence", hellos.size() == all.size(), "no Retry",
-                     "a Retry before a cookie, whatever the body");
+                     "a Retry before a cookie, for any body");
   for (const Bytes& hello : hellos) guest.wire.send(port, hello);
   std::vector<Bytes> heard = guest.replies(port, kSilence);
   std::erase_if(heard, [](const Bytes& datagram) { return read_head(datagram)->type == kRetryType; });
@@ -138,13 +138,13 @@ void check_versions(ServerGuest& guest) {
                     refused.version_max() < 0x7FFFFFFE && refused.detail().size() <= 128 &&
                     mismatch->head == Head{.type = kAnswerType, .suite = guest.options.suite()};
   guest.report.judge("version-mismatch", good, mismatch ? hex(mismatch->datagram, 64) : "nothing",
-                     "Refused, CODE_UNSUPPORTED with the server's range, connection id 0");
-  if (!good) return guest.report.not_applicable("version-highest", "the server's range is not known");
+                     "Refused, CODE_UNSUPPORTED with the range of the server, connection id 0");
+  if (!good) return guest.report.not_applicable("version-highest", "the range of the server is unknown");
 
   const auto wide = offer(1, std::numeric_limits<std::uint32_t>::max());
   const std::uint32_t chosen = wide ? wide->body.welcome().version() : 0;
   guest.report.judge("version-highest", chosen == refused.version_max(), "version " + std::to_string(chosen),
-                     "version " + std::to_string(refused.version_max()) + ", the highest that both speak");
+                     "version " + std::to_string(refused.version_max()) + ", the highest common version");
 }
 
 void check_features(ServerGuest& guest) {
@@ -160,7 +160,7 @@ void check_features(ServerGuest& guest) {
 void check_keys(ServerGuest& guest) {
   if (!guest.options.key) {
     for (const std::string_view check : {"plain-denied", "unknown-key-silence"}) {
-      guest.report.not_applicable(check, "this server was talked to without a key");
+      guest.report.not_applicable(check, "requires --key");
     }
     return;
   }
@@ -181,14 +181,14 @@ void check_keys(ServerGuest& guest) {
   const Attempt known = guest.attempt(guest.hello(pb::ROLE_OBSERVER));
   const auto silent = [&](const Attempt& attempt, std::size_t damaged, const std::string& what) {
     const auto its = guest.cookie(other_port, attempt);
-    guest.report.judge("unknown-key-silence", its.has_value(), "nothing", "a Retry before a cookie, whatever the key");
+    guest.report.judge("unknown-key-silence", its.has_value(), "nothing", "a Retry before a cookie, for any key");
     if (!its) return;
     Bytes bytes = attempt.hello(*its);
     if (damaged > 0) bytes[damaged] ^= std::byte{1};
     guest.wire.send(other_port, bytes);
     guest.expect_silence("unknown-key-silence", other_port, what);
   };
-  silent(unknown, 0, "a Hello of a key that nobody has");
+  silent(unknown, 0, "a Hello with an unknown key");
   silent(known, 50 + 8 + 40, "a Noise message 1 with one bit changed");
 }
 
@@ -200,7 +200,7 @@ void check_half_open(ServerGuest& guest) {
   guest.report.judge("half-open", answered.has_value(), "no answer", "a Welcome");
   const auto heard = guest.replies(port, kSilence);
   guest.report.judge("half-open", heard.empty(), heard.empty() ? "" : hex(heard.front()),
-                     "silence until the first good Data");
+                     "silence until the first valid Data");
 }
 
 void check_stray_data(ServerGuest& guest) {
@@ -210,7 +210,7 @@ void check_stray_data(ServerGuest& guest) {
     body.set_tx_time_ns(1);
     guest.wire.send(port, write({.suite = guest.options.suite(), .connection_id = id}) + bytes_of(body));
   }
-  guest.expect_silence("stray-data-silence", port, "Data for nobody");
+  guest.expect_silence("stray-data-silence", port, "Data without a session");
 }
 
 void check_hello_limit(ServerGuest& guest) {
@@ -229,7 +229,7 @@ void check_hello_limit(ServerGuest& guest) {
       std::ranges::count_if(heard, [](const Bytes& datagram) { return read_head(datagram)->type == kAnswerType; });
   const double allowed = 41 + 20 * seconds(guest.wire.now() - begin);
   guest.report.judge("hello-limit", static_cast<double>(answers) <= allowed,
-                     std::to_string(answers) + " answers to 80 Hellos at once", "at most 40, and 20 for each second");
+                     std::to_string(answers) + " answers to 80 Hellos at once", "at most 40, and 20 per second");
 }
 
 void check_answer_again(ServerGuest& guest, ServerGuest::Session& session) {
@@ -245,16 +245,15 @@ void check_answer_again(ServerGuest& guest, ServerGuest::Session& session) {
   talk.listen_until(kPatience, [&] { return !answers().empty(); });
   const auto heard = answers();
   const auto again = heard.empty() ? std::nullopt : session.attempt.read(heard[0]);
-  guest.report.judge(
-      "answer-again", again && again->head.connection_id == talk.setup().connection_id,
-      again ? hex(again->datagram) : "nothing",
-      "the Answer that was given before, with connection id " + std::to_string(talk.setup().connection_id));
-  guest.report.judge("answer-again", talk.confirmed(talk.say()), "the session is gone", "the session goes on");
+  guest.report.judge("answer-again", again && again->head.connection_id == talk.setup().connection_id,
+                     again ? hex(again->datagram) : "nothing",
+                     "the previous Answer, with connection id " + std::to_string(talk.setup().connection_id));
+  guest.report.judge("answer-again", talk.confirmed(talk.say()), "the session has ended", "the session continues");
 }
 
 void check_second_controller(ServerGuest& guest) {
   if (guest.options.key)
-    return guest.report.not_applicable("one-controller", "the same key takes its own place: see replaced");
+    return guest.report.not_applicable("one-controller", "the same key replaces its session, see the check replaced");
   const auto answered = guest.ask(guest.hello(pb::ROLE_CONTROLLER));
   guest.report.judge("one-controller", answered && answered->body.refused().code() == pb::CODE_BUSY,
                      answered ? answered->body.ShortDebugString() : "nothing", "Refused, CODE_BUSY");

@@ -38,14 +38,14 @@ void check_requests(ServerGuest& guest, Conversation& talk) {
   std::size_t before = talk.heard().size();
   talk.confirmed(say(rate(2, 50)));
   talk.listen(milliseconds(120));
-  guest.report.judge("request-order", acks(before, 2) == 0, "request 2 was answered before request 1 had come",
+  guest.report.judge("request-order", acks(before, 2) == 0, "request 2 was answered before request 1 was sent",
                      "no answer to 2 before 1");
   const auto first = talk.ask(rate(1, 500));
   const bool second = acks(before, 2) > 0 || talk.ask(rate(2, 50)).has_value();
   guest.report.judge("request-order", first && second, "no answer", "answers to 1 and 2");
   guest.report.judge("request-order", states_in(kWindow) < kBetween,
                      "more than " + std::to_string(kBetween) + " states in 600 ms",
-                     "about 30: request 2, 50 per second, was delivered last");
+                     "about 30, because request 2 with 50 per second was delivered last");
 
   // Request 1 again must return the old answer without any effect.
   const auto again = talk.ask(rate(1, 500));
@@ -53,11 +53,11 @@ void check_requests(ServerGuest& guest, Conversation& talk) {
                      again && first && again->code() == first->code() && again->detail() == first->detail(),
                      again ? again->ShortDebugString() : "nothing", first ? first->ShortDebugString() : "an answer");
   if (guest.report.failed("request-order")) {
-    guest.report.not_applicable("request-once", "what it delivered last is not known: it does not keep the order");
+    guest.report.not_applicable("request-once", "the last delivered request is unknown, because the order is wrong");
   } else {
     guest.report.judge("request-once", states_in(kWindow) < kBetween,
                        "more than " + std::to_string(kBetween) + " states in 600 ms after request 1 was repeated",
-                       "about 30: request 1, 500 per second, is delivered once");
+                       "about 30, because request 1 with 500 per second is delivered once");
   }
 
   pb::Control unknown;
@@ -85,7 +85,7 @@ void check_requests(ServerGuest& guest, Conversation& talk) {
     return true;
   };
   const bool all = talk.listen_until(kPatience, [&] { return all_of(before); });
-  guest.report.judge("request-order", all, "not all of 4 … 19 were answered", "all, whatever order they came in");
+  guest.report.judge("request-order", all, "not all of 4 … 19 were answered", "all, in any order");
   guest.report.judge("golden-frame", acks(before, 7) > 0, "no answer to " + std::string(golden::kControl),
                      "an answer to 7");
   before = talk.heard().size();
@@ -100,7 +100,7 @@ void check_requests(ServerGuest& guest, Conversation& talk) {
   talk.confirmed(say(rate(20 + 16, 50)));
   talk.listen(milliseconds(120));
   guest.report.judge("request-bounds", acks(before, 0) == 0 && acks(before, 36) == 0, "an answer to request 0 or 36",
-                     "dropped: 0 is no id, and 36 is more than 16 after 19, the last answered");
+                     "dropped, because 0 is not an id, and 36 is more than 16 above 19, the last answered id");
 
   // One state per second, so the server must send keep-alives.
   guest.report.judge("request-order", talk.ask(rate(20, 1)).has_value(), "no answer to 20", "an answer");

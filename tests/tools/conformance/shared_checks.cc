@@ -122,9 +122,9 @@ std::uint64_t say_all(Conversation& talk, Evidence& evidence, const std::vector<
   const bool lives = talk.confirmed(talk.say());
   talk.listen(kMoment);
   for (std::size_t i = 0; i < all.size(); ++i) {
-    talk.report().judge(all[i].check, lives, "no answer after bad datagrams", "the conversation goes on");
-    talk.report().judge(all[i].check, !evidence.shown(unseen + i), number_text(unseen + i) + " was believed",
-                        "dropped: its datagram had " + std::string(all[i].wrong));
+    talk.report().judge(all[i].check, lives, "no answer after wrong datagrams", "the session continues");
+    talk.report().judge(all[i].check, !evidence.shown(unseen + i), number_text(unseen + i) + " was accepted",
+                        "dropped, because its datagram had " + std::string(all[i].wrong));
   }
   return first;
 }
@@ -143,7 +143,7 @@ void check_bad_datagrams(Conversation& talk, Evidence& evidence) {
   std::ranges::move(sealed ? forgeries(talk) : malformed_bodies(talk), std::back_inserter(all));
   const std::uint64_t first = say_all(talk, evidence, all, true);
   if (talk.report().failed("reordering")) {
-    talk.report().not_applicable("damaged-copy", "the good one comes late, which this peer drops anyway");
+    talk.report().not_applicable("damaged-copy", "this peer drops late datagrams");
     talk.skip_to(talk.next_number() + 40);
   } else {
     for (std::size_t i = 0; i < all.size(); ++i) {
@@ -154,7 +154,7 @@ void check_bad_datagrams(Conversation& talk, Evidence& evidence) {
   }
   if (!sealed) return talk.report().not_applicable("forged", "suite 0 has no tag");
   // An authentic datagram uses its number regardless of the body.
-  if (!evidence.any) return talk.report().not_applicable("malformed-body", "a sealed observer does not show it");
+  if (!evidence.any) return talk.report().not_applicable("malformed-body", "not visible for an encrypted observer");
   say_all(talk, evidence, malformed_bodies(talk), false);
 }
 
@@ -170,7 +170,7 @@ void check_replay(Conversation& talk) {
     talk.overhear(milliseconds(60));
   }
   talk.report().judge("replay", heard && talk.confirmed(talk.say()), "no answer after a replay",
-                      "the conversation goes on");
+                      "the session continues");
 }
 
 void check_reordering(Conversation& talk, Evidence& evidence) {
@@ -181,14 +181,14 @@ void check_reordering(Conversation& talk, Evidence& evidence) {
   talk.say_at(late, of(evidence.frame(shown)));
   talk.attribute(late, "reordering");
   talk.confirmed(talk.say());
-  talk.report().judge("reordering", shows(talk, evidence, shown), number_text(shown) + " was not believed",
-                      "it is the newest, though its datagram came late");
+  talk.report().judge("reordering", shows(talk, evidence, shown), number_text(shown) + " was not accepted",
+                      "accepted, because it is the newest, although its datagram arrived late");
 }
 
 void check_window(Conversation& talk, Evidence& evidence) {
-  if (!evidence.any) return talk.report().not_applicable("window-edge", "an observer does not show what it believes");
+  if (!evidence.any) return talk.report().not_applicable("window-edge", "not visible for an observer");
   if (talk.report().failed("reordering")) {
-    return talk.report().not_applicable("window-edge", "this peer drops all that comes late");
+    return talk.report().not_applicable("window-edge", "this peer drops late datagrams");
   }
   talk.skip_to(talk.next_number() + 3000);
   talk.confirmed(talk.say());
@@ -202,10 +202,10 @@ void check_window(Conversation& talk, Evidence& evidence) {
   talk.overhear(kMoment);
   talk.say_at(edge + 1, of(evidence.frame(just_in_time)));
   const bool shown = shows(talk, evidence, just_in_time);
-  talk.report().judge("window-edge", !evidence.shown(too_old), number_text(too_old) + " was believed",
-                      "dropped: its packet is 1984 numbers behind the newest");
-  talk.report().judge("window-edge", shown, number_text(just_in_time) + " was not believed",
-                      "accepted: its packet is 1983 numbers behind the newest");
+  talk.report().judge("window-edge", !evidence.shown(too_old), number_text(too_old) + " was accepted",
+                      "dropped, because its packet is 1984 numbers behind the newest");
+  talk.report().judge("window-edge", shown, number_text(just_in_time) + " was not accepted",
+                      "accepted, because its packet is 1983 numbers behind the newest");
 }
 
 void check_unknown(Conversation& talk, Evidence& evidence) {
@@ -220,8 +220,8 @@ void check_unknown(Conversation& talk, Evidence& evidence) {
   talk.attribute(talk.next_number(), "unknown-ignored");
   const bool heard = talk.confirmed(talk.say(body));
   talk.report().judge("unknown-ignored", heard, "no echo of a datagram with an unknown frame and field", "an echo");
-  talk.report().judge("unknown-ignored", shows(talk, evidence, number), number_text(number) + " was not believed",
-                      "believed: only what stood beside it is unknown");
+  talk.report().judge("unknown-ignored", shows(talk, evidence, number), number_text(number) + " was not accepted",
+                      "accepted, because only other parts are unknown");
 }
 
 void check_out_of_bounds(Conversation& talk, Evidence& evidence,
@@ -237,10 +237,10 @@ void check_out_of_bounds(Conversation& talk, Evidence& evidence,
     pb::Datagram body = of(frame);
     *body.add_frames() = evidence.frame(good);
     const bool lives = talk.confirmed(talk.say(body));
-    talk.report().judge("out-of-bounds", lives, "no echo after " + frame.ShortDebugString(), "the session lives on");
-    talk.report().judge("out-of-bounds", shows(talk, evidence, good), number_text(good) + " was not believed",
-                        "only the frame out of bounds is dropped, not the next: " + frame.ShortDebugString());
-    talk.report().judge("out-of-bounds", !evidence.shown(bad.back()), number_text(bad.back()) + " was believed",
+    talk.report().judge("out-of-bounds", lives, "no echo after " + frame.ShortDebugString(), "the session continues");
+    talk.report().judge("out-of-bounds", shows(talk, evidence, good), number_text(good) + " was not accepted",
+                        "only the frame out of bounds is dropped, not the next one: " + frame.ShortDebugString());
+    talk.report().judge("out-of-bounds", !evidence.shown(bad.back()), number_text(bad.back()) + " was accepted",
                         "dropped: " + frame.ShortDebugString());
   }
 }
@@ -262,21 +262,22 @@ void check_bad_requests(Conversation& talk, std::uint32_t id) {
   pb::Control sound;
   sound.set_id(id);
   sound.mutable_disarm();
-  talk.report().judge("request-invalid", talk.ask(sound).has_value(), "no answer to a disarm after all these", "one");
+  talk.report().judge("request-invalid", talk.ask(sound).has_value(), "no answer to a disarm after these requests",
+                      "one");
 }
 
 void check_newest_wins(Conversation& talk, Evidence& evidence) {
-  if (!evidence.any) return talk.report().not_applicable("newest-wins", "an observer does not show what it believes");
+  if (!evidence.any) return talk.report().not_applicable("newest-wins", "not visible for an observer");
   const std::uint64_t older = evidence.next;
   const std::uint64_t newer = older + 5;
   evidence.next += 10;
   talk.say(of(evidence.frame(newer)));
-  talk.report().judge("newest-wins", shows(talk, evidence, newer), number_text(newer) + " was not believed",
+  talk.report().judge("newest-wins", shows(talk, evidence, newer), number_text(newer) + " was not accepted",
                       "believed");
   talk.confirmed(talk.say(of(evidence.frame(older))));
   talk.listen(kMoment);
   talk.report().judge("newest-wins", !evidence.shown(older),
-                      number_text(older) + " was believed after " + number_text(newer), "dropped as stale");
+                      number_text(older) + " was accepted after " + number_text(newer), "dropped as stale");
 }
 
 void check_rekey(Conversation& talk) {
@@ -294,7 +295,7 @@ void check_rekey(Conversation& talk) {
   if (!followed) {
     talk.return_to_old_key();
     for (const std::string_view check : {"old-key-overlap", "old-key-over"}) {
-      talk.report().not_applicable(check, "it does not follow to the next key");
+      talk.report().not_applicable(check, "the peer does not change to the next key");
     }
     return;
   }
@@ -307,7 +308,7 @@ void check_rekey(Conversation& talk) {
   const std::uint64_t old = talk.next_number();
   talk.skip_to(old + 1);
   if (talk.now() - moved_on > std::chrono::seconds(1)) {
-    return talk.report().not_applicable("old-key-overlap", "this machine paused for too long to see it");
+    return talk.report().not_applicable("old-key-overlap", "this machine paused for too long");
   }
   talk.attribute(old, "old-key-overlap");
   talk.say_old(old);
@@ -325,8 +326,8 @@ void check_old_key(Conversation& talk, LocalTime renewed) {
   talk.say_bad("old-key-over", old, talk.seal(talk.head(old), bytes_of(body), -1), "the old key");
   const bool lives = talk.confirmed(talk.say());
   talk.report().judge("old-key-over", lives && talk.told_of(old) == false,
-                      "a datagram of a key that is over was accepted",
-                      "dropped: more than 2 s have passed since the next epoch began");
+                      "a datagram with an expired key was accepted",
+                      "dropped, because the next epoch started more than 2 s ago");
 }
 
 void check_keep_alive(Conversation& talk) {
@@ -335,7 +336,7 @@ void check_keep_alive(Conversation& talk) {
       milliseconds(1500), [&] { return talk.heard().size() - before >= 8; }, false);
   const std::size_t count = talk.heard().size() - before;
   talk.report().judge("keep-alive", count >= 8, std::to_string(count) + " datagrams in 1500 ms",
-                      "30, one each 50 ms; at least 8");
+                      "30, one every 50 ms; at least 8");
 }
 
 void check_timeout(Conversation& talk, Duration timeout) {
@@ -361,9 +362,9 @@ void check_timeout(Conversation& talk, Duration timeout) {
   for (std::size_t i = before; i < talk.heard().size(); ++i) heard_last = talk.heard()[i].at;
   const auto ms = std::chrono::duration_cast<milliseconds>(heard_last - fell_silent);
   talk.report().judge("timeout", ms >= timeout / 2 && ms <= timeout + milliseconds(1500),
-                      "it spoke for " + std::to_string(ms.count()) + " ms after our last good word",
+                      "datagrams for " + std::to_string(ms.count()) + " ms after our last valid datagram",
                       "for about " + std::to_string(timeout / milliseconds(1)) +
-                          " ms, whatever replayed, malformed and foreign datagrams came meanwhile");
+                          " ms, independent of replayed, malformed and foreign datagrams");
 }
 
 void check_bye_silence(Conversation& talk) {
@@ -403,7 +404,8 @@ void check_byes(Conversation& talk, std::size_t since) {
 }
 
 void check_rekey_sent(Conversation& talk, const Options& options) {
-  if (!options.long_checks) return talk.report().not_applicable("rekey-sent", "takes 610 s: --long");
+  if (!options.long_checks)
+    return talk.report().not_applicable("rekey-sent", "requires --long, because it takes 610 s");
   if (talk.setup().suite == 0) return talk.report().not_applicable("rekey-sent", "suite 0 has no keys");
   const std::uint8_t before = talk.peer_epoch();
   const auto waited = options.key_age + std::chrono::seconds(10);

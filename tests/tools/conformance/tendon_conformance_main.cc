@@ -114,53 +114,58 @@ int judge_worker(const Line& line) {
 
 int run(int argc, char** argv) {
   CLI::App app(
-      "Talks to a client or a server over UDP and judges it by WIRE.md and SESSION.md, or to a worker as its front "
-      "does "
-      "(clients/cpp/worker/stream.h).",
+      "Test a client or a server over UDP for conformance with WIRE.md and SESSION.md, or a worker for conformance "
+      "with\nclients/cpp/worker/stream.h.",
       "tendon-conformance");
   usage::dress(app);
   app.footer(
       "Examples: tendon-conformance server 127.0.0.1:47100\n"
       "          tendon-conformance client --key wall.key -- python3 my_client.py --server {} --key wall.key\n"
       "          tendon-conformance worker -- mpirun -n 2 ./my_worker\n"
-      "Exit: 0 all checks that apply passed; 1 one failed or was not reached; 2 wrong usage.");
+      "Exit: 0 success, all applicable checks passed; 1 a check failed or was not reached; 2 wrong usage.");
   app.set_version_flag("--version", version_text());
   Line line;
   bool list_only = false;
-  app.add_flag("--list", list_only, "Print every check, the section it comes from and the sentence it tests");
-  app.add_flag("--json", line.json, "One JSON object per check on stdout");
+  app.add_flag("--list", list_only, "Print each check, with its section and sentence of the specification, and exit");
+  app.add_flag("--json", line.json, "Print JSON on stdout, one object per check");
   app.require_subcommand(0, 1);
   const auto common = [&](CLI::App* command) {
     auto* const key =
-        command->add_option("--key", line.key, "Sealed, with this key file (of a controller); without one suite 0")
+        command->add_option("--key", line.key, "Key file of a controller. Default: suite 0, without encryption")
             ->type_name("FILE");
-    command->add_option("--suite", line.suite, "With a key, of Data: 2 offers and chooses suite 2, and judges by it")
+    command->add_option("--suite", line.suite, "Cipher suite of Data with a key; 2: offer and require suite 2")
         ->check(usage::one_of({"1", "2"}))
         ->needs(key)
         ->capture_default_str();
-    command->add_flag("--long", line.long_checks, "Also the check that takes 610 s: the peer renews its key");
-    command->add_flag("--json", line.json, "One JSON object per check on stdout");
+    command->add_flag("--long", line.long_checks, "Also run the check of key changes, which takes 610 s");
+    command->add_flag("--json", line.json, "Print JSON on stdout, one object per check");
   };
-  CLI::App* const server = app.add_subcommand("server", "Be the clients of a server");
-  server->add_option("ADDRESS", line.server, "Where it listens; it needs no other controller")->required();
+  CLI::App* const server = app.add_subcommand("server", "Test a server, as its clients");
+  server->add_option("ADDRESS", line.server, "Address of the server, which must not have another controller")
+      ->required();
   server->add_flag("--follower", line.follower,
-                   "Its device 0 is the follower of a coupling that fits the kit (README.md)");
+                   "Device 0 is the follower of a coupling with the parameters in README.md");
   common(server);
   CLI::App* const client = app.add_subcommand(
-      "client", "Be the server of a client, which is started several times, and asked to end by SIGTERM");
-  client->add_option("--listen", line.listen, "Where to wait for it; port 0: any")->capture_default_str();
-  client->add_option("--log", line.log, "A file for what the client says")->type_name("FILE");
-  client->add_option("COMMAND", line.command, "The client; {} stands for the address, which is else the last argument")
+      "client", "Test a client, as its server. The client is started several times, and stopped with SIGTERM");
+  client->add_option("--listen", line.listen, "Address for the client. Port 0: a free port")->capture_default_str();
+  client->add_option("--log", line.log, "File for the output of the client")->type_name("FILE");
+  client
+      ->add_option("COMMAND", line.command,
+                   "Command of the client; {} is replaced by the address, which otherwise is appended")
       ->required();
   common(client);
   CLI::App* const worker =
       app.add_subcommand("worker",
-                         "Be the front of a worker, which is started twice: its stream is a Unix socket, then TCP.\n"
-                         "Example: tendon-conformance worker -- mpirun -n 2 ./my_worker");
-  worker->add_option("--listen", line.listen, "Where to wait for it over TCP; port 0: any")->capture_default_str();
-  worker->add_option("--log", line.log, "A file for what the worker says")->type_name("FILE");
-  worker->add_option("COMMAND", line.command, "The worker; its environment has the address and the secret")->required();
-  worker->add_flag("--json", line.json, "One JSON object per check on stdout");
+                         "Test a worker, as its front. The worker is started twice: with a Unix socket, then with "
+                         "TCP.\nExample: tendon-conformance worker -- mpirun -n 2 ./my_worker");
+  worker->add_option("--listen", line.listen, "TCP address for the worker. Port 0: a free port")->capture_default_str();
+  worker->add_option("--log", line.log, "File for the output of the worker")->type_name("FILE");
+  worker
+      ->add_option("COMMAND", line.command,
+                   "Command of the worker, which receives the address and the secret in its environment")
+      ->required();
+  worker->add_flag("--json", line.json, "Print JSON on stdout, one object per check");
   try {
     usage::parse(app, argc, argv);
   } catch (const CLI::ParseError& error) {

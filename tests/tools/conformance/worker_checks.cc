@@ -117,7 +117,7 @@ std::optional<Record> WorkerJudge::next(LocalTime deadline) {
       }
     } catch (const std::runtime_error& error) {
       judge("record-length", false, error.what(), "a length of 8 to 1208 in front of each record");
-      over_ = "there are no records in its stream";
+      over_ = "the stream has no records";
       reader_ = {};
     }
     if (!over_.empty()) return std::nullopt;
@@ -139,7 +139,7 @@ bool WorkerJudge::open() {
   if (!record && report_.failed("record-length")) return false;
   const bool opened = record && worker::opens(*record, secret);
   const std::string seen = record ? "sequence " + std::to_string(record->sequence) + ", " + hex(record->body, 24)
-                           : over_.empty() ? "nothing within two minutes of its start"
+                           : over_.empty() ? "nothing within two minutes after its start"
                                            : over_;
   judge("stream-opens", opened, seen,
         std::string("sequence 0, \"tendon worker 1\", a newline, and the secret of ") + worker::kSecretVariable);
@@ -150,7 +150,7 @@ bool WorkerJudge::silent(LocalTime deadline) {
   const auto record = next(deadline);
   const bool waits = !record && over_.empty();
   judge("stream-silent", waits, record ? "a record of sequence " + std::to_string(record->sequence) : over_,
-        "nothing while there is no state to answer");
+        "nothing as long as there is no state to answer");
   return waits;
 }
 
@@ -243,7 +243,7 @@ void WorkerJudge::converse() {
   }
   if (!silent(wire_.now() + kQuiet)) return;
   wire_.end_stream();
-  judge("stream-ends", wire_.ends(wire_.now() + kEnd), "it still runs 10 s after the end of its stream",
+  judge("stream-ends", wire_.ends(wire_.now() + kEnd), "the program runs 10 s after the end of its stream",
         "the end of the program");
 }
 
@@ -260,7 +260,7 @@ void judge_worker(WorkerWire& wire, Report& report) {
   }
   if (!answered || heard_force) return;
   for (const std::string_view check : {"answer-names-state", "answer-bounds"}) {
-    report.not_applicable(check, "this worker knew no force");
+    report.not_applicable(check, "this worker sent no force");
   }
 }
 

@@ -63,7 +63,7 @@ std::string WorkerProgram::listen(Road road) {
     sockaddr_un at{};
     at.sun_family = AF_UNIX;
     if (path.size() >= sizeof at.sun_path)
-      throw std::runtime_error(path + " is too long for a socket: set TMPDIR to a shorter path");
+      throw std::runtime_error(path + " is too long for a socket; set TMPDIR to a shorter path");
     std::ranges::copy(path, std::begin(at.sun_path));
     listen_at(listener_ = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0), at, path);
     return "unix:" + path;
@@ -115,7 +115,8 @@ std::optional<WorkerWire::Heard> WorkerProgram::receive(LocalTime deadline) {
       if (size > 0) return Heard{.bytes = {buffer.begin(), buffer.begin() + size}};
       return Heard{.ended = "the stream has ended"};
     }
-    if (!ran) return Heard{.ended = stream_ < 0 ? "the program has ended; nobody came" : "the program has ended"};
+    if (!ran)
+      return Heard{.ended = stream_ < 0 ? "the program has ended without a connection" : "the program has ended"};
     if (left <= milliseconds::zero()) return std::nullopt;
   }
 }
