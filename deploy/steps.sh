@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-# Steps for deploy's scripts. Each prints its place, its duration and an estimate of the remaining time. Source this file.
+# Functions for scripts that consist of several steps. Each step prints its number, its duration and an estimate of the
+# remaining time. This file must be sourced.
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 logs=$root/build/log
 jobs=$(nproc)
@@ -16,8 +17,8 @@ skip() {
   exit 77
 }
 
-# configure PRESET [-B FOLDER] OPTION…: by CMake, which would forget the options where another compiler than the preset's
-# has configured the folder.
+# configure PRESET [-B FOLDER] OPTION…: runs CMake. If the compiler of the preset has changed, this uses --fresh, because
+# CMake would otherwise discard the options.
 configure() {
   local folder=build/$1 wanted had fresh=()
   if [ "${2-}" = -B ]; then folder=$3; fi
@@ -27,16 +28,17 @@ configure() {
   cmake "${fresh[@]}" --preset "$@"
 }
 
-# The plan: step I is names[I], runs commands[I] (quoted words, after them whether it is loud), usually takes
-# lengths[I] and has taken lasted[I] seconds. results[I] is for the table.
+# The plan. Step I has the name names[I] and runs commands[I], which contains quoted words. It is expected to take
+# lengths[I] seconds and has taken lasted[I] seconds. The table shows results[I].
 names=() commands=() lengths=() lasted=() results=()
 plan_file=/dev/null current=
 
-# plan NAME: from here on `add` makes a plan. What a step took the last time, which build/log remembers, is a better
-# estimate than what `add` says.
+# plan NAME: starts a plan, to which `add` adds steps. If build/log contains the duration of a step in the previous run,
+# it is used instead of the estimate that is passed to `add`.
 plan() { plan_file=$logs/lengths-$1; }
 
-# add [--loud] SECONDS STEP COMMAND…: one more step, which takes SECONDS on two processors from nothing.
+# add [--loud] SECONDS STEP COMMAND…: adds a step to the plan. SECONDS is the estimated duration on two processors if
+# nothing is built yet. With --loud, the output is printed.
 add() {
   local run=step seconds
   if [ "$1" = --loud ]; then run=loud_step && shift; fi
@@ -46,13 +48,14 @@ add() {
   commands+=("$(printf '%q ' $run "${@:2}")")
 }
 
-# add_packages SECONDS LIST…: the first step.
+# add_packages SECONDS LIST…: adds the first step, which installs packages.
 add_packages() {
   add "$1" packages
   commands=("install_packages ${*:2}")
 }
 
-# run_steps: all of the plan. After the last step, or the one that fails, `finish` runs with 0 or 1.
+# run_steps: runs all steps of the plan, until one of them fails. Then `finish` is called with 0 if all steps succeeded,
+# and otherwise with 1.
 run_steps() {
   for current in "${!names[@]}"; do eval "${commands[current]}"; done
   current=
@@ -77,14 +80,14 @@ seconds_left() {
   if [ $took -lt $planned ]; then took=$planned; fi
   step=$((step * took / planned - running))
   if [ $step -lt 0 ]; then step=0; fi
-  # The more is counted, the less the plan counts.
+  # The weight of the plan decreases as more items are finished.
   if [ "$counted" -gt 0 ]; then
     step=$(((step * (total - counted) + running * (total - counted) / counted * counted) / total))
   fi
   echo $((step + others * took / planned))
 }
 
-# time_left …: prints seconds_left in words, or nothing without a plan.
+# time_left …: prints the result of seconds_left in words, or nothing if there is no plan.
 time_left() {
   local seconds word=about
   seconds=$(seconds_left "$@")
@@ -98,14 +101,14 @@ time_left() {
   fi
 }
 
-# begin STEP: prints the time, its place and its name, without an end of line.
+# begin STEP: prints the time, the number of the step and its name, without a newline.
 begin() {
   local place=
   if [ -n "$current" ]; then place=$(printf '%2d/%d ' $((current + 1)) ${#names[@]}); fi
   printf '[%4d s] %s%-24s ' "$SECONDS" "$place" "$1"
 }
 
-# end STEP SECONDS RESULT: its line, and what the table and the next estimate want to know.
+# end STEP SECONDS RESULT: prints the rest of the line, and stores the result for the table and for later estimates.
 end() {
   local i text
   if [ -z "$current" ]; then
@@ -129,8 +132,8 @@ end() {
   printf '%4d s  %s%s\n' "$2" "$3" "${text:+; $text}"
 }
 
-# follow STEP LOG: on a terminal, until it is killed: each second the step's line with what ninja or ctest has
-# counted, and the time left.
+# follow STEP LOG: updates the line of a step on the terminal every second until it is killed. The line shows the
+# progress of ninja or ctest and the remaining time.
 follow() {
   local started=$SECONDS counted columns line
   { columns=$(stty size <&3 2>/dev/null | cut -d ' ' -f 2); } 3>&1
@@ -144,8 +147,9 @@ follow() {
   done
 }
 
-# step NAME COMMAND…: one line on the terminal, all that COMMAND prints in build/log. When it fails, the end of that
-# too. COMMAND stops at its first error: bash would overlook `set -e` in a condition, so it does not run in one.
+# step NAME COMMAND…: prints one line and writes the output of COMMAND to build/log. If the command fails, the end of the
+# output is also printed. COMMAND stops at the first error. It does not run in a condition, because bash ignores `set -e`
+# there.
 step() {
   local name=$1 started=$SECONDS log status follower=
   log=$(log_of "$name")
@@ -178,7 +182,7 @@ step() {
   esac
 }
 
-# loud_step NAME COMMAND…: the same for one that prints for itself.
+# loud_step NAME COMMAND…: does the same, but prints the output of COMMAND.
 loud_step() {
   local name=$1 started=$SECONDS
   shift
@@ -188,8 +192,8 @@ loud_step() {
   if [ -n "$current" ]; then lasted[current]=$((SECONDS - started)); fi
 }
 
-# result_of LOG: in a word, or in ctest's numbers. What ctest has skipped goes to LOG.skipped: its own log is gone after
-# the next run.
+# result_of LOG: prints the result of a successful step, with the number of tests if the step has run ctest. The skipped
+# tests are saved in LOG.skipped, because the next run overwrites the log of ctest.
 result_of() {
   local skipped=
   skipped_tests "$1" >"$1.skipped"
@@ -202,7 +206,7 @@ result_of() {
     END { print "passed" result (alone ? "; only alone:" alone : "") }' "$1"
 }
 
-# skipped_tests LOG: prints "number reason" for the tests that ctest skipped. The reasons come from ctest's own log.
+# skipped_tests LOG: prints "number reason" for the tests that ctest has skipped. The reasons are in the log of ctest.
 skipped_tests() {
   local folder last
   folder=$(sed -n 's/^Test project //p' "$1" | tail -n 1)
@@ -226,7 +230,7 @@ skipped_tests() {
   ' "$1" "$last" | sort -rn
 }
 
-# table: prints each step with its seconds and its result, and the reason for each skipped part, drill and test.
+# table: prints the duration and the result of each step, and the reasons why parts, drills and tests were skipped.
 table() {
   local i name log line shown=
   printf '\n%-24s %7s  %s\n' step seconds result
@@ -244,8 +248,8 @@ table() {
   printf '%-24s %7d\n' total "$SECONDS"
 }
 
-# ctest_summaries: prints ctest's closing lines for each test step, without the names of skipped tests. If the
-# failed tests were run again, only the lines of the second run are printed.
+# ctest_summaries: prints the summary of ctest for each test step, without the names of skipped tests. If the failed tests
+# were run again, only the summary of the second run is printed.
 ctest_summaries() {
   local i
   for i in "${!names[@]}"; do
@@ -258,8 +262,8 @@ ctest_summaries() {
   done
 }
 
-# install_packages LIST…: also points this shell at build/sysroot, should the packages have had to go there. sudo asks
-# for its password before the step has a line.
+# install_packages LIST…: installs packages. If they are unpacked into build/sysroot, this also sets up the shell to use
+# them. sudo asks for the password before the line of the step is printed.
 install_packages() {
   if [ "$(id -u)" != 0 ] && [ -t 0 ] && command -v sudo >/dev/null && ! deploy/setup --check "$@" >/dev/null; then
     sudo -v || true

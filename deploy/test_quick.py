@@ -1,12 +1,13 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""deploy/test --quick: builds and tests what a change touches, in the release build alone.
+"""deploy/test --quick: builds and tests the parts that are affected by a change. This only uses the release build.
 
     test_quick.py [COMMIT]
 
-A changed test is run. A changed source of a room is tested by the tests in the folder of the same name under tests/ (or the next
-one above that has tests), by the room's tests that include its header, and by the room's property tests with fewer cases. The tests
-in tests/rules always run. The end says what this leaves out.
+If a test has changed, it is run. If a source of a room has changed, this runs the tests in the folder with the same name
+under tests/ (or in the closest parent folder with tests), the tests of the room that include the header of the source, and
+the property tests of the room with fewer cases. The tests in tests/rules are always run. At the end, this prints what was
+not tested.
 """
 import collections
 import json
@@ -20,7 +21,7 @@ import time
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 BUILD = ROOT / "build/release"
 PROPERTY_CASES = 500
-# Whole processes, worlds and long measurements: only when one of their own files has changed.
+# These tests start processes, simulate worlds or take long. They are only run if one of their own files has changed.
 SLOW = {"bench-smoke", "conformance", "e2e", "extended", "hard", "world"}
 STARTED = time.monotonic()
 
@@ -40,11 +41,11 @@ def commit_of(name):
 
 
 def changed_files(base):
-    """(files that differ, in words from what)"""
+    """Returns the files that have changed, and a description of what they are compared to."""
     untracked = output("git", "ls-files", "--others", "--exclude-standard").splitlines()
     if base:
         if not commit_of(base):
-            sys.exit(f"deploy/test --quick: {base} is no commit")
+            sys.exit(f"deploy/test --quick: {base} is not a commit")
         return output("git", "diff", "--no-renames", "--name-only", base).splitlines() + untracked, f"since {base}"
     uncommitted = output("git", "diff", "--no-renames", "--name-only", "HEAD").splitlines() + untracked
     if uncommitted:
@@ -57,17 +58,17 @@ def changed_files(base):
 
 
 class Graph:
-    """What ninja knows: which sources are in which object, and which objects are in which executable."""
+    """The build graph of ninja: the sources of each object, and the objects of each executable."""
 
     def __init__(self):
-        self.sources = {}  # object -> its sources: several where they are compiled as one
+        self.sources = {}  # object -> its sources; there can be several if they are compiled together
         for entry in json.loads((BUILD / "compile_commands.json").read_text()):
             found = re.search(r" -o (\S+\.o) ", entry["command"])
             if found:
                 together = "/Unity/unity_" in entry["file"] and pathlib.Path(entry["file"]).read_text()
                 files = re.findall(r'^#include "([^"]+)"', together, re.MULTILINE) if together else [entry["file"]]
                 self.sources[found[1]] = [inside(path) for path in files]
-        self.users = collections.defaultdict(set)  # file -> objects that are compiled from it
+        self.users = collections.defaultdict(set)  # file -> the objects that depend on it
         for name, sources in self.sources.items():
             for source in sources:
                 self.users[source].add(name)
@@ -78,8 +79,8 @@ class Graph:
             else:
                 name = line.partition(":")[0]
         archives = {}
-        self.own = {}  # executable -> the objects that it alone has
-        self.linked = {}  # executable -> all of its objects
+        self.own = {}  # executable -> the objects that are not from a library
+        self.linked = {}  # executable -> all objects
         for line in (BUILD / "build.ninja").read_text().splitlines():
             found = re.match(r"build (\S+)[^:]*: CXX_(STATIC_LIBRARY|EXECUTABLE)_LINKER__\S+ (.*)", line)
             if not found:
@@ -99,7 +100,7 @@ class Graph:
 
 
 def inside(path):
-    """`path` as git names it, when it is in the checkout."""
+    """Returns the path relative to the checkout, if it is inside."""
     path = os.path.normpath(path)
     root = str(ROOT) + "/"
     return path[len(root):] if path.startswith(root) else path
@@ -120,11 +121,11 @@ class Test:
 
 
 def known_tests(graph):
-    """What ctest knows, in its order: the tests of the cases in executables, and the others with the folder of their CMakeLists."""
+    """Returns all tests in the order of ctest. `folder` is only set for tests that are not test cases of an executable."""
     found = json.loads(output("ctest", "--show-only=json-v1", cwd=BUILD))
     tests = [Test(i + 1, entry, found["backtraceGraph"]) for i, entry in enumerate(found["tests"])]
     for test in tests:
-        # An executable that is not built yet is one test, by its name.
+        # ctest lists a single test for an executable that is not built yet.
         if test.name.endswith("_NOT_BUILT"):
             test.executable = "tests/" + test.name.removesuffix("_NOT_BUILT")
         if test.executable in graph.own:
@@ -145,7 +146,10 @@ def includes(source, header):
 
 
 def choose(changed, graph, tests):
-    """(executables with tests, folders of the other tests): what is to run; also those that are chosen for their own sake."""
+    """Selects the tests for the changed files.
+
+    Returns the executables, the folders of the other tests, and the set of those whose own files have changed.
+    """
     executables, folders, own = set(), {"tests/rules/documents"}, set()
     labels = collections.defaultdict(set)
     for test in tests:
@@ -155,7 +159,7 @@ def choose(changed, graph, tests):
     executables |= {name for name in of_cases if "tests/rules/rooms" in graph.folders(name)}
 
     def tests_near(folder):
-        """The tests of `folder`, or of the first one above that has any."""
+        """Returns the tests of `folder`, or of the closest parent folder that has any."""
         while folder.count("/") >= 1:
             found = {name for name in of_cases if folder in graph.folders(name)}
             if found or folder in other_folders:
@@ -190,7 +194,7 @@ def choose(changed, graph, tests):
 
 
 def run(name, *command, environment=None):
-    """What it prints is shown only when it fails."""
+    """Runs a command. The output is only printed if the command fails."""
     say(name)
     done = subprocess.run(command, cwd=ROOT, env={**os.environ, **(environment or {})}, stdout=subprocess.PIPE,
                           stderr=subprocess.STDOUT, text=True, errors="replace", check=False)
@@ -201,7 +205,7 @@ def run(name, *command, environment=None):
 
 
 def main():
-    # Even where there is a build: that of deploy/demo has no tests.
+    # If there is already a build, it may be the build of deploy/demo, which does not have tests.
     run("configure release", "cmake", "--preset", "release", "-DTENDON_TESTS=ON")
     changed, since = changed_files(sys.argv[1] if len(sys.argv) > 1 else "")
     say(f"changed {since}: {len(changed)} {'file' if len(changed) == 1 else 'files'}")
@@ -216,7 +220,7 @@ def main():
     targets = sorted(executables | programs)
     run(f"build {' '.join(os.path.basename(target) for target in targets)}", "ninja", "-C", str(BUILD), "--quiet", *targets)
 
-    # Once more: what has been built may have other cases.
+    # The test cases may have changed in the build.
     tests = known_tests(graph)
     missing = [name for name in graph.own if name.startswith("bin/") and not (BUILD / name).exists()]
     chosen = [
@@ -240,8 +244,8 @@ def main():
     built = set().union(*(graph.linked[target] for target in targets)) if targets else set()
     not_linked = [name for name in graph.linked if graph.linked[name] & touched and name not in targets]
     say(f"passed: {len(chosen)} of {len(tests)} tests")
-    print(f"  Not run: the other {left} tests, the READMEs' commands, what deploy/test --all adds"
-          + (f"; properties had {PROPERTY_CASES} cases" if fewer else "") + ".")
+    print(f"  Not run: the other {left} tests, the commands of the READMEs, the steps that only deploy/test --all has"
+          + (f"; properties were only tested with {PROPERTY_CASES} cases" if fewer else "") + ".")
     if missing:
         print(f"  Not run: the commands in documents, because {len(missing)} programs are not built.")
     if not_linked:

@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Prints the sources that clang-tidy is to look at for a change.
+"""Prints the sources that clang-tidy should check for a change.
 
     git diff --name-only HEAD~3 | deploy/tidied.py build/tidy/compile_commands.json [AT_MOST]
 
-Of the sources that this file compiles: those that changed, and for each header that changed its own source, or the
-nearest one that includes it. Not the tests: GoogleTest's macros cost a clang-tidy run more time than everything that it
-could find. If there are more than AT_MOST, this prints a sample of AT_MOST and says so on stderr. The sample depends only
-on the contents of the sources.
+These are the changed sources that are listed in compile_commands.json. If a header has changed, its source is printed, or
+the closest source that includes it. Tests are not checked, because the macros of GoogleTest make clang-tidy too slow. If
+there are more than AT_MOST sources, this prints a sample of AT_MOST sources and a message on stderr. The sample only
+depends on the contents of the sources.
 """
 import collections
 import hashlib
@@ -27,7 +27,7 @@ def main():
         sys.exit(__doc__)
     compiled = {entry["file"].removeprefix(f"{ROOT}/") for entry in json.loads(pathlib.Path(sys.argv[1]).read_text())}
     sources = sorted(path for path in compiled if not re.search(r"^(/|build/)|_(test|fuzz)\.cc$", path))
-    users = collections.defaultdict(list)  # header -> what includes it
+    users = collections.defaultdict(list)  # header -> the files that include it
     headers = {str(path.relative_to(ROOT)) for room in ("core", "protocol", "devices", "server", "clients", "tests")
                for path in (ROOT / room).rglob("*.h") if "node_modules" not in path.parts}
     for path in sources + sorted(headers):
