@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What deploy/kubernetes/check looks at: types, misspelt keys, the rules of README.md, and that everything that is named
-// is there. It prints a line for each fault, and how much was looked at.
+// The checks of deploy/kubernetes/check: types, misspelled keys, the rules of README.md, and references to programs and
+// files. Prints a line for each error and a summary.
 import { execFileSync } from "node:child_process";
 import { copyFileSync, existsSync, mkdtempSync, readdirSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
@@ -33,7 +33,7 @@ const find = (place) => {
 };
 find(folder);
 
-/** {file, value, patch} of everything that the kustomizations name. */
+/** {file, value, patch} of each document in the kustomizations. */
 const documents = [];
 const known = ["apiVersion", "kind", "namespace", "resources", "images", "patches", "configMapGenerator"];
 for (const file of kustomizations) {
@@ -41,17 +41,17 @@ for (const file of kustomizations) {
   for (const key of Object.keys(value)) if (!known.includes(key)) fault(file, `unknown key ${key}`);
   const named = (name, patch) => {
     const path = join(dirname(file), name);
-    if (!existsSync(path)) return fault(file, `${name} is not there`);
+    if (!existsSync(path)) return fault(file, `${name} does not exist`);
     if (existsSync(join(path, "kustomization.yaml"))) return;
     for (const one of read(path)) documents.push({ file: path, value: one, patch });
   };
   for (const name of value.resources ?? []) named(name, false);
   for (const { path } of value.patches ?? []) named(path, true);
   for (const { files = [] } of value.configMapGenerator ?? []) {
-    for (const name of files) if (!existsSync(join(dirname(file), name))) fault(file, `${name} is not there`);
+    for (const name of files) if (!existsSync(join(dirname(file), name))) fault(file, `${name} does not exist`);
   }
 }
-// The job of a sweep, as tendon-sweep writes it.
+// The job of a sweep, which is created by tendon-sweep.
 if (programs !== "" && existsSync(join(programs, "tendon-sweep"))) {
   const sweep = mkdtempSync(join(tmpdir(), "tendon-check-"));
   const say = (...words) => execFileSync(join(programs, "tendon-sweep"), words, { encoding: "utf8" });
@@ -64,11 +64,11 @@ const whole = documents.filter((document) => !document.patch);
 const find_one = (kind, name) => whole.find((d) => d.value.kind === kind && d.value.metadata?.name === name)?.value;
 for (const { file, value, patch } of documents) {
   if (patch && !find_one(value.kind, value.metadata?.name)) {
-    fault(file, `changes ${value.kind} ${value.metadata?.name}, which the base does not have`);
+    fault(file, `changes ${value.kind} ${value.metadata?.name}, which is not in the base`);
   }
 }
 
-// ---- Types, by TypeScript and the published types of Kubernetes: a key that a type does not have is an error there -----
+// ---- Types: TypeScript finds unknown keys with the published types of Kubernetes ---------------------------------------
 
 const partial = "type Part<T> = T extends object ? { [K in keyof T]?: Part<T[K]> } : T;\n";
 const modules = {
@@ -121,7 +121,7 @@ const rule = (name, holds) => {
   try {
     kept = holds();
   } catch {
-    // Something that the rule is about is not there.
+    // An object that is needed by the rule does not exist.
   }
   if (!kept) faults.push(`rule: ${name}`);
 };
@@ -133,66 +133,66 @@ const all_of = (spec) => [...(spec?.initContainers ?? []), ...(spec?.containers 
 const everywhere = [pod, ...engines.map((engine) => engine.spec?.template?.spec)].flatMap(all_of);
 const one = (name) => all_of(pod).find((container) => container.name === name);
 
-rule("the server is on its node's network", () => pod.hostNetwork === true && pod.dnsPolicy === "ClusterFirstWithHostNet");
-rule("no container has a port of the node", () => !JSON.stringify(documents).includes('"hostPort"'));
-rule("nothing stands behind a Service", () => whole.every((d) => d.value.kind !== "Service"));
-rule("requests are limits, in whole cores, in patches too", () =>
+rule("the server uses the network of its node", () => pod.hostNetwork === true && pod.dnsPolicy === "ClusterFirstWithHostNet");
+rule("no container uses hostPort", () => !JSON.stringify(documents).includes('"hostPort"'));
+rule("there is no Service", () => whole.every((d) => d.value.kind !== "Service"));
+rule("requests are equal to limits and are whole cores, also in patches", () =>
   everywhere.every((c) => c.resources) &&
   documents.flatMap((d) => all_of(d.value.spec?.template?.spec)).filter((c) => c.resources).every((c) =>
     same(c.resources.requests, c.resources.limits) && /^[1-9]\d*$/.test(c.resources.limits.cpu) && c.resources.limits.memory));
-rule("the server has two rights, and no others", () =>
+rule("the server only has the capabilities SYS_NICE and IPC_LOCK", () =>
   ["doctor", "tendond"].every((name) => same(one(name).securityContext.capabilities, { drop: ["ALL"], add: ["SYS_NICE", "IPC_LOCK"] })));
-rule("the others have none, and are not root", () =>
+rule("the other containers have no capabilities and are not root", () =>
   everywhere.filter((c) => !["doctor", "tendond"].includes(c.name)).every((c) => same(c.securityContext.capabilities, { drop: ["ALL"] }) && c.securityContext.runAsNonRoot));
-rule("nobody gains rights, and nobody writes to the image", () =>
+rule("containers cannot gain privileges or write to the image", () =>
   everywhere.every((c) => c.securityContext.allowPrivilegeEscalation === false && c.securityContext.readOnlyRootFilesystem === true));
-rule("nobody is privileged, and nobody sees the host's files", () =>
+rule("no container is privileged or uses hostPath", () =>
   !JSON.stringify(documents).includes('"privileged":true') && !JSON.stringify(documents).includes('"hostPath"'));
-rule("a device comes by name", () =>
+rule("a device is requested by name", () =>
   documents.some((d) => d.patch && JSON.stringify(d.value).includes('"tendon.dev/falcon":"1"')));
-rule("a server is replaced by hand only", () => server.spec.updateStrategy.type === "OnDelete");
-rule("nobody evicts a server", () => {
+rule("a server is only replaced manually", () => server.spec.updateStrategy.type === "OnDelete");
+rule("a server cannot be evicted", () => {
   const budget = find_one("PodDisruptionBudget", "server").spec;
   return budget.maxUnavailable === 0 && same(budget.selector.matchLabels, server.spec.template.metadata.labels);
 });
-rule("a server stands above batch work", () => find_one("PriorityClass", pod.priorityClassName).value >= 1000000);
-rule("a server has 30 s to let go", () => pod.terminationGracePeriodSeconds === 30);
-rule("no probe restarts a server under a hand", () => !JSON.stringify(documents).includes("livenessProbe"));
-rule("the dashboard says whether the server is ready", () => one("dash").readinessProbe.httpGet.path === "/metrics");
-rule("the doctor looks first", () => same(pod.initContainers[0].command.slice(0, 2), ["tendond", "doctor"]));
-rule("keys are a secret", () =>
+rule("a server has a higher priority than batch jobs", () => find_one("PriorityClass", pod.priorityClassName).value >= 1000000);
+rule("a server has 30 s to shut down", () => pod.terminationGracePeriodSeconds === 30);
+rule("there is no liveness probe, which could restart a server in use", () => !JSON.stringify(documents).includes("livenessProbe"));
+rule("the dashboard has a readiness probe", () => one("dash").readinessProbe.httpGet.path === "/metrics");
+rule("tendond doctor runs first", () => same(pod.initContainers[0].command.slice(0, 2), ["tendond", "doctor"]));
+rule("the keys are a read-only secret", () =>
   pod.volumes.find((v) => v.name === "keys").secret.secretName === "tendon-keys" &&
   everywhere.flatMap((c) => c.volumeMounts ?? []).every((m) => m.name !== "keys" || m.readOnly === true));
-rule("recordings have a bound", () => Boolean(pod.volumes.find((v) => v.name === "recordings").emptyDir.sizeLimit));
-rule("no pod may talk to the cluster", () =>
+rule("the size of the recordings is limited", () => Boolean(pod.volumes.find((v) => v.name === "recordings").emptyDir.sizeLimit));
+rule("no pod has access to the API of the cluster", () =>
   [pod, ...engines.map((engine) => engine.spec.template.spec)].every((spec) => spec.automountServiceAccountToken === false));
-rule("there are two engines: of one process, and of many ranks", () => same(engines.map((d) => d.metadata.name).sort(), ["engine", "fem"]));
-rule("an engine listens nowhere", () => everywhere.every((c) => c.ports === undefined));
-rule("there is one of each engine at a time", () =>
+rule("there are two engines: one with a single process, and one with many ranks", () => same(engines.map((d) => d.metadata.name).sort(), ["engine", "fem"]));
+rule("an engine does not listen on any port", () => everywhere.every((c) => c.ports === undefined));
+rule("each engine only runs once at a time", () =>
   engines.every((engine) => engine.spec.replicas === 1 && engine.spec.strategy.type === "Recreate"));
-rule("each rank has a core, and the front one more", () => {
+rule("there is one core for each rank and one for the front", () => {
   const [fem] = engines.find((d) => d.metadata.name === "fem").spec.template.spec.containers;
   const launch = fem.command[fem.command.indexOf("--launch") + 1];
   return launch === `mpirun -n ${Number(fem.resources.limits.cpu) - 1}` &&
     same(fem.volumeMounts.filter((m) => !m.readOnly).map((m) => m.mountPath), ["/tmp", "/dev/shm"]);
 });
-// Of Agones, where nothing has a device.
+// The rules for Agones, which does not use devices.
 const fleet = find_one("Fleet", "simulated")?.spec?.template?.spec ?? {};
-rule("a simulated server has no device, no rights, and its node's network", () =>
+rule("a simulated server has no device and no capabilities, and uses the network of its node", () =>
   fleet.template.spec.hostNetwork === true && !JSON.stringify(fleet).includes("tendon.dev/") &&
   all_of(fleet.template.spec).every((c) => same(c.securityContext.capabilities, { drop: ["ALL"] }) && c.securityContext.runAsNonRoot &&
     c.securityContext.allowPrivilegeEscalation === false && c.securityContext.readOnlyRootFilesystem === true && c.resources));
-rule("a simulated server is not taken away under a session", () => fleet.eviction.safe === "Never" && fleet.health.disabled === true);
-rule("the port is the node's own", () => same(fleet.ports.map((p) => [p.portPolicy, p.protocol]), [["Passthrough", "UDP"]]));
-rule("Agones is told by follow, which is there", () =>
+rule("a simulated server is not stopped during a session", () => fleet.eviction.safe === "Never" && fleet.health.disabled === true);
+rule("a simulated server uses a port of its node", () => same(fleet.ports.map((p) => [p.portPolicy, p.protocol]), [["Passthrough", "UDP"]]));
+rule("follow runs tendond and reports its state to Agones", () =>
   fleet.container === "tendond" && fleet.template.spec.containers[0].command[1] === "/follow/follow" &&
   fleet.template.spec.containers[0].command.includes("--json") &&
   fleet.template.spec.volumes.some((v) => v.configMap?.name === "agones-follow"));
-rule("every volume that is mounted is there", () =>
+rule("every mounted volume exists", () =>
   [pod, ...engines.map((engine) => engine.spec.template.spec), fleet.template.spec].every((spec) =>
     all_of(spec).flatMap((c) => c.volumeMounts ?? []).every((m) => spec.volumes.some((v) => v.name === m.name))));
 
-// ---- Programs and their options are those of this tree --------------------------------------------------------------
+// ---- Programs and options must exist in this tree -------------------------------------------------------------------
 
 let asked = 0;
 if (programs !== "") {
@@ -208,12 +208,12 @@ if (programs !== "") {
     all_of(pod_of(value)).filter((c) => c.command).map((c) => ({ file, command: c.command.slice(c.command[0] === "bash" ? 2 : 0) })));
   for (const { file, command } of commands) {
     if (!existsSync(join(programs, command[0]))) {
-      fault(file, `${command[0]} is no program of this tree`);
+      fault(file, `${command[0]} is not a program of this tree`);
       continue;
     }
     const [program, verb] = command;
     if (/^[a-z]+$/.test(verb) && !new RegExp(`^  ${verb}\\b`, "m").test(help_of([program]))) {
-      fault(file, `${program} has no ${verb}`);
+      fault(file, `${program} has no subcommand ${verb}`);
       continue;
     }
     for (const option of command.filter((word) => word.startsWith("--"))) {
@@ -226,6 +226,6 @@ if (programs !== "") {
 for (const line of faults) console.log(line);
 console.log(
   `${documents.length} documents of ${kustomizations.length} kustomizations, ${asked} options of programs: ` +
-    (faults.length === 0 ? "as they have to be" : `${faults.length} faults`),
+    (faults.length === 0 ? "passed" : `${faults.length} errors`),
 );
 process.exit(faults.length === 0 ? 0 : 1);
