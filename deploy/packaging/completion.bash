@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-# bash completion for Tendon's programs: the verbs and options that --help lists, and files.
+# bash completion for the programs of Tendon. Completes subcommands and options from the output of --help, and file
+# names.
 _tendon() {
   local program=$1 current=${COMP_WORDS[COMP_CWORD]} help verb=
-  # The first word that is no option is the verb of a program that has verbs.
+  # The first word may be a subcommand.
   if ((COMP_CWORD > 1)) && [[ ${COMP_WORDS[1]} != -* ]]; then
     verb=${COMP_WORDS[1]}
   fi

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-# What `cmake --install` brings, and the Debian packages that `cpack` makes of it: `tendon`, to run; `tendon-plug`, for the
-# machine of a program that exists already, which needs nothing else; `libtendon-dev`, to write an engine with:
-# find_package(tendon), tendon::client; and `tendon-fem-worker`, which alone needs PETSc and MPI, where they are.
-# Sweeps and the shipping of recordings are in `tendon`: they need nothing more, and its image is the one that a sweep's job runs.
+# The contents of `cmake --install` and of the Debian packages that are created by `cpack`:
+#   tendon             the server and the tools, including sweeps and the upload of recordings. Its image can also run
+#                      the job of a sweep
+#   tendon-plug        bridges for existing programs, which do not need any other package
+#   libtendon-dev      the C++ library: find_package(tendon), tendon::client
+#   tendon-fem-worker  the only package that depends on PETSc and MPI, if the build has found them
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 
@@ -21,7 +23,7 @@ if(TARGET tendon-dash)
   install(DIRECTORY deploy/monitoring DESTINATION ${CMAKE_INSTALL_DATADIR}/tendon COMPONENT programs
           PATTERN check EXCLUDE PATTERN otelcol-contrib.txt EXCLUDE)
 endif()
-# By its installed name, as its manual page has it.
+# Rename it to the name of its manual page.
 set(ship ${CMAKE_RUNTIME_OUTPUT_DIRECTORY}/tendon-ship)
 configure_file(deploy/recordings/ship ${ship} @ONLY)
 install(PROGRAMS ${ship} DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT programs)
@@ -30,21 +32,21 @@ if(TARGET tendon-fem-worker)
   install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/tendon-fem-worker COMPONENT worker)
 endif()
 install(TARGETS tendon-plug COMPONENT plug)
-# Where the program looks for them: beside its own folder.
+# The program searches for these libraries relative to its own folder.
 install(TARGETS hdPhantom HD LIBRARY DESTINATION lib/tendon/chai3d COMPONENT plug)
 install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/tendon-plug COMPONENT plug)
-# What belongs to the whole machine is for packages only: `cmake --install` into a home folder leaves /etc alone.
+# These files are only installed by the packages. `cmake --install` into a home folder does not change /etc.
 install(FILES deploy/udev/60-tendon.rules DESTINATION lib/udev/rules.d COMPONENT machine EXCLUDE_FROM_ALL)
 install(FILES deploy/systemd/tendond.service deploy/recordings/tendon-ship.service deploy/recordings/tendon-ship.timer
         DESTINATION lib/systemd/system COMPONENT machine EXCLUDE_FROM_ALL)
 install(FILES deploy/scenes/demo.toml DESTINATION /etc/tendon RENAME scene.toml COMPONENT machine EXCLUDE_FROM_ALL)
 
-# Every program has a manual page, which is what --help says (manual), and completion: one file completes all, and bash-completion looks
-# for one by the name of each.
+# Each program has a manual page, which is created from --help, and completion. bash-completion needs a file with the
+# name of each program, so the same file is installed several times.
 tendon_needs(has_help2man "manual pages" help2man)
 set(completions ${CMAKE_INSTALL_DATADIR}/bash-completion/completions)
 set(pages)
-# describe_program(NAME COMPONENT [FILE]): FILE where it is no target.
+# describe_program(NAME COMPONENT [FILE]): FILE is the path of a program that is not a target.
 function(describe_program program component)
   install(FILES deploy/packaging/completion.bash DESTINATION ${completions} RENAME ${program} COMPONENT ${component})
   if(NOT has_help2man)
@@ -75,14 +77,14 @@ if(TARGET tendon-fem-worker)
 endif()
 add_custom_target(man ALL DEPENDS ${pages})
 
-# The client's library. Headers keep the names that they have here: #include "clients/cpp/run.h".
+# The client library. The installed headers have the same paths as in this repository: #include "clients/cpp/run.h".
 set(libraries tendon_client tendon_output tendon_server_name tendon_usage tendon_protocol tendon_address tendon_proto tendon_core tendon_core_design)
 foreach(library ${libraries})
   string(REPLACE tendon_ "" name ${library})
   set_target_properties(${library} PROPERTIES EXPORT_NAME ${name})
 endforeach()
 install(TARGETS ${libraries} EXPORT tendon COMPONENT development INCLUDES DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/tendon)
-# CMake strips programs, and leaves archives as they are.
+# Strip the static libraries, because CMake only strips programs.
 install(CODE "
   if(CMAKE_INSTALL_DO_STRIP)
     file(GLOB archives \"\$ENV{DESTDIR}\${CMAKE_INSTALL_PREFIX}/${CMAKE_INSTALL_LIBDIR}/libtendon_*.a\")
@@ -125,7 +127,7 @@ set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
 set(CPACK_DEBIAN_RUN_PACKAGE_NAME tendon)
 set(CPACK_DEBIAN_RUN_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_RUN_PACKAGE_SHLIBDEPS ON)
-# What tendond loads for a scene that lists it, which no tool sees in the program.
+# These libraries are loaded at runtime if a scene needs them, so dpkg-shlibdeps does not find them.
 set(CPACK_DEBIAN_RUN_PACKAGE_DEPENDS "libsystemd0")
 if(TARGET tendon::libusb)
   string(APPEND CPACK_DEBIAN_RUN_PACKAGE_DEPENDS ", libusb-1.0-0")
@@ -133,24 +135,24 @@ endif()
 set(CPACK_DEBIAN_RUN_PACKAGE_RECOMMENDS "gnuplot-nox, libopenblas0-pthread")
 set(CPACK_DEBIAN_RUN_PACKAGE_SUGGESTS "avahi-daemon, gmsh, rclone, tendon-fem-worker")
 set(CPACK_DEBIAN_RUN_DESCRIPTION "Networked haptics server with an energy-bounding output limiter
- Runs the loop of a haptic device at 1 kHz and bounds every force so that the device never gives out more energy than it took in,
- while physics engines anywhere on the network send forces late, rarely or wrong.")
+ Runs the control loop of a haptic device at 1 kHz. It limits each force so that the device never gives out more
+ energy than it has received, even if the forces of remote physics engines are late, rare or wrong.")
 set(CPACK_DEBIAN_RUN_PACKAGE_CONTROL_EXTRA ${CMAKE_CURRENT_SOURCE_DIR}/deploy/packaging/conffiles)
 set(CPACK_DEBIAN_PLUG_PACKAGE_NAME tendon-plug)
 set(CPACK_DEBIAN_PLUG_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_PLUG_PACKAGE_SHLIBDEPS ON)
-set(CPACK_DEBIAN_PLUG_DESCRIPTION "Haptic devices of a Tendon server for programs that exist already
- Runs beside a program that knows CHAI3D, VRPN, Inverse-compatible JSON or ROS 2, and gives it the device of a Tendon server
- anywhere on the network, behind an output limiter that bounds its energy.")
+set(CPACK_DEBIAN_PLUG_DESCRIPTION "Haptic devices of a Tendon server for existing programs
+ Connects programs that use CHAI3D, VRPN, Inverse-compatible JSON or ROS 2 to the device of a Tendon server on the
+ network. The energy of the device is bounded by an output limiter.")
 set(CPACK_DEBIAN_WORKER_PACKAGE_NAME tendon-fem-worker)
 set(CPACK_DEBIAN_WORKER_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_WORKER_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_WORKER_PACKAGE_DEPENDS openmpi-bin)
-set(CPACK_DEBIAN_WORKER_DESCRIPTION "Large soft bodies for the Tendon haptics server, by PETSc on MPI
- The workers that tendon-fem starts: they spread the finite elements of a soft body that a hand touches over many cores and machines.")
+set(CPACK_DEBIAN_WORKER_DESCRIPTION "Large soft bodies for the Tendon haptics server, with PETSc and MPI
+ The workers of tendon-fem, which distribute the finite elements of a soft body over many cores and machines.")
 set(CPACK_DEBIAN_DEV_PACKAGE_NAME libtendon-dev)
 set(CPACK_DEBIAN_DEV_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_DEV_PACKAGE_DEPENDS "libeigen3-dev, libprotobuf-dev, libsodium-dev, libsystemd-dev")
-set(CPACK_DEBIAN_DEV_DESCRIPTION "Library to write a physics engine for the Tendon haptics server
- A session over UDP, newest pose wins, one callback: position in, force out.")
+set(CPACK_DEBIAN_DEV_DESCRIPTION "Library for physics engines of the Tendon haptics server
+ Opens a session over UDP, and calls a function that computes the force for the latest position.")
 include(CPack)
