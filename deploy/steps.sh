@@ -17,8 +17,8 @@ skip() {
   exit 77
 }
 
-# configure PRESET [-B FOLDER] OPTION…: runs CMake. If the compiler of the preset has changed, this uses --fresh, because
-# CMake would otherwise discard the options.
+# configure PRESET [-B FOLDER] OPTION…: runs CMake. If the compiler of the preset has changed, this uses --fresh,
+# because CMake would otherwise discard the options.
 configure() {
   local folder=build/$1 wanted had fresh=()
   if [ "${2-}" = -B ]; then folder=$3; fi
@@ -147,9 +147,9 @@ follow() {
   done
 }
 
-# step NAME COMMAND…: prints one line and writes the output of COMMAND to build/log. If the command fails, the end of the
-# output is also printed. COMMAND stops at the first error. It does not run in a condition, because bash ignores `set -e`
-# there.
+# step NAME COMMAND…: prints one line and writes the output of COMMAND to build/log. If the command fails, the end of
+# the output is also printed. COMMAND stops at the first error. It does not run in a condition, because bash ignores
+# `set -e` there.
 step() {
   local name=$1 started=$SECONDS log status follower=
   log=$(log_of "$name")
@@ -248,8 +248,8 @@ table() {
   printf '%-24s %7d\n' total "$SECONDS"
 }
 
-# ctest_summaries: prints the summary of ctest for each test step, without the names of skipped tests. If the failed tests
-# were run again, only the summary of the second run is printed.
+# ctest_summaries: prints the summary of ctest for each test step, without the names of skipped tests. If the failed
+# tests were run again, only the summary of the second run is printed.
 ctest_summaries() {
   local i
   for i in "${!names[@]}"; do

@@ -4,10 +4,10 @@
 
     test_quick.py [COMMIT]
 
-If a test has changed, it is run. If a source of a room has changed, this runs the tests in the folder with the same name
-under tests/ (or in the closest parent folder with tests), the tests of the room that include the header of the source, and
-the property tests of the room with fewer cases. The tests in tests/rules are always run. At the end, this prints what was
-not tested.
+If a test has changed, it is run. If a source of a room has changed, this runs the tests in the folder with the same
+name under tests/ (or in the closest parent folder with tests), the tests of the room that include the header of the
+source, and the property tests of the room with fewer cases. The tests in tests/rules are always run. At the end, this
+prints what was not tested.
 """
 import collections
 import json
@@ -121,7 +121,7 @@ class Test:
 
 
 def known_tests(graph):
-    """Returns all tests in the order of ctest. `folder` is only set for tests that are not test cases of an executable."""
+    """Returns all tests in the order of ctest. `folder` is only set for tests that are not cases of an executable."""
     found = json.loads(output("ctest", "--show-only=json-v1", cwd=BUILD))
     tests = [Test(i + 1, entry, found["backtraceGraph"]) for i, entry in enumerate(found["tests"])]
     for test in tests:

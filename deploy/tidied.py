@@ -4,10 +4,10 @@
 
     git diff --name-only HEAD~3 | deploy/tidied.py build/tidy/compile_commands.json [AT_MOST]
 
-These are the changed sources that are listed in compile_commands.json. If a header has changed, its source is printed, or
-the closest source that includes it. Tests are not checked, because the macros of GoogleTest make clang-tidy too slow. If
-there are more than AT_MOST sources, this prints a sample of AT_MOST sources and a message on stderr. The sample only
-depends on the contents of the sources.
+These are the changed sources that are listed in compile_commands.json. If a header has changed, its source is printed,
+or the closest source that includes it. Tests are not checked, because the macros of GoogleTest make clang-tidy too
+slow. If there are more than AT_MOST sources, this prints a sample of AT_MOST sources and a message on stderr. The
+sample only depends on the contents of the sources.
 """
 import collections
 import hashlib

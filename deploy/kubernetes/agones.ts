@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The fields of a fleet, from the definitions of Agones 1.57 (install/helm/agones/templates/crds). There is no npm package
-// with these types. deploy/kubernetes/check uses them to check overlays/agones.
+// The fields of a fleet, from the definitions of Agones 1.57 (install/helm/agones/templates/crds). There is no npm
+// package with these types. deploy/kubernetes/check uses them to check overlays/agones.
 import type { IPodTemplateSpec } from "kubernetes-models/v1";
 import type { IObjectMeta } from "@kubernetes-models/apimachinery/apis/meta/v1/ObjectMeta";
 

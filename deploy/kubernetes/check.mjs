@@ -68,7 +68,7 @@ for (const { file, value, patch } of documents) {
   }
 }
 
-// ---- Types: TypeScript finds unknown keys with the published types of Kubernetes ---------------------------------------
+// ---- Types: TypeScript finds unknown keys with the published types of Kubernetes ------------------------------------
 
 const partial = "type Part<T> = T extends object ? { [K in keyof T]?: Part<T[K]> } : T;\n";
 const modules = {
@@ -157,7 +157,7 @@ rule("a server cannot be evicted", () => {
 });
 rule("a server has a higher priority than batch jobs", () => find_one("PriorityClass", pod.priorityClassName).value >= 1000000);
 rule("a server has 30 s to shut down", () => pod.terminationGracePeriodSeconds === 30);
-rule("there is no liveness probe, which could restart a server in use", () => !JSON.stringify(documents).includes("livenessProbe"));
+rule("there is no liveness probe", () => !JSON.stringify(documents).includes("livenessProbe"));
 rule("the dashboard has a readiness probe", () => one("dash").readinessProbe.httpGet.path === "/metrics");
 rule("tendond doctor runs first", () => same(pod.initContainers[0].command.slice(0, 2), ["tendond", "doctor"]));
 rule("the keys are a read-only secret", () =>
@@ -166,7 +166,7 @@ rule("the keys are a read-only secret", () =>
 rule("the size of the recordings is limited", () => Boolean(pod.volumes.find((v) => v.name === "recordings").emptyDir.sizeLimit));
 rule("no pod has access to the API of the cluster", () =>
   [pod, ...engines.map((engine) => engine.spec.template.spec)].every((spec) => spec.automountServiceAccountToken === false));
-rule("there are two engines: one with a single process, and one with many ranks", () => same(engines.map((d) => d.metadata.name).sort(), ["engine", "fem"]));
+rule("there are two engines", () => same(engines.map((d) => d.metadata.name).sort(), ["engine", "fem"]));
 rule("an engine does not listen on any port", () => everywhere.every((c) => c.ports === undefined));
 rule("each engine only runs once at a time", () =>
   engines.every((engine) => engine.spec.replicas === 1 && engine.spec.strategy.type === "Recreate"));
