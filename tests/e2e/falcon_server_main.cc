@@ -187,22 +187,23 @@ bool kill_often(int kills, bool json) {
 
 int main(int argc, char** argv) {
   CLI::App app(
-      "falcon-server: the whole server, tendond as it is, on a model of a Falcon through the real libusb, with the\n"
-      "scene deploy/scenes/falcon.toml, sealed sessions and virtual_wall as its engine; and beside it a thread that "
-      "only\n"
-      "sleeps. How late are its steps, what is felt, and how long does a force outlive the server?\n\n"
+      "Run tendond with a model of a Falcon through the real libusb, with the scene deploy/scenes/falcon.toml, "
+      "encrypted\n"
+      "sessions and virtual_wall as engine. Measure how late its steps are compared with a thread that only sleeps, "
+      "the\n"
+      "felt force, and how long a force lasts after the server is killed.\n\n"
       "Example:  falcon-server --duration-s 60 --kills 15 --json\n",
       "falcon-server");
   usage::dress(app);
   app.set_version_flag("--version", version_text());
-  app.footer("\nExit: 0 all was as it should be; 1 it was not; 2 wrong usage.");
+  app.footer("\nExit: 0 success; 1 failed, or a value out of bounds; 2 wrong usage.");
   double duration_s = 60;
   int kills = 15;
   bool json = false;
-  app.add_option("--duration-s", duration_s, "How long the hand is in the wall; 0: not at all")
+  app.add_option("--duration-s", duration_s, "Time of the hand in the wall, s; 0: none")
       ->check(CLI::Range(0.0, 3600.0))
       ->capture_default_str();
-  app.add_option("--kills", kills, "How often the server is killed while it pushes")
+  app.add_option("--kills", kills, "How often to kill the server during contact")
       ->check(CLI::Range(0, 1000))
       ->capture_default_str();
   app.add_flag("--json", json, "Print JSON on stdout, one object per line: run, kills");

@@ -208,7 +208,7 @@ TEST(Front, ExplainsABodyWithoutAServer) {
   const auto scene = demo_scene().replace_filename("softbody.toml").string();
   Process explain(program("tendon-fem"), {"explain", scene, "--ranks", "1,64"}, folder.path());
   EXPECT_EQ(explain.wait(), 0) << explain.err();
-  EXPECT_NE(explain.out().find("Take: the table"), std::string::npos) << explain.out();
+  EXPECT_NE(explain.out().find("Recommended: the table"), std::string::npos) << explain.out();
   Process wrong(program("tendon-fem"), {"explain", scene, "--ranks", "0"}, folder.path());
   EXPECT_EQ(wrong.wait(), 2);
   Process none(program("tendon-fem"), {}, folder.path());

@@ -12,10 +12,10 @@
 
 int main(int argc, char** argv) {
   CLI::App app(
-      "tendon-soak: a server in real time that is treated roughly: engines that are killed, guests that come and go, "
-      "clocks\n"
-      "that are set, a disk that is full, processors that others use. Are its memory, files and threads flat, and its\n"
-      "promises kept? See tests/soak/README.md.\n\n"
+      "Run a server in real time under stress: killed engines, guests that connect and disconnect, clock steps, a full "
+      "disk\n"
+      "and busy processors. Check that memory, files and threads do not grow, and that the guarantees hold. See\n"
+      "tests/soak/README.md.\n\n"
       "Example:  tendon-soak --duration-s 60 --reconnects 10000 --folder /tmp/soak\n",
       "tendon-soak");
   tendon::usage::dress(app);
@@ -23,15 +23,13 @@ int main(int argc, char** argv) {
   tendon::soak::Config config{.folder = "soak"};
   double duration_s = 3600;
   bool json = false;
-  app.add_option("--duration-s", duration_s, "How long, of real time")
-      ->check(CLI::Range(1.0, 1e6))
+  app.add_option("--duration-s", duration_s, "Duration, s")->check(CLI::Range(1.0, 1e6))->capture_default_str();
+  app.add_option("--reconnects", config.reconnects, "Number of guest sessions that end after one state")
       ->capture_default_str();
-  app.add_option("--reconnects", config.reconnects, "Sessions of guests that come, see a state and go")
-      ->capture_default_str();
-  app.add_option("--seed", config.seed, "Of the times of what happens")->capture_default_str();
-  app.add_option("--folder", config.folder, "For logs and scene; made, or empty")->capture_default_str();
-  app.add_flag("--json", json, "One JSON object on stdout");
-  app.footer("\nExit: 0 all was as it should be; 1 it was not; 2 wrong usage.");
+  app.add_option("--seed", config.seed, "Seed of the times of events")->capture_default_str();
+  app.add_option("--folder", config.folder, "Folder for logs and scene; empty or new")->capture_default_str();
+  app.add_flag("--json", json, "Print one JSON object on stdout");
+  app.footer("\nExit: 0 success; 1 failed, or a violation; 2 wrong usage.");
   try {
     tendon::usage::parse(app, argc, argv);
   } catch (const CLI::ParseError& problem) {

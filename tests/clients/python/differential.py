@@ -445,7 +445,7 @@ def main() -> int:
     line.add_argument("--decode-lines", type=Path, default=built, metavar="PROGRAM", help="[%(default)s]")
     line.add_argument("--count", type=int, default=100_000, help="Datagrams [%(default)s]")
     line.add_argument("--seed", type=int, default=1, help="[%(default)s]")
-    line.add_argument("--json", action="store_true", help="What was seen as one JSON object on stdout")
+    line.add_argument("--json", action="store_true", help="Print one JSON object on stdout")
     options = line.parse_args()
     told, different = compare(options.decode_lines, options.seed, options.count)
     print(json.dumps({**told, "different": len(different)}) if options.json else f"{told}, different: {len(different)}")

@@ -144,7 +144,7 @@ def main() -> int:
     line.add_argument("--seconds", type=float, default=10, help="For each client and round [%(default)s]")
     line.add_argument("--rounds", type=int, default=3, help="[%(default)s]")
     line.add_argument("--programs", type=Path, default=PROGRAMS, metavar="FOLDER", help="[%(default)s]")
-    line.add_argument("--json", action="store_true", help="One JSON object per client on stdout")
+    line.add_argument("--json", action="store_true", help="Print JSON on stdout, one object per client")
     options = line.parse_args()
 
     key = bytes((7 * i * i + 3) % 256 for i in range(32))

@@ -149,7 +149,7 @@ void check_bottleneck(const Bottleneck& b) {
   if (b.bits_per_second > kMaxRate) refuse("rate", std::to_string(b.bits_per_second) + "bit/s", "at most 1000Gbit/s");
   check_count("opportunities", b.opportunities_ms.size(), kMaxOpportunities, "lines");
   if (!b.opportunities_ms.empty()) {
-    if (b.bits_per_second > 0) refuse("rate", std::to_string(b.bits_per_second) + "bit/s", "none beside opportunities");
+    if (b.bits_per_second > 0) refuse("rate", std::to_string(b.bits_per_second) + "bit/s", "none with opportunities");
     if (!std::ranges::is_sorted(b.opportunities_ms)) refuse("opportunities", "not rising", "times in order");
     if (b.opportunities_ms.back() == 0) refuse("opportunities: the last", "0", "more, because it is the period");
   }

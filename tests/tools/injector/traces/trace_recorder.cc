@@ -79,7 +79,7 @@ void TraceRecorder::write_until_the_end() {
 void TraceRecorder::finish() {
   end_ = true;
   thread_.join();
-  if (!stream_) throw std::runtime_error("cannot write " + file_.string() + ": the disk is full or gone");
+  if (!stream_) throw std::runtime_error("cannot write " + file_.string() + ": is the disk full?");
   if (lost_ > 0) {
     throw std::runtime_error(file_.string() + " is incomplete: the disk was too slow for " + std::to_string(lost_) +
                              " datagrams");
