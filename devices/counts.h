@@ -41,7 +41,7 @@ inline constexpr std::array kDeviceCounters = {
     DeviceCounter{DeviceCount::kFailedSetups, "failed_setups",
                   "failed transfers of the firmware, or failed calibrations", "set-up fails"},
     DeviceCounter{DeviceCount::kLostCounts, "lost_counts",
-                  "losses of encoder counts, after which the device must be homed again", "device lost encoder counts"},
+                  "losses of encoder counts, after which the device must be homed again", "counts were lost"},
     DeviceCounter{DeviceCount::kSilences, "silences",
                   "silences of the device for 100 ms, after which it is opened again", "device is silent"},
     DeviceCounter{DeviceCount::kImplausible, "implausible",

@@ -464,7 +464,7 @@ int main(int argc, char** argv) {
   auto* scene_option = app.add_option("SCENE", scene_files, "Scene files (TOML), one for each device");
   scene_option->expected(1, static_cast<int>(limits::kMaxDevices))->check(CLI::Validator(meant_command, ""));
   app.add_option("--record", record,
-                 "Record to this MCAP file instead of that in [recording] of the scene. Existing files are never "
+                 "Record to this MCAP file instead of the one of the scene. Existing files are never "
                  "overwritten: if run.mcap exists, run-2.mcap is written")
       ->type_name("FILE.mcap");
   app.add_option("--listen", listen,

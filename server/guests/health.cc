@@ -53,7 +53,7 @@ DeviceReport report(const Health& before, const Health& now) {
   say(now.steps_lost > before.steps_lost, "the log thread is too slow");
   say(now.recording_ended, "recording has stopped");
   say(now.unsent > before.unsent, "unsent datagrams");
-  say(now.broken_assumptions > before.broken_assumptions, "acceleration above the limiter's bound");
+  say(now.broken_assumptions > before.broken_assumptions, "acceleration too high");
   const auto worst = std::ranges::find_if(kDeviceCounters, [&](const DeviceCounter& row) {
     return !row.degraded.empty() && now.device[row.count] > before.device[row.count];
   });

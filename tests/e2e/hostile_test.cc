@@ -137,7 +137,7 @@ TEST(HostileName, ForgesNoLineOfALogAndReachesNoTerminal) {
   const std::jthread hostile([&] { run(options, [](const DeviceState&) { return Touch{}; }); });
   const std::string welcomed = server.process().wait_for_line("welcomed controller");
   Client wall("virtual_wall", server.address(), folder.path());
-  const std::string refused = wall.wait_for_line("refuses");
+  const std::string refused = wall.wait_for_line("refused");
   for (const std::string& line : {welcomed, refused}) {
     EXPECT_NE(line.find(R"(\x1b[2Jwall\n07:00:00.000 info the device is armed)"), std::string::npos) << line;
     EXPECT_EQ(line.find('\x1b'), std::string::npos) << line;

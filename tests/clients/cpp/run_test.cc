@@ -83,7 +83,7 @@ TEST(Run, WithHandsTogetherEachHasItsDeviceAndItsServer) {
   const std::string said = testing::internal::GetCapturedStderr();
   for (const std::string line :
        {"grasp at left: no answer from 127.0.0.1:9", "grasp at right: no answer from 127.0.0.1:19",
-        "grasp: this program selects its devices itself: expected no --device"}) {
+        "grasp: expected one or more devices in the program, no --device"}) {
     EXPECT_NE(said.find(line), std::string::npos) << said;
   }
 }

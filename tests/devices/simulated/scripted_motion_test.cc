@@ -173,7 +173,7 @@ TEST(ScriptedMotion, RefusesImpossibleScriptsAndNamesTheField) {
       {ScriptedMotion::MinimumJerk{.points = {Vec3::Zero(), Vec3::Zero()}, .durations = {0ms}},
        "minimum_jerk.durations = 0: expected durations above 0 s"},
       {Recorded{.samples = {{0, 0}}}, "recorded.samples (their number) = 1: expected 2 or more"},
-      {Recorded{.samples = {{0, 0}, {0, 1}}}, "recorded.samples.t = 0: expected a time after"},
+      {Recorded{.samples = {{0, 0}, {0, 1}}}, "recorded.samples.t = 0: expected a time later than"},
       {Recorded{.samples = {{0, 0}, {1, nan}}}, "recorded.samples.x = nan: expected a finite number"},
   };
   for (const auto& [script, says] : cases) {

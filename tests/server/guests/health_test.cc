@@ -94,7 +94,7 @@ TEST(HealthMeter, ABrokenAccelerationBoundDegradesTheDeviceInThatReportOnly) {
   meter.observe(step);
   const Health broken = meter.counted();
   EXPECT_EQ(broken.broken_assumptions, 1U);
-  EXPECT_EQ(report(before, broken).degraded, "acceleration above the limiter's bound");
+  EXPECT_EQ(report(before, broken).degraded, "acceleration too high");
   EXPECT_EQ(report(broken, broken).degraded, "");
 }
 
@@ -166,8 +166,8 @@ TEST(Health, SaysAllThatTheServerDoesLessOfWithinTheBoundOfAText) {
   now.device.values[static_cast<std::size_t>(DeviceCount::kSilences)] = 1;  // counter with the longest text
   const std::string degraded = report({}, now).degraded;
   EXPECT_EQ(degraded,
-            "no real time; the log thread is too slow; recording has stopped; unsent datagrams; acceleration above the "
-            "limiter's bound; device is silent");
+            "no real time; the log thread is too slow; recording has stopped; unsent datagrams; acceleration too high; "
+            "device is silent");
   EXPECT_LE(degraded.size(), limits::kMaxDetail);
 }
 

@@ -127,7 +127,7 @@ TEST(RosDevice, AWrenchCommandIsFeltWithItsSignAndIsToldBack) {
   stage.run(300, [&] { stage.command(kWriter, 0.5); });
   EXPECT_NEAR(stage.world.step.applied.x(), -0.5, 1e-9) << "the hand is pushed to the left";
   EXPECT_NEAR(stage.wrench.force.y(), 0.5, 1e-9);
-  EXPECT_TRUE(has(sentences_of(stage.device), "publisher 71 owns the device"));
+  EXPECT_TRUE(has(sentences_of(stage.device), "publisher 71 controls the device"));
 }
 
 TEST(RosDevice, AForceAlongEachAxisOfRep103IsFeltAlongTheHands) {
