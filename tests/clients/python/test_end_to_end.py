@@ -145,7 +145,7 @@ def test_a_second_controller_waits_and_takes_over_when_the_first_leaves(tmp_path
     with Server(tmp_path) as server, example(tmp_path, "virtual_wall", "--server", server.address) as first:
         first.wait_for_line("connected")
         with example(tmp_path, "virtual_wall", "--server", server.address) as second:
-            second.wait_for_line("refuses")
+            second.wait_for_line("refused")
             assert first.stop(signal.SIGINT) == 0
             second.wait_for_line("connected")
             assert second.stop() == 0
@@ -217,7 +217,7 @@ def test_an_engine_drives_the_device_that_it_names_and_no_other(tmp_path):
 def test_a_device_that_is_not_there_is_refused_for_good(tmp_path):
     with Server(tmp_path) as server:
         with example(tmp_path, "virtual_wall", "--server", server.address, "--device", "none") as engine:
-            engine.wait_for_line("refuses")
+            engine.wait_for_line("refused")
             assert engine.wait() == 1
 
 

@@ -61,7 +61,7 @@ describe("diagnostics", () => {
 
   it("neither a controller nor an untold observer asks for them", () => {
     assert.throws(() => new ForceClient({ diagnostics: true }, { physics: () => kPush }, () => {}, 0n),
-      /diagnostics = true: expected false: they are for observers only/);
+      /diagnostics = true: expected false: only observers can use diagnostics/);
     const world = new World(1, kFair, {}, { watch: () => {} });
     world.runMs(100);
     assert.deepEqual(world.server.hellos[0]!.hello.features, ["local-model", "channels", "handle"]);
