@@ -80,7 +80,7 @@ struct WaveMessage {
 template <int N>
 class WavePort {
  public:
-  static constexpr Duration kSmoothing = std::chrono::milliseconds(12);
+  static constexpr Duration kSmoothing = std::chrono::milliseconds(12);  ///< default of W
   struct Config {
     double impedance = 0;             ///< B, N·s/m; > 0
     Duration period{};                ///< T, hold time of a command; > 0
@@ -143,7 +143,7 @@ class WavePort {
   static constexpr double kPoorShare = 0.8;
   static constexpr double kReserves = 1.5;    ///< a missing part is made up with the energy beyond these reserves
   static constexpr double kTracking = 150.0;  ///< N/m, B/τ_x
-  static constexpr double kStill = 1.5;       ///< counts; a handle that stays within them for kStillFor does not move
+  static constexpr double kStill = 1.5;       ///< counts; v = 0 if the handle stays within them for kStillFor
   static constexpr Duration kStillFor = std::chrono::milliseconds(16);
 
   WaveMessage<N>& heard(std::size_t k) noexcept { return heard_[(begin_ + k) % kMost]; }

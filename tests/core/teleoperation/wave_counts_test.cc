@@ -17,7 +17,7 @@ constexpr std::optional<Preset> kBare;
 constexpr Friction kPhantom{.coulomb = 0.03, .viscous = 0.005};
 constexpr Friction kLight{.coulomb = 0.02, .viscous = 0.26};
 
-/// Two devices behind limiters, and 10 ms of network each way. The hand moves the leader.
+/// Couples two devices with limiters over a network with a delay of 10 ms. The hand moves the leader.
 Ports light_devices(double count, std::optional<Preset> preset, const Friction& friction, const Surroundings& hand,
                     const Surroundings& object) {
   PortSetup leader = port_of(PortRole::kLeader);

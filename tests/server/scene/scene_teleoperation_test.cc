@@ -46,6 +46,15 @@ TEST(SceneTeleoperation, HasWhatItListsAndTheRestIsSimple) {
   EXPECT_TRUE(scene.loop.control.limiter.shared_account);
 }
 
+TEST(SceneTeleoperation, KnowsTheCountsOfItsDevice) {
+  const auto step = [](const std::string& more) {
+    return minimal_and(kLeader + more).loop.control.coupling->encoder_step;
+  };
+  EXPECT_EQ(step("[device.effects]\nencoder_step_um = 100\n"), 1e-4);
+  EXPECT_EQ(step("[device.effects]\nencoder_step_um = 100\n[limiter.robust_ledger]\nencoder_step_um = 50\n"), 5e-5);
+  EXPECT_EQ(step("[device.effects]\nencoder_step_um = false\n"), 0);
+}
+
 TEST(SceneTeleoperation, TakesEveryKeyInItsUnit) {
   const Scene scene = minimal_and(R"([teleoperation]
 role = "follower"
