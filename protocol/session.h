@@ -42,13 +42,6 @@ struct LinkStats {
 /// A conversation between a client and a server, used by both. It does not use sockets, clocks, threads or random
 /// numbers: its inputs are bytes and times, and its owner pulls bytes and events.
 ///
-/// * States, forces, ports and reports are unreliable. Only the newest value of each device and channel is sent, and a
-///   received value that is not newer is dropped and counted.
-/// * Requests are reliable and in order: each one is resent until it is answered. Their order relative to states and
-///   forces is not guaranteed.
-/// * Each datagram contains its sending time and an Echo, which gives a round trip and an ack vector.
-/// * Keep-alives are sent if necessary, and the session is closed if the peer is silent for too long.
-///
 /// All queues are bounded: one state and one report per device, one force, port and report per channel, one link
 /// report, and limits::kRequestWindow requests in each direction. If an event was not pulled in time, a newer one of
 /// the same stream replaces it.
@@ -168,7 +161,6 @@ class Session {
   std::uint32_t connection_id() const noexcept;
   Suite suite() const noexcept;
   const LinkStats& stats() const noexcept;
-  /// The time stamps of the newest echo.
   const std::optional<ClockExchange>& newest_exchange() const noexcept;
   /// The offset of the peer's clock at the newest `now`, with an error bound. Empty before the first echo.
   std::optional<ClockOffsetEstimator::Estimate> peer_clock() const noexcept;

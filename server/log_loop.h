@@ -76,7 +76,7 @@ class LogLoop {
     DeviceCounts counts{};
     std::uint64_t steps_lost = 0;
     std::uint64_t ports_lost = 0;
-    std::array<PortPhase, limits::kMaxChannels> phase{};  ///< by channel
+    std::array<PortPhase, limits::kMaxChannels> phase{};
   };
   struct DeviceLog {
     Watched of;

@@ -58,21 +58,8 @@ struct HandedHello {
 };
 
 /// The data that the haptic thread of one device exchanges with the other threads of the server. There is no other
-/// shared state, and no locks are used.
-///
-///     network ──forces─▶ haptic      one slot per channel; only the newest value is kept
-///     network ──orders─▶ haptic      queue; none is dropped
-///     network ─outputs──▶ haptic     lamps and vibration, complete settings; only the newest value is kept
-///     network ──port in─▶ haptic     one slot per coupling: the peer's port; only the newest value is kept
-///     haptic  ──state──▶ network     only the newest value is kept
-///     haptic  ──port out▶ network    one slot per coupling: our port; only the newest value is kept
-///     haptic  ──steps──▶ log         queue, if the server records; overflow is counted
-///     haptic  ──ports──▶ log         queue, if the device is coupled; overflow is counted
-///     haptic  ──flight─▶ log         the steps before a fault; the haptic thread freezes them at the fault
-///     log     ──health─▶ network     counts since the start; only the newest value is kept
-///     network ──ways───▶ log         names of solver paths; each is written before the first force with its number
-///     network ─datagrams▶ log        queue, for all devices of the network thread, after DatagramSieve; what the sieve
-///                                    leaves out and overflow are counted
+/// shared state, and no locks are used. server/THREADS.md, "Queues", lists who writes and who reads each of them, and
+/// what happens if it is full. The name of a solver path in `ways` is written before the first force with its number.
 ///
 /// All memory is allocated by the constructor, before the loops run.
 struct Mailboxes {

@@ -32,20 +32,12 @@ namespace tendon {
 /// The function `turn` should be called by a single thread if a datagram has arrived, if a haptic loop has made a step,
 /// or if the time returned by the previous call has been reached.
 ///
-/// Each channel accepts forces from one controller at a time. Controllers can share a channel with a lease
-/// (SESSION.md). Observers only receive states. If they have requested kFeatureDiagnostics, they also receive a report
-/// about the device loops and engines once per second. Each turn drains the link to avoid queueing delays. If there are
-/// several forces for a channel, only the newest one is used. All requests are answered.
+/// Each turn drains the link to avoid queueing delays. If there are several forces for a channel, only the newest one
+/// is used. All requests are answered. SESSION.md describes sessions, leases and reports.
 ///
 /// The devices of a large server can be split between several loops (Shard). Each loop has its own thread and its own
 /// link, and there is no other shared state. All Hellos are received by one of the loops. If a Hello is intended for
 /// another loop, it must be forwarded by the owner of the loops (take_foreign, receive_foreign).
-///
-/// Without keys, sessions are not encrypted, and only clients on this machine are admitted. With keys, all sessions are
-/// sealed with one of `suites`, except through a Unix socket, where file permissions control access. A session is
-/// half-open until the first authentic Data datagram has been received. It does not affect other clients until then.
-/// The address of a client is updated with each authentic datagram that is newer than all previous ones. If a
-/// controller connects again with the same key, the previous session is replaced.
 ///
 /// The logic is implemented in separate files in guests/. See admission.h for new sessions, leases.h for the holders of
 /// channels, requests.h for the requests of clients, lateness.h for the causes of late forces, and reports.h for
@@ -103,7 +95,6 @@ class NetworkLoop {
     std::string why{};       ///< the reason for leaving
   };
 
-  /// A message for the log.
   struct Notice {
     bool warning = false;
     std::string text;

@@ -29,18 +29,7 @@
 
 namespace tendon {
 
-/// The threads and sockets of an Assembly. Each USB device has its own haptic thread, so that other devices do not wait
-/// for it. All other devices with the same period and processor share one thread (Assembly::HapticGroup).
-///
-/// | thread  | calls                         | waits for                               | may                     |
-/// |---------|-------------------------------|-----------------------------------------|-------------------------|
-/// | haptic… | HapticGroup::turn             | the absolute time of the next step      | nothing but compute     |
-/// | network… | turn_network, of its UdpLink | a datagram, a haptic step, a timer      | allocate, log rarely    |
-/// | log     | LogLoop::turn                 | 20 ms                                   | allocate, write, log    |
-/// | announce| Announcer, if a scene has one | D-Bus                                   | allocate, log           |
-///
-/// The threads only share the Mailboxes of each device. A large server has several network threads, each of which
-/// serves whole banks of devices (Shard).
+/// The threads (server/THREADS.md) and sockets of an Assembly. They only share the Mailboxes of each device.
 class Server {
  public:
   struct DeviceSummary {

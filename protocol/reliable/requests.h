@@ -10,11 +10,7 @@
 #include "protocol/limits.h"
 #include "protocol/wire/frame.h"
 
-// The reliable part of a session: requests arrive exactly once and in order, and each one is answered.
-//
-// Requests are numbered 1, 2, 3 … and resent until they are answered; there is no other acknowledgment. The responder
-// keeps its last 16 answers, and resends an answer if the request arrives again. This is sufficient because the
-// requester has at most 16 pending requests: if it sends request n + 16, it has already received answer n.
+// The reliable part of a session (SESSION.md, "Requests").
 
 namespace tendon {
 

@@ -23,12 +23,7 @@ struct ClientKey {
 using KeyId = std::array<std::byte, 8>;
 KeyId key_id(const Key& key) noexcept;
 
-// A key file is a text file with one line, not counting empty lines and lines starting with #:
-//
-//     controller 64 hexadecimal digits
-//
-// or `observer` and the digits. The server and the client use the same file.
-
+/// The text of a key file (WIRE.md, "Key file").
 std::string key_file_text(const ClientKey& key);
 
 /// Parses a key file with the permissions `mode` (st_mode). Throws std::invalid_argument if other users have access to

@@ -22,7 +22,6 @@ inline constexpr std::array kSealedSuites = {NamedSuite{Suite::kAesGcm, "aes-256
 inline constexpr std::string_view kFeatureAesGcm = kSealedSuites[0].name;
 static_assert(kSealedSuites[0].suite == Suite::kAesGcm);
 
-/// A set of sealed suites.
 using Suites = std::vector<Suite>;
 
 Suites all_suites();

@@ -390,8 +390,6 @@ void declare_port(Table& keys, std::string& port) {
            Absent{.text = "the first device that is not in use"});
 }
 
-// The keys of each kind of device.
-
 template <class Table>
 void declare(Table& keys, SimulatedDevice::Config& /*device*/, Draft& draft) {
   SimulatedDevice::Config& config = draft.simulated;
