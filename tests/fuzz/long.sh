@@ -4,7 +4,7 @@
 # executions (default: 10 000 000), which takes hours. Each target writes its findings to build/asan/long/TARGET/ and
 # its log to TARGET.log there. TARGET/minimised then contains the inputs that reach the same coverage. If they reach
 # more than the committed corpus, pack them with the command in the last line of the output, and commit the result with
-# the figures for README.md.
+# the figures for tests/tools/bench/RESULTS.md.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 runs=${1:-10000000}
