@@ -3,33 +3,15 @@
 
 #include <algorithm>
 #include <cmath>
-#include <utility>
+
+#include "core/control/law_support.h"
 
 namespace tendon {
 
-namespace {
-
-template <std::size_t Count, std::size_t... I>
-std::array<EnergyLedger, Count> ledgers_of(const std::array<Friction, Count>& friction, std::index_sequence<I...>) {
-  return {EnergyLedger(friction[I])...};
-}
-
-template <std::size_t Count>
-std::array<EnergyLedger, Count> ledgers_of(const std::array<Friction, Count>& friction) {
-  return ledgers_of(friction, std::make_index_sequence<Count>());
-}
-
-template <int N>
-std::array<Friction, N> repeated(const Friction& friction) {
-  std::array<Friction, N> all;
-  all.fill(friction);
-  return all;
-}
-
-}  // namespace
-
 template <int Blocks, int Size>
-Aol<Blocks, Size>::Aol(const Config& config) : friction_(config.friction), ledgers_(ledgers_of(config.friction)) {
+Aol<Blocks, Size>::Aol(const Config& config)
+    : friction_(config.friction),
+      ledgers_(law_support::each<EnergyLedger, Blocks>([&](std::size_t i) { return config.friction[i]; })) {
   for (std::size_t i = 0; i < bounds_.size(); ++i) {
     bounds_[i] = OutputBound::of(config.friction[i], config.longest_hold);
   }
@@ -112,7 +94,7 @@ template class Aol<2, 3>;
 template <int N>
 PerAxisAol<N>::PerAxisAol(const Config& config)
     : friction_(config.friction),
-      ledgers_(ledgers_of(repeated<N>(config.friction))),
+      ledgers_(law_support::each<EnergyLedger, N>([&](std::size_t) { return config.friction; })),
       bound_(OutputBound::of(config.friction, config.longest_hold)) {}
 
 template <int N>

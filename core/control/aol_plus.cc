@@ -5,10 +5,10 @@
 #include <cmath>
 #include <stdexcept>
 #include <string>
-#include <utility>
 
 #include "core/base/expect.h"
 #include "core/base/portable_math.h"
+#include "core/control/law_support.h"
 
 namespace tendon {
 
@@ -26,11 +26,6 @@ constexpr double kMostDamping = 1;     // share of the damped force
 constexpr double kDamperMemory = 0.3;  // s, time constant of the debt of the damper
 constexpr double kCountsAhead = 4;     // a growing force must be able to pay for this number of counts
 constexpr double kEuler = 2.718281828459045;
-
-template <class Ledger, std::size_t Count, class Make, std::size_t... I>
-std::array<Ledger, Count> each(const Make& make, std::index_sequence<I...>) {
-  return {Ledger(make(I))...};
-}
 
 template <int Blocks, int Size>
 void check(const typename AolPlus<Blocks, Size>::Config& config) {
@@ -95,18 +90,14 @@ AolPlus<Blocks, Size>::AolPlus(const Config& config)
       shared_(config.shared_account),
       friction_(config.friction),
       longest_hold_(config.longest_hold),
-      ledgers_(each<EnergyLedger, Blocks>([&config](std::size_t i) { return config.friction[i]; },
-                                          std::make_index_sequence<Blocks>())),
+      ledgers_(law_support::each<EnergyLedger, Blocks>([&](std::size_t i) { return config.friction[i]; })),
       target_(config.friction) {
   check<Blocks, Size>(config);
-  constexpr auto kEach = std::make_index_sequence<Blocks>();
   if (const auto& robust = config.parts.robust_ledger) {
-    robust_ = each<RobustLedger<Size>, Blocks>(
-        [&](std::size_t i) {
-          return typename RobustLedger<Size>::Config{
-              .friction = config.friction[i], .encoder_step = robust->encoder_step[i], .window = robust->window};
-        },
-        kEach);
+    robust_ = law_support::each<RobustLedger<Size>, Blocks>([&](std::size_t i) {
+      return typename RobustLedger<Size>::Config{
+          .friction = config.friction[i], .encoder_step = robust->encoder_step[i], .window = robust->window};
+    });
   }
   for (std::size_t i = 0; i < bounds_.size(); ++i) use(i, config.friction[i]);
   const Damper damper = config.parts.damper.value_or(Damper{});
@@ -328,35 +319,22 @@ template <int Blocks, int Size>
   return bound;
 }
 
-/// The largest share of `force` that the account permits; can exceed 1.
-template <int Blocks, int Size>
-double AolPlus<Blocks, Size>::largest_share(const Vec<kSize>& force, double budget) const noexcept {
-  std::array<double, Blocks> sizes{};
-  std::array<OutputBound, Blocks> bounds;
-  for (int i = 0; i < Blocks; ++i) {
-    const auto block = static_cast<std::size_t>(i);
-    const Vec<Size> part = force.template segment<Size>(i * Size);
-    sizes[block] = part.norm();
-    bounds[block] = bound_along(block, part, sizes[block]);
-  }
-  return largest_scale(bounds, sizes, budget);
-}
-
 /// ℓ_s of a group of coordinates.
 template <int Blocks, int Size>
 OutputBound AolPlus<Blocks, Size>::shaping_along(std::size_t block) const noexcept {
   return {.coulomb = friction_[block].coulomb, .viscous_per_hold = parts_.shaping->stiffness[block] / 2};
 }
 
-/// As largest_share, for shaping.
+/// The largest share of `force` that the account permits, by ℓ or (`shaping`) by ℓ_s; can exceed 1.
 template <int Blocks, int Size>
-double AolPlus<Blocks, Size>::shaped_share(const Vec<kSize>& force, double budget) const noexcept {
+double AolPlus<Blocks, Size>::largest_share(const Vec<kSize>& force, double budget, bool shaping) const noexcept {
   std::array<double, Blocks> sizes{};
   std::array<OutputBound, Blocks> bounds;
   for (int i = 0; i < Blocks; ++i) {
     const auto block = static_cast<std::size_t>(i);
-    sizes[block] = force.template segment<Size>(i * Size).norm();
-    bounds[block] = shaping_along(block);
+    const Vec<Size> part = force.template segment<Size>(i * Size);
+    sizes[block] = part.norm();
+    bounds[block] = shaping ? shaping_along(block) : bound_along(block, part, sizes[block]);
   }
   return largest_scale(bounds, sizes, budget);
 }
@@ -467,7 +445,7 @@ auto AolPlus<Blocks, Size>::limit(const Demand<kSize>& wanted) noexcept -> Limit
     scale = size > 0 ? permitted / size : 1;
   } else {
     scale = largest_share(force, budget);
-    if (parts_.shaping) scale = std::min(scale, shaped_share(force, budget));
+    if (parts_.shaping) scale = std::min(scale, largest_share(force, budget, true));
     permitted = size > 0 ? scale * size : 0;
   }
 

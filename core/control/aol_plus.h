@@ -14,7 +14,7 @@
 namespace tendon {
 
 /// AOL+ is the Adjusting Output-Limiter with optional parts for real devices. Without parts it is equal to Aol<Blocks,
-/// Size>, bit for bit.
+/// Size>: bit for bit with one group of coordinates, and up to rounding with several.
 ///
 ///     E ← E + the last interval                     exactly, or as robust_ledger does
 ///     E ← min(E, E_cap + C)                         energy_cap
@@ -197,9 +197,8 @@ class AolPlus {
   void forget_velocity() noexcept;
   double count(std::size_t block) const noexcept;
   OutputBound bound_along(std::size_t block, const Vec<Size>& force, double size) const noexcept;
-  double largest_share(const Vec<kSize>& force, double budget) const noexcept;
   OutputBound shaping_along(std::size_t block) const noexcept;
-  double shaped_share(const Vec<kSize>& force, double budget) const noexcept;
+  double largest_share(const Vec<kSize>& force, double budget, bool shaping = false) const noexcept;
   double give_back(const Vec<kSize>& force, double size, double near, double budget) const noexcept;
   double grow(double size, double budget) const noexcept;
   double stiff(std::size_t block) const noexcept;

@@ -2,7 +2,10 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstddef>
+#include <utility>
 
 #include "core/base/expect.h"
 #include "core/control/stability_controller.h"
@@ -20,6 +23,13 @@ inline double checked_hold(Duration longest_hold) {
 inline double checked_viscous(double viscous) {
   expect_above_zero(viscous, "friction.viscous");
   return viscous;
+}
+
+/// Returns T(make(0)), …, T(make(Count − 1)), for a T without a default constructor.
+template <class T, std::size_t Count, class Make>
+std::array<T, Count> each(const Make& make) {
+  return [&make]<std::size_t... I>(std::index_sequence<I...>) { return std::array<T, Count>{T(make(I))...}; }
+  (std::make_index_sequence<Count>());
 }
 
 /// Whether the values and their squares are finite.

@@ -34,6 +34,10 @@ struct Bench {
     last = step;
     return step;
   }
+  /// Moves from 0 to `steps` · 0.2 mm at 0.2 m/s.
+  void move_freely(int steps) {
+    for (int i = 0; i <= steps; ++i) move_to(i * 2e-4);
+  }
   void want(double force) {
     RemoteForce remote;
     remote.sequence = ++sequence;
@@ -97,8 +101,7 @@ TEST(HapticController, AnOverrunIsBookedAsItWasAndFlagged) {
 
 // Stores some energy, requests a force, then pauses while the hand follows the force (worst case).
 Step after_a_pause(Bench& bench, Duration pause) {
-  bench.move_to(0);
-  for (int i = 1; i <= 100; ++i) bench.move_to(i * 2e-4);
+  bench.move_freely(100);
   bench.want(-6);
   const Step before = bench.move_to(0.02);
   const double follows = seconds(pause) * (before.force.norm() - 0.05) / (2 * 0.26);
@@ -145,8 +148,7 @@ TEST(HapticController, TheSecondHoldAsLongAsALateOneTakesNothing) {
 
 TEST(HapticController, TheIntervalAfterAnUnseenStepIsBookedAtItsWorst) {
   Bench bench(config());
-  bench.move_to(0);
-  for (int i = 1; i <= 100; ++i) bench.move_to(i * 2e-4);
+  bench.move_freely(100);
   bench.want(-6);
   const Step before = bench.move_to(0.02);
   bench.now += milliseconds(1);
@@ -198,8 +200,7 @@ TEST(HapticController, APauseBeyondTheWatchdogIsChargedTheWorstNoMore) {
   HapticController::Config c = config();
   c.watchdog = milliseconds(5);
   Bench bench(c);
-  bench.move_to(0);
-  for (int i = 1; i <= 100; ++i) bench.move_to(i * 2e-4);
+  bench.move_freely(100);
   bench.want(-6);
   const Step before = bench.move_to(0.02);
   const Step after = bench.move_to(0.07, milliseconds(60));  // a long motion with the force off earns no credit
@@ -219,8 +220,7 @@ TEST(HapticController, LongestHoldEqualToWatchdogKeepsLedgerNonnegative) {
 
 TEST(HapticController, NotANumberForceIsRefusedAndTheOneBeforeGoesOn) {
   Bench bench(config());
-  bench.move_to(0);
-  for (int i = 1; i <= 100; ++i) bench.move_to(i * 2e-4);
+  bench.move_freely(100);
   bench.want(-0.5);
   const double before = bench.move_to(0.02).force.x();
   bench.want(std::nan(""));
@@ -229,8 +229,7 @@ TEST(HapticController, NotANumberForceIsRefusedAndTheOneBeforeGoesOn) {
 
 TEST(HapticController, ANanPositionZeroesForceFreezesLedgerLatchesFault) {
   Bench bench(config());
-  bench.move_to(0);
-  for (int i = 1; i <= 100; ++i) bench.move_to(i * 2e-4);
+  bench.move_freely(100);
   bench.want(-0.5);
   bench.move_to(0.02);
   const double energy = bench.last.energy;
@@ -249,8 +248,7 @@ TEST(HapticController, AnImpossiblePositionIsAFaultAndEarnsNothing) {
   HapticController::Config c = config();
   c.max_speed = 10;
   Bench bench(c);
-  bench.move_to(0);
-  for (int i = 1; i <= 100; ++i) bench.move_to(i * 2e-4);
+  bench.move_freely(100);
   bench.want(-0.5);
   bench.move_to(0.02 + 0.0099);
   ASSERT_EQ(bench.controller.fault(), HapticController::Fault::kNone);
@@ -356,8 +354,7 @@ TEST(HapticController, WhenTimeGoesBackTheForceStaysAsItIs) {
   HapticController::Config c = config();
   c.max_slew = 500;
   Bench bench(c);
-  bench.move_to(0);
-  for (int i = 1; i <= 400; ++i) bench.move_to(i * 2e-4);
+  bench.move_freely(400);
   bench.want(-2);
   bench.move_to(0.08);
   bench.move_to(0.08);
@@ -371,8 +368,7 @@ TEST(HapticController, TheForceNeverGrowsFasterThanTheSlewLimit) {
   HapticController::Config c = config();
   c.max_slew = 500;
   Bench bench(c);
-  bench.move_to(0);
-  for (int i = 1; i <= 400; ++i) bench.move_to(i * 2e-4);
+  bench.move_freely(400);
   bench.want(-2);
   double before = bench.applied.x();
   for (int i = 0; i < 20; ++i) {
@@ -390,8 +386,7 @@ TEST(HapticController, APauseDoesNotLetTheForceJump) {
   HapticController::Config c = config();
   c.max_slew = 500;
   Bench bench(c);
-  bench.move_to(0);
-  for (int i = 1; i <= 400; ++i) bench.move_to(i * 2e-4);
+  bench.move_freely(400);
   bench.want(-4);
   EXPECT_LE(bench.move_to(0.08, milliseconds(60)).force.norm(), 0.5 + 1e-12);
 }
@@ -400,8 +395,7 @@ TEST(HapticController, StaysWithinTheDevicesForceAndSaysSo) {
   HapticController::Config c = config();
   c.max_force = 2;
   Bench bench(c);
-  bench.move_to(0);
-  for (int i = 1; i <= 400; ++i) bench.move_to(i * 2e-4);
+  bench.move_freely(400);
   bench.want(-100);
   const Step step = bench.move_to(0.08);
   EXPECT_DOUBLE_EQ(step.force.norm(), 2);
