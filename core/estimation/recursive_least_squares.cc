@@ -6,8 +6,6 @@
 
 #include "core/base/expect.h"
 
-#include "core/base/portable_math.h"
-
 namespace tendon {
 namespace {
 
@@ -23,25 +21,6 @@ const LeastSquaresConfig& checked(const LeastSquaresConfig& config) {
 template <class Scalar>
 Scalar capped(Scalar forgetting, Scalar trace, Scalar cap) noexcept {
   return std::max(forgetting, std::min(Scalar(1), trace / cap));
-}
-
-/// Solves R θ = z. The pivots of R are never zero.
-template <int M, class Scalar>
-Eigen::Matrix<Scalar, M, 1> solved(const Eigen::Matrix<Scalar, M, M>& r, Eigen::Matrix<Scalar, M, 1> z) noexcept {
-  for (int i = M - 1; i >= 0; --i) {
-    for (int j = i + 1; j < M; ++j) z[i] -= r(i, j) * z[j];
-    z[i] /= r(i, i);
-  }
-  return z;
-}
-
-template <int M, class Scalar>
-Eigen::Matrix<Scalar, M, M> inverse(const Eigen::Matrix<Scalar, M, M>& r) noexcept {
-  Eigen::Matrix<Scalar, M, M> inverse;
-  for (int j = 0; j < M; ++j) {
-    inverse.col(j) = solved<M, Scalar>(r, Eigen::Matrix<Scalar, M, 1>::Unit(j));
-  }
-  return inverse;
 }
 
 }  // namespace
@@ -102,67 +81,6 @@ bool UdLeastSquares<M, Scalar>::observe(const Vector& regressor, Scalar y) noexc
   return true;
 }
 
-template <int M, class Scalar>
-QrLeastSquares<M, Scalar>::QrLeastSquares(const LeastSquaresConfig& config)
-    : forgetting_(static_cast<Scalar>(checked(config).forgetting)),
-      prior_variance_(static_cast<Scalar>(config.prior_variance)),
-      dead_zone_(static_cast<Scalar>(config.dead_zone)) {
-  reset();
-}
-
-template <int M, class Scalar>
-void QrLeastSquares<M, Scalar>::reset() noexcept {
-  r_ = Matrix::Identity() / std::sqrt(prior_variance_);
-  z_ = r_ * estimate_;
-}
-
-template <int M, class Scalar>
-void QrLeastSquares<M, Scalar>::set_estimate(const Vector& estimate) noexcept {
-  estimate_ = estimate;
-  z_ = r_ * estimate_;
-}
-
-template <int M, class Scalar>
-typename QrLeastSquares<M, Scalar>::Matrix QrLeastSquares<M, Scalar>::covariance() const noexcept {
-  const Matrix root = inverse<M, Scalar>(r_);
-  return root * root.transpose();
-}
-
-template <int M, class Scalar>
-Scalar QrLeastSquares<M, Scalar>::trace() const noexcept {
-  return inverse<M, Scalar>(r_).squaredNorm();
-}
-
-template <int M, class Scalar>
-bool QrLeastSquares<M, Scalar>::observe(const Vector& regressor, Scalar y) noexcept {
-  if (!regressor.allFinite() || !std::isfinite(y)) return false;
-  if (std::abs(y - regressor.dot(estimate_)) < dead_zone_) return false;
-
-  const Scalar root = std::sqrt(capped(forgetting_, trace(), Scalar(M) * prior_variance_));
-  Matrix r = r_ * root;
-  Vector z = z_ * root;
-  Vector row = regressor;
-  for (int i = 0; i < M; ++i) {
-    const Scalar length = portable::hypot(r(i, i), row[i]);
-    const Scalar c = r(i, i) / length;
-    const Scalar s = row[i] / length;
-    for (int j = i; j < M; ++j) {
-      const Scalar above = r(i, j);
-      r(i, j) = c * above + s * row[j];
-      row[j] = c * row[j] - s * above;
-    }
-    const Scalar above = z[i];
-    z[i] = c * above + s * y;
-    y = c * y - s * above;
-  }
-  const Vector estimate = solved<M, Scalar>(r, z);
-  if (!(r.diagonal().minCoeff() > 0 && r.allFinite() && estimate.allFinite())) return false;
-  r_ = r;
-  z_ = z;
-  estimate_ = estimate;
-  return true;
-}
-
 template class UdLeastSquares<1, float>;
 template class UdLeastSquares<2, float>;
 template class UdLeastSquares<3, float>;
@@ -171,13 +89,5 @@ template class UdLeastSquares<1, double>;
 template class UdLeastSquares<2, double>;
 template class UdLeastSquares<3, double>;
 template class UdLeastSquares<4, double>;
-template class QrLeastSquares<1, float>;
-template class QrLeastSquares<2, float>;
-template class QrLeastSquares<3, float>;
-template class QrLeastSquares<4, float>;
-template class QrLeastSquares<1, double>;
-template class QrLeastSquares<2, double>;
-template class QrLeastSquares<3, double>;
-template class QrLeastSquares<4, double>;
 
 }  // namespace tendon

@@ -68,38 +68,4 @@ class UdLeastSquares {
   Vector estimate_ = Vector::Zero();
 };
 
-/// The same estimator as UdLeastSquares in square-root information form, RᵀR = P⁻¹ and Rθ = z, updated by Givens
-/// rotations of [R z] with the row [φᵀ y]. It needs square roots and one back-substitution per sample. In return its
-/// error grows with the condition number of R, not of P. The contract and the results are the same.
-///
-/// Source: Golub and Van Loan, "Matrix Computations", 5.1 (Givens rotations).
-///
-/// Thread-safe: no. Realtime-safe: yes; O(M²) per sample. Instantiated for M = 1…4, float and double.
-template <int M, class Scalar = double>
-class QrLeastSquares {
- public:
-  using Vector = Eigen::Matrix<Scalar, M, 1>;
-  using Matrix = Eigen::Matrix<Scalar, M, M>;
-
-  explicit QrLeastSquares(const LeastSquaresConfig& config = {});
-  bool observe(const Vector& regressor, Scalar y) noexcept;
-  const Vector& estimate() const noexcept { return estimate_; }
-  void set_estimate(const Vector& estimate) noexcept;
-  void reset() noexcept;
-
-  /// As for UdLeastSquares, with D_i = 1/R_ii².
-  Vector pivots() const noexcept { return r_.diagonal().array().square().inverse().matrix(); }
-
-  Matrix covariance() const noexcept;
-  Scalar trace() const noexcept;
-
- private:
-  Scalar forgetting_;
-  Scalar prior_variance_;
-  Scalar dead_zone_;
-  Matrix r_ = Matrix::Zero();
-  Vector z_ = Vector::Zero();
-  Vector estimate_ = Vector::Zero();
-};
-
 }  // namespace tendon

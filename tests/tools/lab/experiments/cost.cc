@@ -142,8 +142,6 @@ void fit_lines(const Bench& bench, std::vector<Costed>& lines) {
   const std::string order = ", order " + std::to_string(M) + ", ";
   lines.push_back(fit_line<UdLeastSquares<M, double>, M, double>(bench, "UD" + order + "float64"));
   lines.push_back(fit_line<UdLeastSquares<M, float>, M, float>(bench, "UD" + order + "float32"));
-  lines.push_back(fit_line<QrLeastSquares<M, double>, M, double>(bench, "QR" + order + "float64"));
-  lines.push_back(fit_line<QrLeastSquares<M, float>, M, float>(bench, "QR" + order + "float32"));
 }
 
 std::vector<Costed> measure(const Bench& bench) {

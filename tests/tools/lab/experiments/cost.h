@@ -14,7 +14,7 @@ struct CostOptions {
 };
 
 /// `tendon-lab cost`: time (and instructions, if the kernel counts them) per step of each law, each part of AOL+, each
-/// model of the output estimator, and each form and order of its least squares in float32 and float64, with the
+/// model of the output estimator, and each order of its least squares in float32 and float64, with the
 /// remaining force error. The baseline, an empty loop in the same run, is not subtracted.
 void cost(const CostOptions& options, std::ostream& out);
 
