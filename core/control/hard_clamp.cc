@@ -11,16 +11,6 @@ HardClamp<N>::HardClamp(const Config& config) : max_force_(config.max_force), po
 }
 
 template <int N>
-void HardClamp<N>::observe(const Interval<N>& interval) noexcept {
-  port_.observe(interval.applied, interval.dx, interval.held);
-}
-
-template <int N>
-void HardClamp<N>::observe_unseen(const Vec<N>& applied, Duration at_most) noexcept {
-  port_.observe_unseen(applied.norm(), at_most);
-}
-
-template <int N>
 LimitedForce<N> HardClamp<N>::limit(const Demand<N>& demand) noexcept {
   if (!law_support::finite(demand)) return law_support::refused<N>(max_force_);
   return law_support::bounded<N>(demand.force, max_force_, Reason::kMaxForce);

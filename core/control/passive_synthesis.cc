@@ -18,16 +18,6 @@ PassiveSynthesis<N>::PassiveSynthesis(const Config& config)
 }
 
 template <int N>
-void PassiveSynthesis<N>::observe(const Interval<N>& interval) noexcept {
-  port_.observe(interval.applied, interval.dx, interval.held);
-}
-
-template <int N>
-void PassiveSynthesis<N>::observe_unseen(const Vec<N>& applied, Duration at_most) noexcept {
-  port_.observe_unseen(applied.norm(), at_most);
-}
-
-template <int N>
 LimitedForce<N> PassiveSynthesis<N>::limit(const Demand<N>& demand) noexcept {
   if (!law_support::finite(demand)) return law_support::refused<N>(kNoBound);
   steepest_ = std::max(steepest_, law_support::spectral_norm<N>(demand.stiffness));

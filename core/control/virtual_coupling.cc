@@ -16,16 +16,6 @@ VirtualCoupling<N>::VirtualCoupling(const Config& config)
 }
 
 template <int N>
-void VirtualCoupling<N>::observe(const Interval<N>& interval) noexcept {
-  port_.observe(interval.applied, interval.dx, interval.held);
-}
-
-template <int N>
-void VirtualCoupling<N>::observe_unseen(const Vec<N>& applied, Duration at_most) noexcept {
-  port_.observe_unseen(applied.norm(), at_most);
-}
-
-template <int N>
 LimitedForce<N> VirtualCoupling<N>::limit(const Demand<N>& demand) noexcept {
   if (!law_support::finite(demand)) {
     stretch_.setZero();

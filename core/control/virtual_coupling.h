@@ -39,8 +39,10 @@ class VirtualCoupling {
   /// Throws std::invalid_argument if a field is out of range.
   explicit VirtualCoupling(const Config& config);
 
-  void observe(const Interval<N>& interval) noexcept;
-  void observe_unseen(const Vec<N>& applied, Duration at_most) noexcept;
+  void observe(const Interval<N>& interval) noexcept { port_.observe(interval.applied, interval.dx, interval.held); }
+  void observe_unseen(const Vec<N>& applied, Duration at_most) noexcept {
+    port_.observe_unseen(applied.norm(), at_most);
+  }
   LimitedForce<N> limit(const Demand<N>& demand) noexcept;
   double energy() const noexcept { return port_.energy(); }
 
