@@ -1,11 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <concepts>
 #include <cstdint>
 #include <filesystem>
 #include <optional>
-#include <string_view>
 #include <vector>
 
 #include "core/control/preset.h"
@@ -71,25 +69,6 @@ struct Draft {
 
 /// N. For a device without motors. Large enough to record the forces of the engines without changes.
 inline constexpr double kUnfelt = 10;
-
-/// `part` is the description for `tendond explain` if the key or table is a part that can be removed from a scene.
-struct Name {
-  std::string_view name;
-  std::string_view part;
-
-  template <std::convertible_to<std::string_view> Text>
-  Name(const Text& text, std::string_view what = {}) : name(text), part(what) {}
-};
-
-struct NoKeys {
-  void operator()(const auto& /*table*/) const {}
-};
-
-struct Absent {
-  bool required = false;
-  std::string_view text = {};
-};
-inline constexpr Absent kRequired = {.required = true};
 
 template <class Table>
 void declare_scene(Table& scene, Draft& draft);

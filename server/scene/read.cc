@@ -13,7 +13,6 @@
 #include <unordered_map>
 #include <utility>
 
-#include "core/base/nearest_word.h"
 #include "protocol/limits.h"
 #include "server/guests/guest.h"
 #include "server/machine/regular_file.h"
@@ -25,25 +24,6 @@
 
 namespace tendon {
 namespace {
-
-/// Returns the value after the = in this line if it starts like a number. The first line is 1.
-std::string_view bare_value(std::string_view text, std::size_t line) {
-  for (; line > 1; --line) text.remove_prefix(std::min(text.find('\n'), text.size() - 1) + 1);
-  text = text.substr(0, text.find_first_of("\n#"));
-  text.remove_prefix(std::min(text.find('='), text.size() - 1) + 1);
-  text.remove_prefix(std::min(text.find_first_not_of(" \t"), text.size()));
-  return text.find_first_of("+-.0123456789") == 0 ? text : std::string_view();
-}
-
-toml::table parse_toml(std::string_view text, const std::string& name) {
-  try {
-    return toml::parse(text);
-  } catch (const toml::parse_error& error) {
-    const std::size_t line = error.source().begin.line;
-    throw SceneError(name + ':' + std::to_string(line) + ": not TOML: " + std::string(error.description()) +
-                     std::string(decimal_point_hint(bare_value(text, line))));
-  }
-}
 
 /// "TABLE.KEY=VALUE" sets a key, and "TABLE.KEY=" removes it.
 void apply_setting(toml::table& file, const std::string& setting) {
@@ -109,7 +89,7 @@ Scene parse_scene(std::string_view text, const std::string& name, const std::fil
   if (text.size() > kMaxSceneBytes) {
     throw SceneError(name + ": expected a scene of at most " + std::to_string(kMaxSceneBytes) + " bytes, found more");
   }
-  toml::table file = parse_toml(text, name);
+  toml::table file = scene_file::parse_toml(text, name);
   for (const std::string& setting : settings) apply_setting(file, setting);
   scene_file::Draft draft;
   draft.scene.text = settings.empty() ? std::string(text) : text_of(file);

@@ -6,7 +6,9 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <initializer_list>
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <type_traits>
@@ -14,10 +16,9 @@
 #include <vector>
 
 #include "core/base/nearest_word.h"
-#include "server/scene/keys.h"
 #include "server/scene/values.h"
 
-// Internal to server/scene.
+// Only the declarations of keys use this.
 
 namespace tendon::scene_file {
 
@@ -36,6 +37,9 @@ struct Place {
 };
 
 Place place_of(const toml::node& node);
+
+/// Throws a SceneError if the text is not TOML. `name` is the start of the message.
+toml::table parse_toml(std::string_view text, const std::string& name);
 
 /// Throws SceneError "FILE:LINE: KEY: SENTENCE".
 [[noreturn]] void fail(const std::string& file, Place at, const std::string& key, const std::string& sentence);
@@ -66,6 +70,31 @@ class SceneProblems {
   }
 
   std::optional<Problem> first_;
+};
+
+/// Reports inconsistencies between several keys of a file.
+class SceneErrors {
+ public:
+  /// `name` is the start of error messages. Both arguments must outlive this object.
+  SceneErrors(const toml::table& file, const std::string& name) : file_(file), name_(name) {}
+
+  /// Throws a SceneError with the line of the first of `places` that exists in the file, or of the innermost table that
+  /// contains the key.
+  [[noreturn]] void blame(std::string_view key, std::initializer_list<std::string_view> places,
+                          const std::string& sentence) const;
+
+  template <class Build>
+  void build(std::string_view table, const Build& attempt) const {
+    try {
+      attempt();
+    } catch (const std::invalid_argument& refused) {
+      blame(table, {}, refused.what());
+    }
+  }
+
+ protected:
+  const toml::table& file_;
+  const std::string& name_;
 };
 
 /// Reads the keys of a table from the file. `table` is null if it is not in the file.
@@ -151,6 +180,15 @@ class Reader {
       declare(inner, target.emplace_back());
       inner.refuse_unknown();
     }
+  }
+
+  /// Exactly one of two keys must be in the file. Returns true if it is the first one.
+  bool either(std::string_view first, std::string_view second) {
+    const bool found = look_up(first) != nullptr;
+    if (found == (look_up(second) != nullptr)) {
+      problems_.wrong(place_, path_, "expected either " + std::string(first) + " or " + std::string(second));
+    }
+    return found;
   }
 
   void refuse_unknown() const {

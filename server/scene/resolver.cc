@@ -564,20 +564,6 @@ class SceneResolver : SceneErrors {
 
 }  // namespace
 
-void SceneErrors::blame(std::string_view key, std::initializer_list<std::string_view> places,
-                        const std::string& sentence) const {
-  Place place;
-  const auto look = [&](std::string_view path) {
-    if (const auto node = file_.at_path(path); node && place.line == 0) place = place_of(*node.node());
-  };
-  for (const std::string_view path : places) look(path);
-  for (std::string_view path = key;; path = path.substr(0, path.rfind('.'))) {
-    look(path);
-    if (path.find('.') == std::string_view::npos) break;
-  }
-  fail(name_, place, std::string(key), sentence);
-}
-
 Scene resolve(Draft draft, const toml::table& file, const std::string& name, const std::filesystem::path& directory) {
   return SceneResolver(std::move(draft), file, name).scene(directory);
 }

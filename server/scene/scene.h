@@ -25,6 +25,7 @@
 #include "server/haptic_loop.h"
 #include "server/network_loop.h"
 #include "server/recording/keep.h"
+#include "server/scene/scene_error.h"
 
 namespace tendon {
 
@@ -119,22 +120,11 @@ std::string_view needs_one_network_thread(const std::vector<Scene>& scenes);
 /// In the order of Scene::AnyDevice.
 const std::vector<const Driver*>& drivers();
 
-/// The message is "FILE:LINE: KEY: expected …, found …". The line is omitted if it is unknown, for example because a
-/// table is missing. The key is omitted for syntax errors.
-class SceneError : public std::runtime_error {
- public:
-  using std::runtime_error::runtime_error;
-};
-
 /// Thrown if a scene file, or a file that is used by a scene, cannot be read.
 class SceneFileError : public SceneError {
  public:
   using SceneError::SceneError;
 };
-
-/// Bytes. Protects against files of other types. With deeply nested tables, a file of 4 times this size causes a stack
-/// overflow in toml++ if the stack has 8 MiB.
-inline constexpr std::size_t kMaxSceneBytes = 16'384;
 
 /// Throws SceneError if the scene is not valid, and SceneFileError if the file cannot be read or is not a regular file.
 /// The first error in the file is reported. Missing keys are only reported if there are no other errors, because a

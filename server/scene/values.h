@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <concepts>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
@@ -25,12 +26,31 @@
 #include "protocol/limits.h"
 #include "protocol/link.h"
 
-// The representation of values in a scene file. Internal to server/scene.
+// The representation of keys and values in a scene file. Only the declarations of keys use this.
 //
 // A rule specifies the valid values of a key, which are described by `expected(unit)`. `take(node, unit, to)` converts
 // a value to SI units, or returns an error. `shown(unit, value)` is the inverse.
 
 namespace tendon::scene_file {
+
+/// `part` is the description for `tendond explain` if the key or table is a part that can be removed from a scene.
+struct Name {
+  std::string_view name;
+  std::string_view part;
+
+  template <std::convertible_to<std::string_view> Text>
+  Name(const Text& text, std::string_view what = {}) : name(text), part(what) {}
+};
+
+struct NoKeys {
+  void operator()(const auto& /*table*/) const {}
+};
+
+struct Absent {
+  bool required = false;
+  std::string_view text = {};
+};
+inline constexpr Absent kRequired = {.required = true};
 
 /// Specified by the suffix of a key.
 struct Unit {
@@ -193,22 +213,24 @@ struct Count {
 };
 
 struct Vector {
+  Number each = kAnyNumber;
+
   static std::string expected(const Unit& unit) {
     return unit.symbol.empty() ? "[x, y, z]" : "[x, y, z] in " + std::string(unit.symbol);
   }
 
-  static Verdict take(const toml::node& node, const Unit& unit, Vec3& to) {
+  Verdict take(const toml::node& node, const Unit& unit, Vec3& to) const {
     const auto* array = node.as_array();
     if (array == nullptr || array->size() != 3) return Refusal{&node, expected(unit)};
     Vec3 vector;
     for (Eigen::Index i = 0; i < 3; ++i) {
-      if (auto refusal = kAnyNumber.take(*array->get(static_cast<std::size_t>(i)), unit, vector[i])) return refusal;
+      if (auto refusal = each.take(*array->get(static_cast<std::size_t>(i)), unit, vector[i])) return refusal;
     }
     to = vector;
     return {};
   }
 
-  static Verdict take(const toml::node& node, const Unit& unit, std::optional<Vec3>& to) {
+  Verdict take(const toml::node& node, const Unit& unit, std::optional<Vec3>& to) const {
     return take(node, unit, to.emplace());
   }
 
@@ -224,8 +246,9 @@ struct Vector {
 template <class Rule>
 struct ListOf {
   Rule rule;
+  std::string_view form = "[…]";
 
-  std::string expected(const Unit& unit) const { return "[…], each " + rule.expected(unit); }
+  std::string expected(const Unit& unit) const { return std::string(form) + ", each " + rule.expected(unit); }
 
   template <class T>
   Verdict take(const toml::node& node, const Unit& unit, std::vector<T>& to) const {
@@ -238,10 +261,19 @@ struct ListOf {
     return {};
   }
 
-  template <class T>
-  std::string shown(const Unit& unit, const std::vector<T>& values) const {
+  template <class T, std::size_t kCount>
+  Verdict take(const toml::node& node, const Unit& unit, std::array<T, kCount>& to) const {
+    std::vector<T> all;
+    if (auto refusal = take(node, unit, all)) return refusal;
+    if (all.size() != kCount) return Refusal{&node, expected(unit)};
+    std::copy(all.begin(), all.end(), to.begin());
+    return {};
+  }
+
+  template <class Values>
+  std::string shown(const Unit& unit, const Values& values) const {
     std::string text;
-    for (const T& value : values) text += (text.empty() ? "" : ", ") + rule.shown(unit, value);
+    for (const auto& value : values) text += (text.empty() ? "" : ", ") + rule.shown(unit, value);
     return "[" + text + "]";
   }
 };
