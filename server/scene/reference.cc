@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "core/base/nearest_word.h"
+#include "server/scene/keys.h"
 #include "server/scene/scene.h"
 
 namespace tendon {

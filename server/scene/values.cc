@@ -42,6 +42,7 @@ constexpr std::array kUnits = {
     Unit{"_mm", "mm", 1e3},
     Unit{"_ms", "ms", 1e3},
     Unit{"_nm", "N·m", 1},
+    Unit{"_ppm", "ppm", 1e6},
     Unit{"_pa", "Pa", 1},
     Unit{"_um", "µm", 1e6},
     Unit{"_us", "µs", 1e6},

@@ -84,7 +84,7 @@ struct Refusal {
 };
 using Verdict = std::optional<Refusal>;
 
-/// Longer times are not useful in a haptic loop, and this prevents overflow of sums.
+/// Maximum of a time if its rule has none. Longer times are not useful in a haptic loop, and this prevents overflow.
 inline constexpr Duration kLongest = limits::kMaxTimeout;
 
 struct Number {
@@ -118,7 +118,8 @@ struct Number {
 
   Verdict take(const toml::node& node, const Unit& unit, Duration& to) const {
     const auto number = number_in(node);
-    if (auto refusal = check(node, unit, number, std::min(most, seconds(kLongest) * unit.per_si))) return refusal;
+    const double limit = most < limits::kMaxValue ? most : seconds(kLongest) * unit.per_si;
+    if (auto refusal = check(node, unit, number, limit)) return refusal;
     const Duration rounded(std::llround(*number * (1e9 / unit.per_si)));
     if (without_least && rounded <= Duration::zero()) return Refusal{&node, expected(unit)};
     to = rounded;

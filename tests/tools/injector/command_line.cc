@@ -9,7 +9,7 @@
 
 #include "clients/cpp/usage.h"
 #include "server/build_info.h"
-#include "tests/tools/injector/profile/named_profiles.h"
+#include "tests/tools/injector/profile/scenario.h"
 
 namespace tendon::injector {
 namespace {
@@ -82,6 +82,7 @@ struct Said {
   std::filesystem::path control;
   bool json = false;
   bool profiles = false;
+  bool scenario_help = false;
   bool dry = false;
   DryRun dry_run;
   std::filesystem::path control_path;
@@ -205,6 +206,7 @@ void add_options(CLI::App& app, Said& said) {
       ->type_name("FILE")
       ->group(network)
       ->excludes("--profile", "--up", "--down");
+  app.add_flag("--scenario-help", said.scenario_help, "Print the keys of such a file and exit")->group(network);
   app.add_option("--replay", said.network.replay, "Recorded or imported trace to repeat, instead of a profile")
       ->type_name("TRACE")
       ->group(network)
@@ -329,6 +331,7 @@ Task parse_command_line(int argc, const char* const* argv) {
     if (!said.seed.empty()) said.selftest.seed = parse_seed(said.seed);
     return SelftestTask{said.selftest};
   }
+  if (said.scenario_help) return HelpTask{scenario_reference()};
   if (said.profiles) return ProfilesTask{said.json};
   if (!said.seed.empty()) said.network.seed = parse_seed(said.seed);
   if (said.replay_by == "time") said.network.replay_by = TracePlayer::By::kTime;

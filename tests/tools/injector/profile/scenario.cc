@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tests/tools/injector/profile/scenario.h"
 
-#include <toml++/toml.h>
-
 #include <algorithm>
+#include <cmath>
 #include <fstream>
-#include <initializer_list>
 #include <iterator>
 #include <stdexcept>
 
-#include "core/base/nearest_word.h"
 #include "server/machine/regular_file.h"
+#include "server/scene/reader.h"
+#include "server/scene/reference.h"
+#include "server/scene/values.h"
 #include "tests/tools/injector/profile/named_profiles.h"
 #include "tests/tools/injector/profile/units.h"
 #include "tests/tools/injector/profile/words.h"
@@ -33,145 +33,66 @@ void append(std::string& text, std::string_view key, std::string_view value) {
       text, [](char c) { return c == '\n' || c == '\r'; }, ' ');
 }
 
-/// One table of a file. Errors are exceptions that name file, line and key.
-class Keys {
- public:
-  Keys(const std::string& file, const toml::table& table, std::string path)
-      : file_(file), table_(table), path_(std::move(path)) {}
+/// Adds a profile or a note to a change, and to its text.
+struct ChangeText {
+  std::string_view key;
 
-  void refuse_others_than(std::initializer_list<std::string_view> known) const {
-    for (const auto& [key, node] : table_) {
-      if (std::ranges::find(known, key.str()) != known.end()) continue;
-      std::string all = did_you_mean(key.str(), known);
-      if (all.empty()) {
-        for (const std::string_view name : known) all.append(all.empty() ? "; expected one of " : ", ").append(name);
-      }
-      fail(node, key.str(), (node.is_table() ? "unknown table" : "unknown key") + all);
-    }
+  std::string expected(const scene_file::Unit&) const {
+    return key == "note" ? "a text in quotes" : "a profile in quotes like \"delay=20ms loss=2%\" or \"wifi-bad\"";
   }
 
-  const toml::node* find(std::string_view key) const { return table_.get(key); }
-
-  std::optional<std::string> text(std::string_view key) const {
-    const toml::node* const node = find(key);
-    if (node == nullptr) return std::nullopt;
-    if (!node->is_string()) fail(*node, key, "expected text in quotes");
-    return **node->as_string();
-  }
-
-  std::optional<std::int64_t> whole(std::string_view key, std::int64_t most) const {
-    const toml::node* const node = find(key);
-    if (node == nullptr) return std::nullopt;
-    const auto* const value = node->as_integer();
-    if (value == nullptr || **value < 0 || **value > most) {
-      fail(*node, key, "expected a whole number from 0 to " + std::to_string(most));
-    }
-    return **value;
-  }
-
-  /// `unit_ns` is the unit in the key's suffix. At most one day.
-  std::optional<Duration> duration(std::string_view key, double unit_ns, bool may_be_negative) const {
-    const std::optional<double> value = number(key);
-    if (!value) return std::nullopt;
-    const std::optional<Duration> duration = to_duration(*value, unit_ns);
-    if (!duration || (!may_be_negative && *duration < Duration::zero())) {
-      fail(*find(key), key, may_be_negative ? "expected at most a day" : "expected 0 or more, and at most a day");
-    }
-    return duration;
-  }
-
-  std::optional<double> number(std::string_view key) const {
-    const toml::node* const node = find(key);
-    if (node == nullptr) return std::nullopt;
-    const std::optional<double> value = node->value<double>();
-    if (!value || !(*value > -1e15 && *value < 1e15)) fail(*node, key, "expected a number");
-    return value;
-  }
-
-  /// Calls `take` for the tables of an array [[key]], if it exists.
-  template <class Take>
-  void each(std::string_view key, std::size_t most, const Take& take) const {
-    const toml::node* const node = find(key);
-    if (node == nullptr) return;
-    const toml::array* const array = node->as_array();
-    if (array == nullptr) fail(*node, key, "expected tables [[" + joined(key) + "]]");
-    if (array->size() > most) fail(*node, key, "expected at most " + std::to_string(most) + " of them");
-    for (const toml::node& element : *array) {
-      if (!element.is_table()) fail(element, key, "expected tables [[" + joined(key) + "]]");
-      take(Keys(file_, *element.as_table(), joined(key)));
-    }
-  }
-
-  Change profiles() const {
-    Change change;
-    for (const std::string_view key : {"both", "up", "down"}) {
-      const std::optional<std::string> profile = text(key);
-      if (!profile) continue;
-      if (key != "both" && find("both") != nullptr) fail(*find(key), key, "expected either both, or up and down");
+  scene_file::Verdict take(const toml::node& node, const scene_file::Unit& unit, Change& to) const {
+    const auto* text = node.as_string();
+    if (text == nullptr) return scene_file::Refusal{&node, expected(unit)};
+    if (key != "note") {
+      if (to.text.starts_with("both ")) return scene_file::Refusal{&node, "either both, or up and down"};
       try {
-        set_profiles(change, key, *profile);
+        set_profiles(to, key, **text);
       } catch (const std::invalid_argument& refused) {
-        fail(*find(key), key, refused.what());
+        return scene_file::Refusal{&node, "a profile", std::string(": ") + refused.what()};
       }
-      append(change.text, key, *profile);
     }
-    return change;
+    append(to.text, key, **text);
+    return {};
   }
 
-  [[noreturn]] void fail(const toml::node& node, std::string_view key, const std::string& sentence) const {
-    fail_at(node.source().begin.line, joined(key) + ": " + sentence);
-  }
-  [[noreturn]] void fail(const std::string& sentence) const {
-    fail_at(table_.source().begin.line, path_ + ": " + sentence);
-  }
-
- private:
-  std::string joined(std::string_view key) const {
-    return path_.empty() ? std::string(key) : path_ + '.' + std::string(key);
-  }
-  [[noreturn]] void fail_at(std::uint32_t line, const std::string& sentence) const {
-    throw std::runtime_error(file_ + ':' + std::to_string(line) + ": " + sentence);
-  }
-
-  const std::string& file_;
-  const toml::table& table_;
-  std::string path_;
+  static std::string shown(const scene_file::Unit&, const Change&) { return "none"; }
 };
 
-DriftingClock::Config clock_of(const Keys& keys) {
-  keys.refuse_others_than({"offset_ms", "drift_ppm", "step"});
-  DriftingClock::Config config;
-  config.offset = keys.duration("offset_ms", 1e6, true).value_or(Duration::zero());
-  const double ppb = keys.number("drift_ppm").value_or(0) * 1000;
-  config.drift_ppb = static_cast<std::int64_t>(ppb + (ppb < 0 ? -0.5 : 0.5));
-  keys.each("step", DriftingClock::kMaxSteps, [&config](const Keys& step) {
-    step.refuse_others_than({"t_s", "step_ms"});
-    const auto at = step.duration("t_s", 1e9, false);
-    const auto change = step.duration("step_ms", 1e6, true);
-    if (!at || !change) step.fail("expected t_s and step_ms");
-    config.steps.push_back({*at, *change});
-  });
-  try {
-    DriftingClock{config};
-  } catch (const std::invalid_argument& refused) {
-    keys.fail(refused.what());
-  }
-  return config;
+template <class Table>
+void declare_profiles(Table& keys, Change& change, const scene_file::Absent& absent) {
+  keys.key("both", change, ChangeText{"both"}, "Profile of both directions", absent);
+  keys.key("up", change, ChangeText{"up"}, "Profile from client to server", absent);
+  keys.key("down", change, ChangeText{"down"}, "Profile from server to client", absent);
 }
 
-Scenario::Timed timed_of(const Keys& keys) {
-  keys.refuse_others_than({"t_s", "up", "down", "both", "link", "note"});
-  const auto at = keys.duration("t_s", 1e9, false);
-  if (!at) keys.fail("t_s: expected the time since the start, s, found nothing");
-  Change change = keys.profiles();
-  if (const auto link = keys.whole("link", kMaxLink)) {
-    if (!change.up && !change.down) keys.fail(*keys.find("link"), "link", "expected up, down or both with it");
-    change.link = static_cast<std::uint32_t>(*link);
-    change.text = "link " + std::to_string(*link) + ' ' + change.text;
-  }
-  if (const auto note = keys.text("note")) append(change.text, "note", *note);
-  if (change.text.empty()) keys.fail("expected up, down, both or note");
-  return {*at, std::move(change)};
+/// parse_scenario() checks the conditions that depend on several keys.
+template <class Table>
+void declare_scenario(Table& scenario, Scenario& to, Change& begin) {
+  using scene_file::kRequired;
+  using scene_file::Number;
+  constexpr double kDay = 86'400;  // s, as for all times
+  constexpr Number kTime{.least = 0, .most = kDay};
+  constexpr Number kShift{.least = -kDay * 1e3, .most = kDay * 1e3};
+  scenario.key("seed", to.seed, scene_file::Count{INT64_MAX}, "Seed of the random numbers, unless --seed is used");
+  declare_profiles(scenario, begin, {.text = "no delay and no loss"});
+  scenario.tables("at", to.changes, kMaxChanges, [&](Table& at, Scenario::Timed& timed) {
+    at.key("t_s", timed.at, kTime, "Time since the start. Must not decrease", kRequired);
+    declare_profiles(at, timed.change, {.text = "no change"});
+    at.key("link", timed.change.link, scene_file::Count{kMaxLink}, "Changes only this client, numbered by arrival",
+           {.text = "all clients"});
+    at.key("note", timed.change, ChangeText{"note"}, "Text that is recorded in the trace");
+  });
+  scenario.part("clock", to.clock, [&](Table& clock, DriftingClock::Config& config) {
+    double drift = 0;
+    clock.key("offset_ms", config.offset, kShift, "Offset of the clock of each peer. For simulations only");
+    clock.key("drift_ppm", drift, Number{.least = -1e5, .most = 1e5}, "Drift of this clock. Above zero: fast");
+    config.drift_ppb = std::llround(drift * 1e9);
+    clock.tables("step", config.steps, DriftingClock::kMaxSteps, [&](Table& step, DriftingClock::Step& change) {
+      step.key("t_s", change.at, kTime, "Time since the start. Must increase", kRequired);
+      step.key("step_ms", change.change, kShift, "Change of the clock", kRequired);
+    });
+  });
 }
 
 struct Words {
@@ -202,32 +123,40 @@ Change change_of(std::string_view way, std::string_view profile) {
 
 Scenario parse_scenario(std::string_view toml, const std::string& name) {
   if (toml.size() > kMaxScenarioBytes) throw std::runtime_error(name + ": expected at most 32 MB");
-  toml::table file;
-  try {
-    file = toml::parse(toml);
-  } catch (const toml::parse_error& error) {
-    throw std::runtime_error(name + ':' + std::to_string(error.source().begin.line) +
-                             ": not TOML: " + std::string(error.description()));
-  }
-  const Keys keys(name, file, "");
-  keys.refuse_others_than({"seed", "up", "down", "both", "at", "clock"});
+  const toml::table file = scene_file::parse_toml(toml, name);
   Scenario scenario;
-  scenario.seed = static_cast<std::uint64_t>(keys.whole("seed", INT64_MAX).value_or(1));
-  Change begin = keys.profiles();
-  if (begin.up) scenario.up = *std::move(begin.up);
-  if (begin.down) scenario.down = *std::move(begin.down);
-  keys.each("at", kMaxChanges, [&scenario](const Keys& table) {
-    Scenario::Timed timed = timed_of(table);
-    if (!scenario.changes.empty() && timed.at < scenario.changes.back().at) {
-      table.fail(*table.find("t_s"), "t_s", "is earlier than the previous one, expected increasing times");
+  Change begin;
+  scene_file::SceneProblems problems;
+  scene_file::Reader reader(problems, &file, "", {});
+  declare_scenario(reader, scenario, begin);
+  reader.refuse_unknown();
+  problems.throw_first(name);
+  scenario.up = std::move(begin.up).value_or(Profile{});
+  scenario.down = std::move(begin.down).value_or(Profile{});
+  const scene_file::SceneErrors errors(file, name);
+  if (scenario.clock) errors.build("clock", [&] { DriftingClock{*scenario.clock}; });
+  for (std::size_t i = 0; i < scenario.changes.size(); ++i) {
+    auto& [at, change] = scenario.changes[i];
+    const std::string path = "at[" + std::to_string(i) + ']';
+    if (i > 0 && at < scenario.changes[i - 1].at) {
+      errors.blame(path + ".t_s", {}, "is earlier than the previous one, expected increasing times");
     }
-    scenario.changes.push_back(std::move(timed));
-  });
-  if (const toml::node* const clock = keys.find("clock")) {
-    if (!clock->is_table()) keys.fail(*clock, "clock", "expected a table [clock]");
-    scenario.clock = clock_of(Keys(name, *clock->as_table(), "clock"));
+    if (change.link && !change.up && !change.down) {
+      errors.blame(path + ".link", {}, "expected up, down or both with it");
+    }
+    if (change.text.empty()) errors.blame(path, {}, "expected up, down, both or note");
+    if (change.link) change.text = "link " + std::to_string(*change.link) + ' ' + change.text;
   }
   return scenario;
+}
+
+std::string scenario_reference() {
+  std::string text;
+  Scenario scenario;
+  Change begin;
+  scene_file::Reference reference(text);
+  declare_scenario(reference, scenario, begin);
+  return text;
 }
 
 Scenario read_scenario(const std::filesystem::path& path) {

@@ -22,24 +22,16 @@ namespace tendon::injector {
 // A bad network that changes, by a script (a TOML file) or by commands at run time.
 //
 //   seed = 7
-//   up = "wifi-good"                      # or a profile line: "delay=20ms loss=2%"; also down, both
+//   up = "wifi-good"
 //   down = "wifi-good loss=1%"
 //
-//   [[at]]                                # any number, sorted by time
-//   t_s = 5                               # since the start
-//   both = "wifi-bad"                     # up, down or both; replaces the profile
-//   link = 2                              # optional: only this client (numbered from 0 by arrival)
-//   note = "microwave oven on"            # optional: recorded in the trace
+//   [[at]]
+//   t_s = 5
+//   both = "wifi-bad"
+//   note = "microwave oven on"
 //
-//   [clock]                               # of every peer; for simulations only
-//   offset_ms = 5
-//   drift_ppm = 20
-//   [[clock.step]]
-//   t_s = 10
-//   step_ms = 3
-//
-// All keys are optional. Without up, down and both there is no delay and no loss. The times inside a profile
-// (outage(at=5s,…)) count from its activation.
+// Use `tendon-inject --scenario-help` to list all keys. The times inside a profile (outage(at=5s,…)) count from its
+// activation.
 
 struct Change {
   std::optional<std::uint32_t> link;  ///< only this link; empty: all links
@@ -67,10 +59,14 @@ inline constexpr std::size_t kMaxChanges = 86'400;
 inline constexpr std::uint32_t kMaxLink = 65'535;
 
 /// Parses a scenario file. Throws std::runtime_error that names file, line and key for any error, including unknown
-/// keys: "storm.toml:9: at.both: loss is 150%, expected a probability from 0% to 100%".
+/// keys: "storm.toml:9: at[0].both: expected a profile, found "loss=150%": loss is 150%, expected a probability from 0%
+/// to 100%".
 Scenario read_scenario(const std::filesystem::path& path);
 /// Parses a text. `name` replaces the file name in errors.
 Scenario parse_scenario(std::string_view toml, const std::string& name);
+
+/// The documentation of all keys.
+std::string scenario_reference();
 
 /// Commands other than a Change.
 enum class Request : std::uint8_t {
