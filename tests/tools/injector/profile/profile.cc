@@ -270,53 +270,50 @@ bool set_field(Profile& p, const std::string& field, std::string_view value) {
   return true;
 }
 
+/// The form of each event, for errors.
+constexpr std::array<std::string_view, 8> kEvents = {"drop(byte=16,mask=0x0f,value=3,50%)",
+                                                     "regime(NAME,dwell=4s,delay=…,loss=…)",
+                                                     "step(at=5s,20ms)",
+                                                     "ramp(from=5s,to=10s,30ms)",
+                                                     "spike(every=15s,for=50ms,80ms)",
+                                                     "stall(every=2s,for=100ms)",
+                                                     "handover(every=15s,for=60ms,10ms)",
+                                                     "outage(at=5s,for=300ms)"};
+
 /// "field(…)". Returns false for an unknown field.
 bool add_event(Profile& p, const Call& c) {
+  const auto* const form =
+      std::ranges::find_if(kEvents, [&](std::string_view event) { return event.substr(0, event.find('(')) == c.name; });
+  if (form == kEvents.end()) return false;
+  Arguments a(c, std::string(*form));
   if (c.name == "drop") {
-    Arguments a(c, "drop(byte=16,mask=0x0f,value=3,50%)");
     DropRule rule;
     rule.byte = static_cast<std::uint32_t>(whole(a.name("byte"), a.need("byte"), 65'535));
     if (const auto mask = a.take("mask")) rule.mask = static_cast<std::uint8_t>(whole(a.name("mask"), *mask, 255));
     rule.value = static_cast<std::uint8_t>(whole(a.name("value"), a.need("value"), 255));
     if (const auto share = a.take("")) rule.probability = probability(c.field, *share);
-    a.end();
     p.rules.push_back(rule);
   } else if (c.name == "regime") {
-    Arguments a(c, "regime(NAME,dwell=4s,delay=…,loss=…)");
     Regime regime;
     regime.name = a.need("");
     regime.dwell = a.need_duration("dwell");
     if (const auto text = a.take("delay")) regime.delay = delay(a.name("delay"), *text);
     if (const auto text = a.take("loss")) regime.loss = loss(a.name("loss"), *text);
-    a.end();
     p.regimes.push_back(regime);
   } else if (c.name == "step") {
-    Arguments a(c, "step(at=5s,20ms)");
     p.steps.push_back({a.need_duration("at"), a.need_duration("")});
-    a.end();
   } else if (c.name == "ramp") {
-    Arguments a(c, "ramp(from=5s,to=10s,30ms)");
     p.ramps.push_back({a.need_duration("from"), a.need_duration("to"), a.need_duration("")});
-    a.end();
   } else if (c.name == "spike") {
-    Arguments a(c, "spike(every=15s,for=50ms,80ms)");
     p.spikes.push_back({a.window(), a.need_duration("")});
-    a.end();
   } else if (c.name == "stall") {
-    Arguments a(c, "stall(every=2s,for=100ms)");
     p.stalls.push_back({a.window()});
-    a.end();
   } else if (c.name == "handover") {
-    Arguments a(c, "handover(every=15s,for=60ms,10ms)");
     p.handovers.push_back({a.window(), a.need_duration("")});
-    a.end();
-  } else if (c.name == "outage") {
-    Arguments a(c, "outage(at=5s,for=300ms)");
-    p.outages.push_back({a.window()});
-    a.end();
   } else {
-    return false;
+    p.outages.push_back({a.window()});
   }
+  a.end();
   return true;
 }
 

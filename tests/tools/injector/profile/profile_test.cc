@@ -6,9 +6,9 @@
 #include <sys/stat.h>
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <fstream>
-#include <limits>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -20,10 +20,6 @@ namespace tendon::injector::profile_test {
 namespace {
 
 using namespace std::chrono_literals;
-
-std::string complaint_about(const Profile& profile) {
-  return thrown_by<std::exception>([&] { check(profile); });
-}
 
 std::string complaint_about(const std::string& line) {
   return thrown_by<std::exception>([&] { parse_profile(line); });
@@ -247,31 +243,18 @@ RC_GTEST_PROP(Profile, AnyTextIsReadOrRefusedAndNothingElseHappens, ()) {
 // ---- Refusals -------------------------------------------------------------------------------------------------------
 
 TEST(Profile, RefusesTheImpossibleByFieldValueAndExpectation) {
-  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-  Profile p;
-  p.base = -1ms;
-  EXPECT_EQ(complaint_about(p), "base is -1ms, expected 0ms to 60s");
-  p = {};
-  p.base = 61s;
-  EXPECT_EQ(complaint_about(p), "base is 61s, expected 0ms to 60s");
-  p = {};
-  p.loss = RandomLoss{1.5};
-  EXPECT_EQ(complaint_about(p), "loss is 150%, expected a probability from 0% to 100%");
-  p.loss = RandomLoss{kNan};
-  EXPECT_EQ(complaint_about(p), "loss is nan, expected a probability from 0% to 100%");
-  p = {};
-  p.duplicate = -0.5;
-  EXPECT_EQ(complaint_about(p), "duplicate is -50%, expected a probability from 0% to 100%");
-  p = {};
-  p.rho = 1;
-  EXPECT_EQ(complaint_about(p), "rho is 1, expected 0 to 0.999999");
-  p.rho = 0.5;
-  p.memory = 1ms;
-  EXPECT_EQ(complaint_about(p),
-            "rho is 0.5, expected 0 if memory is set, because the correlation is either by packet or by time");
-  p = {};
-  p.steps.resize(65);
-  EXPECT_EQ(complaint_about(p), "step, ramp, spike, stall, handover or outage is 65 events, expected at most 64");
+  expect_refusals(
+      Profile{}, check,
+      {{"base is -1ms, expected 0ms to 60s", [](Profile& p) { p.base = -1ms; }},
+       {"base is 61s, expected 0ms to 60s", [](Profile& p) { p.base = 61s; }},
+       {"loss is 150%, expected a probability from 0% to 100%", [](Profile& p) { p.loss = RandomLoss{1.5}; }},
+       {"loss is nan, expected a probability from 0% to 100%", [](Profile& p) { p.loss = RandomLoss{std::nan("")}; }},
+       {"duplicate is -50%, expected a probability from 0% to 100%", [](Profile& p) { p.duplicate = -0.5; }},
+       {"rho is 1, expected 0 to 0.999999", [](Profile& p) { p.rho = 1; }},
+       {"rho is 0.5, expected 0 if memory is set, because the correlation is either by packet or by time",
+        [](Profile& p) { p.rho = 0.5, p.memory = 1ms; }},
+       {"step, ramp, spike, stall, handover or outage is 65 events, expected at most 64",
+        [](Profile& p) { p.steps.resize(65); }}});
 }
 
 TEST(Profile, RefusesALineItDoesNotUnderstandAndSaysWhere) {

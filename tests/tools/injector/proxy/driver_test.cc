@@ -103,6 +103,16 @@ class Running {
 
 Peer server(const std::string& address = "127.0.0.1:0") { return Peer(UdpBatch::listening(parse_address(address))); }
 
+/// Sends a datagram to the server and back. Returns the address of the client as the server sees it.
+Address expect_round_trip(Peer& client, Peer& server_end, const std::string& text) {
+  client.send(text);
+  const auto got = server_end.receive().value_or(Peer::Got{"nothing came", {}});
+  EXPECT_EQ(got.text, text);
+  server_end.send(text, got.from);
+  EXPECT_EQ(client.text(), text);
+  return got.from;
+}
+
 TEST(Driver, CarriesDatagramsUpAndAnswersDownToTheClientTheyAreFor) {
   Peer server_end = server();
   Running proxy(server_end.address(), "delay=2ms", "delay=3ms");
@@ -136,12 +146,7 @@ TEST(Driver, CarriesEmptyAndLargestDatagramsAndSpeaksIpv6) {
   Peer client = proxy.client();
   const std::string largest(65'507, 'x');
   for (const std::string& text : {std::string(), std::string("a"), largest}) {
-    client.send(text);
-    const auto got = server_end.receive();
-    ASSERT_TRUE(got);
-    EXPECT_EQ(got->text.size(), text.size());
-    server_end.send(text, got->from);
-    EXPECT_EQ(client.text(), text);
+    expect_round_trip(client, server_end, text);
   }
 }
 
@@ -151,13 +156,8 @@ TEST(Driver, ARebindChangesThePortAndAnswersStillReachTheClient) {
   Peer client = proxy.client();
   std::set<Address> ports;
   // Waiting for each answer makes this loop take some milliseconds on any machine.
-  for (int i = 0; i < 10'000 && ports.size() < 3; ++i) {
-    client.send("ping");
-    const auto got = server_end.receive();
-    ASSERT_TRUE(got);
-    ports.insert(got->from);
-    server_end.send("pong", got->from);
-    ASSERT_EQ(client.text(), "pong");
+  for (int i = 0; i < 10'000 && ports.size() < 3 && !HasFailure(); ++i) {
+    ports.insert(expect_round_trip(client, server_end, "ping"));
   }
   EXPECT_GE(ports.size(), 3U);
   EXPECT_EQ(proxy.stop().clients.size(), 1U);
@@ -207,11 +207,8 @@ TEST(Driver, ListeningOnAllAddressesItAnswersFromTheOneThatWasAsked) {
     for (const std::string& host : hosts) {
       // The socket is connected, so the kernel drops datagrams from any other address.
       Peer client(UdpBatch::connected(parse_address(host + port)));
-      client.send("ping");
-      const auto got = server_end.receive();
-      ASSERT_TRUE(got) << all << ' ' << host;
-      server_end.send("pong", got->from);
-      EXPECT_EQ(client.text(), "pong") << all << ' ' << host;
+      SCOPED_TRACE(all + (' ' + host));
+      expect_round_trip(client, server_end, "ping");
     }
   }
 }

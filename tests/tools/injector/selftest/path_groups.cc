@@ -104,27 +104,20 @@ std::vector<Check> copies_and_damage(const SelftestOptions& options) {
   checks.push_back(rate(stale, "replay rate", replayed, n - 64, 0.05));
   checks.push_back(pearson(stale, "how far back", std::span(back).subspan(1), even_shares(64)));
 
-  const std::string flips = "flip=20%";
-  std::vector<std::uint64_t> bits(8 * kSize);
-  double flipped = 0;
-  play(parse_profile(flips), {.size = kSize}, options, [&](std::size_t, const Decision& decision) {
-    if (!decision.flipped_bit) return;
-    ++flipped;
-    ++bits.at(*decision.flipped_bit);
-  });
-  checks.push_back(rate(flips, "flip rate", flipped, n, 0.2));
-  checks.push_back(pearson(flips, "which bit", bits, even_shares(bits.size())));
-
-  const std::string cuts = "truncate=20%";
-  std::vector<std::uint64_t> left(kSize);
-  double cut = 0;
-  play(parse_profile(cuts), {.size = kSize}, options, [&](std::size_t, const Decision& decision) {
-    if (!decision.truncated_to) return;
-    ++cut;
-    ++left.at(*decision.truncated_to);
-  });
-  checks.push_back(rate(cuts, "truncation rate", cut, n, 0.2));
-  checks.push_back(pearson(cuts, "bytes left", left, even_shares(left.size())));
+  const auto damage = [&](const std::string& line, const std::string& share, const std::string& place,
+                          std::optional<std::uint32_t> Decision::*where, std::size_t places) {
+    std::vector<std::uint64_t> counts(places);
+    double damaged = 0;
+    play(parse_profile(line), {.size = kSize}, options, [&](std::size_t, const Decision& decision) {
+      if (!(decision.*where)) return;
+      ++damaged;
+      ++counts.at(*(decision.*where));
+    });
+    checks.push_back(rate(line, share, damaged, n, 0.2));
+    checks.push_back(pearson(line, place, counts, even_shares(places)));
+  };
+  damage("flip=20%", "flip rate", "which bit", &Decision::flipped_bit, std::size_t{8} * kSize);
+  damage("truncate=20%", "truncation rate", "bytes left", &Decision::truncated_to, kSize);
 
   const std::string rebind = "rebind(every=10s)";
   std::size_t off = 0;

@@ -11,6 +11,8 @@
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <utility>
+#include <vector>
 
 #include "tests/support/refusal.h"
 #include "tests/tools/injector/injector.h"
@@ -149,54 +151,45 @@ TEST(Trace, RecordsOfOneFlowMayComeInAnyOrder) {
 }
 
 TEST(Trace, WhatIsWrongIsNamedWithFileAndLine) {
-  const std::string good = "up,0,0,1000,9,,pass,delay,9000,,,,,,,0\n";
-  EXPECT_EQ(refusal(""), "run.csv:1: expected the first line of a trace, \"# tendon-trace 1\"");
-  EXPECT_EQ(refusal("# tendon-trace 2\n"), "run.csv:1: expected the first line of a trace, \"# tendon-trace 1\"");
-  EXPECT_EQ(refusal("# tendon-trace 1\n"), "run.csv:2: the trace ends before its column names");
-  EXPECT_EQ(refusal("# tendon-trace 1\n# sed 7\n"),
-            "run.csv:2: # \"sed\": unknown, expected seed, start, up, down, tables, build, benign up or benign down");
-  EXPECT_EQ(refusal("# tendon-trace 1\n# seed 7\n# seed 7\n"), "run.csv:3: # seed occurs twice");
-  EXPECT_EQ(refusal("# tendon-trace 1\n# seed -1\n"), "run.csv:2: seed is \"-1\", expected a whole number");
-  EXPECT_EQ(refusal("# tendon-trace 1\n# seed\n"), "run.csv:2: # seed has no value");
-  EXPECT_EQ(refusal("# tendon-trace 1\n# benign up -1\n"),
-            "run.csv:2: benign up is \"-1\", expected a delay of 0 ns or more");
-  // Such a text could not be written back.
-  EXPECT_EQ(refusal("# tendon-trace 1\n# down a\rb\n"),
-            "run.csv:2: found a carriage return, expected lines that end with \\n");
-  EXPECT_EQ(refusal(with_lines("# note a\rb\n")),
-            "run.csv:4: found a carriage return, expected lines that end with \\n");
-  EXPECT_EQ(refusal("# tendon-trace 1\n# tables 12 34\n"),
-            "run.csv:2: tables is \"12\", expected 16 hexadecimal digits");
+  for (const auto& [text, complaint] : std::vector<std::pair<std::string, std::string>>{
+           {"", "1: expected the first line of a trace, \"# tendon-trace 1\""},
+           {"# tendon-trace 2\n", "1: expected the first line of a trace, \"# tendon-trace 1\""},
+           {"# tendon-trace 1\n", "2: the trace ends before its column names"},
+           {"# tendon-trace 1\n# sed 7\n",
+            "2: # \"sed\": unknown, expected seed, start, up, down, tables, build, benign up or benign down"},
+           {"# tendon-trace 1\n# seed 7\n# seed 7\n", "3: # seed occurs twice"},
+           {"# tendon-trace 1\n# seed -1\n", "2: seed is \"-1\", expected a whole number"},
+           {"# tendon-trace 1\n# seed\n", "2: # seed has no value"},
+           {"# tendon-trace 1\n# benign up -1\n", "2: benign up is \"-1\", expected a delay of 0 ns or more"},
+           // Such a text could not be written back.
+           {"# tendon-trace 1\n# down a\rb\n", "2: found a carriage return, expected lines that end with \\n"},
+           {"# tendon-trace 1\n# tables 12 34\n", "2: tables is \"12\", expected 16 hexadecimal digits"}}) {
+    EXPECT_EQ(refusal(text), "run.csv:" + complaint);
+  }
   EXPECT_EQ(refusal("# tendon-trace 1\nup,0,0\n").substr(0, 36), "run.csv:2: expected the column names");
-  EXPECT_EQ(refusal(with_lines("up,0,0\n")), "run.csv:4: expected 16 fields, found 3");
-  EXPECT_EQ(refusal(with_lines(good + "left,0,1,1000,9,,pass,delay,9000,,,,,,,0\n")),
-            "run.csv:5: dir is \"left\", expected up or down");
-  EXPECT_EQ(refusal(with_lines("up,0,0,1000,9,,lost,delay,9000,,,,,,,0\n")),
-            "run.csv:4: verdict is \"lost\", expected pass, drop or dup");
-  EXPECT_EQ(refusal(with_lines("up,0,0,1000,9,,pass,magic,9000,,,,,,,0\n")),
-            "run.csv:4: cause is \"magic\", which is unknown");
-  EXPECT_EQ(refusal(with_lines("up,0,0,1000,9,,pass,delay,999,,,,,,,0\n")),
-            "run.csv:4: t_out_ns is earlier than t_in_ns");
-  EXPECT_EQ(refusal(with_lines("up,0,0,1e9,9,,pass,delay,999,,,,,,,0\n")),
-            "run.csv:4: t_in_ns is \"1e9\", expected whole nanoseconds");
-  EXPECT_EQ(refusal(with_lines("up,0,0,9000000000000000000,9,,pass,delay,9000000000000000000,,,,,,,0\n")),
-            "run.csv:4: t_in_ns is \"9000000000000000000\", expected a time within 73 years of zero");
-  EXPECT_EQ(refusal(with_lines("up,0,0,1000,9,12,pass,delay,9000,,,,,,,0\n")),
-            "run.csv:4: hash is \"12\", expected 16 hexadecimal digits");
-  EXPECT_EQ(refusal(with_lines("up,0,0,1000,9,,dup,delay,9000,,,,,,,0\n")),
-            "run.csv:4: duplicate_ns: expected a time where verdict is dup, and none elsewhere");
-  EXPECT_EQ(refusal(with_lines("up,0,0,1000,9,,pass,delay,9000,,,4,,,,0\n")),
-            "run.csv:4: stale_back and stale_ns: expected both or neither");
-  EXPECT_EQ(refusal(with_lines("up,0,0,1000,9,,pass,delay,9000,,,65,2000,,,0\n")),
-            "run.csv:4: stale_back is \"65\", expected 1 to 64");
-  EXPECT_EQ(refusal(with_lines(good + "# note half\n" + good)),
-            "run.csv:6: datagram 0 of this flow occurs twice, first in line 4");
-  EXPECT_EQ(refusal(with_lines(good + "up,0,1,999,9,,pass,delay,9000,,,,,,,0\n")),
-            "run.csv:5: t_in_ns is earlier than that of a datagram of the same flow with a smaller index");
-  EXPECT_EQ(refusal(with_lines("up,0,1,999,9,,pass,delay,9000,,,,,,,0\n" + good)),
-            "run.csv:4: t_in_ns is earlier than that of a datagram of the same flow with a smaller index");
-  EXPECT_EQ(refusal(with_lines(good.substr(0, 20))),
-            "run.csv:4: the last line is incomplete; remove it to use the rest of the trace");
+  const std::string good = "up,0,0,1000,9,,pass,delay,9000,,,,,,,0\n";
+  const std::string earlier = "t_in_ns is earlier than that of a datagram of the same flow with a smaller index";
+  for (const auto& [lines, complaint] : std::vector<std::pair<std::string, std::string>>{
+           {"# note a\rb\n", "4: found a carriage return, expected lines that end with \\n"},
+           {"up,0,0\n", "4: expected 16 fields, found 3"},
+           {good + "left,0,1,1000,9,,pass,delay,9000,,,,,,,0\n", "5: dir is \"left\", expected up or down"},
+           {"up,0,0,1000,9,,lost,delay,9000,,,,,,,0\n", "4: verdict is \"lost\", expected pass, drop or dup"},
+           {"up,0,0,1000,9,,pass,magic,9000,,,,,,,0\n", "4: cause is \"magic\", which is unknown"},
+           {"up,0,0,1000,9,,pass,delay,999,,,,,,,0\n", "4: t_out_ns is earlier than t_in_ns"},
+           {"up,0,0,1e9,9,,pass,delay,999,,,,,,,0\n", "4: t_in_ns is \"1e9\", expected whole nanoseconds"},
+           {"up,0,0,9000000000000000000,9,,pass,delay,9000000000000000000,,,,,,,0\n",
+            "4: t_in_ns is \"9000000000000000000\", expected a time within 73 years of zero"},
+           {"up,0,0,1000,9,12,pass,delay,9000,,,,,,,0\n", "4: hash is \"12\", expected 16 hexadecimal digits"},
+           {"up,0,0,1000,9,,dup,delay,9000,,,,,,,0\n",
+            "4: duplicate_ns: expected a time where verdict is dup, and none elsewhere"},
+           {"up,0,0,1000,9,,pass,delay,9000,,,4,,,,0\n", "4: stale_back and stale_ns: expected both or neither"},
+           {"up,0,0,1000,9,,pass,delay,9000,,,65,2000,,,0\n", "4: stale_back is \"65\", expected 1 to 64"},
+           {good + "# note half\n" + good, "6: datagram 0 of this flow occurs twice, first in line 4"},
+           {good + "up,0,1,999,9,,pass,delay,9000,,,,,,,0\n", "5: " + earlier},
+           {"up,0,1,999,9,,pass,delay,9000,,,,,,,0\n" + good, "4: " + earlier},
+           {good.substr(0, 20), "4: the last line is incomplete; remove it to use the rest of the trace"}}) {
+    EXPECT_EQ(refusal(with_lines(lines)), "run.csv:" + complaint);
+  }
 }
 
 // A small fuzz test: a valid trace with a few bytes changed, removed or moved.
