@@ -13,6 +13,13 @@
 namespace tendon {
 
 using Bytes = std::vector<std::byte>;
+/// Returns the bytes `first`, `first` + 1 …
+inline Bytes bytes(std::size_t size, int first) {
+  Bytes result(size);
+  for (std::size_t i = 0; i < size; ++i) result[i] = static_cast<std::byte>(first + static_cast<int>(i));
+  return result;
+}
+
 struct Datagram {
   Address from;
   Address to;

@@ -133,17 +133,13 @@ TEST_F(Announcing, ABusThatComesLateIsFound) {
   EXPECT_TRUE(soon([&] { return late.announced().size() == 1; }));
 }
 
-TEST_F(Announcing, OneAddressIsToldToItsOwnInterface) {
-  Running running({{"falcon", kFalcon}}, "[2001:db8::7]:5");  // no device
-  ASSERT_TRUE(soon([&] { return avahi.announced().size() == 1; }));
-  EXPECT_EQ(avahi.announced().front().protocol, 1);
-  EXPECT_EQ(avahi.announced().front().interface, -1);
-}
-
-TEST_F(Announcing, AllAddressesOfBothFamiliesAreToldByBothProtocols) {
-  Running running({{"falcon", kFalcon}}, "[::]:5");
-  ASSERT_TRUE(soon([&] { return avahi.announced().size() == 1; }));
-  EXPECT_EQ(avahi.announced().front().protocol, -1);
+TEST_F(Announcing, OneAddressIsToldByItsProtocolAndAllAddressesByBoth) {
+  for (const auto& [listen, protocol] : {std::pair("[2001:db8::7]:5", 1), std::pair("[::]:5", -1)}) {  // no device
+    Running running({{"falcon", kFalcon}}, listen);
+    ASSERT_TRUE(soon([&] { return avahi.announced().size() == 1; }));
+    EXPECT_EQ(avahi.announced().front().protocol, protocol);
+    EXPECT_EQ(avahi.announced().front().interface, -1);
+  }
 }
 
 TEST_F(Announcing, AServerOfThisMachineAloneIsNotAnnounced) {

@@ -14,11 +14,11 @@
 
 #include "protocol/wire/header.h"
 #include "tests/support/refusal.h"
+#include "tests/support/wire.h"
 
 namespace tendon::udp_link_test {
 namespace {
 
-using Bytes = std::vector<std::byte>;
 using namespace std::chrono_literals;
 
 /// Exceeds every wait of a correct link, so only a failing test reaches it.
@@ -26,12 +26,6 @@ constexpr Duration kForever = 10s;
 
 constexpr Address kAnyPort4 = {.ip = {0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0xff, 0xff, 127, 0, 0, 1}, .port = 0};
 constexpr Address kAnyPort6 = {.ip = {0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1}, .port = 0};
-
-std::vector<std::byte> bytes(std::size_t size, int first) {
-  std::vector<std::byte> result(size);
-  for (std::size_t i = 0; i < size; ++i) result[i] = static_cast<std::byte>(first + static_cast<int>(i));
-  return result;
-}
 
 template <typename Error>
 std::string complaint_about(const Address& listen) {
@@ -48,7 +42,13 @@ std::ptrdiff_t open_files() {
   return std::distance(std::filesystem::directory_iterator("/proc/self/fd"), std::filesystem::directory_iterator());
 }
 
-class UdpLinkTest : public ::testing::TestWithParam<Address> {};
+class UdpLinkTest : public ::testing::TestWithParam<Address> {
+ protected:
+  UdpLink a{GetParam()};
+  UdpLink z{GetParam()};
+  Bytes buffer = Bytes(kMaxDatagram);
+  Address from;
+};
 
 // An epoll instance on the socket would cost a useless wake-up per datagram.
 TEST_P(UdpLinkTest, HasASocketAndNoOtherFile) {
@@ -63,12 +63,8 @@ TEST_P(UdpLinkTest, HasASocketAndNoOtherFile) {
 }
 
 TEST_P(UdpLinkTest, BringsDatagramsFromAToZInOrderWithTheirSender) {
-  UdpLink a(GetParam());
-  UdpLink z(GetParam());
   a.send(z.local_address(), bytes(3, 1));
   a.send(z.local_address(), bytes(kMaxDatagram, 2));
-  std::vector<std::byte> buffer(kMaxDatagram);
-  Address from;
   for (const auto& sent : {bytes(3, 1), bytes(kMaxDatagram, 2)}) {
     z.wait(kForever);
     ASSERT_EQ(z.receive(from, buffer), sent.size());
@@ -80,11 +76,8 @@ TEST_P(UdpLinkTest, BringsDatagramsFromAToZInOrderWithTheirSender) {
 }
 
 TEST_P(UdpLinkTest, TellsTheFullSizeOfADatagramThatWasCut) {
-  UdpLink a(GetParam());
-  UdpLink z(GetParam());
   a.send(z.local_address(), bytes(5000, 1));
-  std::vector<std::byte> buffer(kMaxDatagram + 1, std::byte{0xee});
-  Address from;
+  buffer.assign(kMaxDatagram + 1, std::byte{0xee});
   z.wait(kForever);
   EXPECT_EQ(z.receive(from, std::span(buffer).first(kMaxDatagram)), 5000U);
   EXPECT_EQ(buffer.back(), std::byte{0xee});
@@ -92,19 +85,13 @@ TEST_P(UdpLinkTest, TellsTheFullSizeOfADatagramThatWasCut) {
 }
 
 TEST_P(UdpLinkTest, SkipsEmptyDatagramsToReachTheOneBehindThem) {
-  UdpLink a(GetParam());
-  UdpLink z(GetParam());
   for (int i = 0; i < 10; ++i) a.send(z.local_address(), {});
   a.send(z.local_address(), bytes(7, 1));
-  std::vector<std::byte> buffer(kMaxDatagram);
-  Address from;
   z.wait(kForever);
   EXPECT_EQ(z.receive(from, buffer), 7U);
 }
 
 TEST_P(UdpLinkTest, CountsWhatItCouldNotSendAndLivesOn) {
-  UdpLink a(GetParam());
-  UdpLink z(GetParam());
   a.send(z.local_address(), std::vector<std::byte>(70'000));  // exceeds the maximum of UDP
   EXPECT_EQ(a.send_failures(), 1U);
   a.send(GetParam() == kAnyPort4 ? parse_address("[::1]:9") : parse_address("127.0.0.1:9"), bytes(1, 1));
@@ -112,8 +99,6 @@ TEST_P(UdpLinkTest, CountsWhatItCouldNotSendAndLivesOn) {
   a.send(z.local_address(), bytes(1, 1));
   EXPECT_EQ(a.send_failures(), 2U);
   z.wait(kForever);
-  std::vector<std::byte> buffer(kMaxDatagram);
-  Address from;
   EXPECT_EQ(z.receive(from, buffer), 1U);
 }
 
@@ -207,8 +192,6 @@ TEST_P(UdpLinkTest, SeveralOnOneAddressEachGetTheDataOfTheirConnections) {
     for (const auto& guest : guests) {
       guest->send(links[0]->local_address(), of_connection(id));
       for (std::size_t place = 0; place < links.size(); ++place) {
-        Bytes buffer(kMaxDatagram);
-        Address from;
         EXPECT_EQ(links[place]->receive(from, buffer), place == id % 4 ? kHeaderSize : 0U) << id << " at " << place;
         if (place == id % 4) {
           EXPECT_EQ(from, guest->local_address());
@@ -220,13 +203,10 @@ TEST_P(UdpLinkTest, SeveralOnOneAddressEachGetTheDataOfTheirConnections) {
 
 TEST_P(UdpLinkTest, OfSeveralTheFirstGetsAllElse) {
   const auto links = UdpLink::several(GetParam(), Reach::kThisMachine, 2);
-  UdpLink guest(GetParam());
   const std::vector<Bytes> others = {of_connection(3, DatagramType::kHello), of_connection(1, DatagramType::kAnswer),
                                      bytes(1, 7), bytes(3, 1), Bytes(kMaxDatagram, std::byte{0xFF})};
   for (const Bytes& other : others) {
-    guest.send(links[0]->local_address(), other);
-    Bytes buffer(kMaxDatagram);
-    Address from;
+    a.send(links[0]->local_address(), other);
     EXPECT_EQ(links[1]->receive(from, buffer), 0U);
     EXPECT_EQ(links[0]->receive(from, buffer), other.size());
   }
@@ -243,12 +223,9 @@ TEST_P(UdpLinkTest, SeveralRefuseAnAddressOfOthersAndKeepOthersOutOfTheirs) {
 
 TEST_P(UdpLinkTest, OfSeveralEachAnswersFromTheirAddress) {
   const auto links = UdpLink::several(GetParam(), Reach::kThisMachine, 2);
-  UdpLink guest(GetParam());
-  links[1]->send(guest.local_address(), bytes(2, 1));
-  Bytes buffer(kMaxDatagram);
-  Address from;
-  guest.wait(kForever);
-  EXPECT_EQ(guest.receive(from, buffer), 2U);
+  links[1]->send(a.local_address(), bytes(2, 1));
+  a.wait(kForever);
+  EXPECT_EQ(a.receive(from, buffer), 2U);
   EXPECT_EQ(from, links[0]->local_address());
 }
 

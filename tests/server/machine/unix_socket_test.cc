@@ -21,17 +21,10 @@
 #include "server/machine/udp_link.h"
 #include "tests/server/scratch_folder.h"
 #include "tests/support/refusal.h"
+#include "tests/support/wire.h"
 
 namespace tendon::unix_socket_test {
 namespace {
-
-using testing::ScratchFolder;
-
-std::vector<std::byte> bytes(std::size_t size, int first) {
-  std::vector<std::byte> result(size);
-  for (std::size_t i = 0; i < size; ++i) result[i] = static_cast<std::byte>(first + static_cast<int>(i));
-  return result;
-}
 
 sockaddr_un name_of(const std::filesystem::path& file) {
   sockaddr_un name{};
@@ -69,9 +62,13 @@ std::string complaint_about(const std::filesystem::path& file) {
   return thrown_by<std::runtime_error>([&] { const UnixSocket socket(file); });
 }
 
-TEST(UnixSocket, BringsDatagramsThereAndBackByTheirSender) {
-  const ScratchFolder folder;
-  const auto file = folder.path() / "s";
+class UnixSocketTest : public ::testing::Test {
+ protected:
+  const testing::ScratchFolder folder;
+  const std::filesystem::path file = folder.path() / "s";
+};
+
+TEST_F(UnixSocketTest, BringsDatagramsThereAndBackByTheirSender) {
   UnixSocket server(file);
   Peer a(file);
   Peer z(file);
@@ -93,11 +90,10 @@ TEST(UnixSocket, BringsDatagramsThereAndBackByTheirSender) {
   EXPECT_EQ(z.receive(), bytes(7, 3));
 }
 
-TEST(UnixSocket, SkipsWhoHasNoNameAndWhatIsEmpty) {
-  const ScratchFolder folder;
-  UnixSocket server(folder.path() / "s");
-  Peer nameless(folder.path() / "s", false);
-  Peer named(folder.path() / "s");
+TEST_F(UnixSocketTest, SkipsWhoHasNoNameAndWhatIsEmpty) {
+  UnixSocket server(file);
+  Peer nameless(file, false);
+  Peer named(file);
   nameless.send(bytes(3, 1));
   named.send({});
   named.send(bytes(5000, 2));
@@ -106,10 +102,9 @@ TEST(UnixSocket, SkipsWhoHasNoNameAndWhatIsEmpty) {
   EXPECT_EQ(server.receive(from, buffer), 5000U) << "cut, and the full size is told";
 }
 
-TEST(UnixSocket, LosesADatagramToAPeerThatHasGone) {
-  const ScratchFolder folder;
-  UdpLink link(parse_address("127.0.0.1:0"), Reach::kThisMachine, folder.path() / "s");
-  auto peer = std::make_unique<Peer>(folder.path() / "s");
+TEST_F(UnixSocketTest, LosesADatagramToAPeerThatHasGone) {
+  UdpLink link(parse_address("127.0.0.1:0"), Reach::kThisMachine, file);
+  auto peer = std::make_unique<Peer>(file);
   peer->send(bytes(3, 1));
   link.wait(std::chrono::seconds(10));
   std::vector<std::byte> buffer(kMaxDatagram);
@@ -120,11 +115,10 @@ TEST(UnixSocket, LosesADatagramToAPeerThatHasGone) {
   EXPECT_EQ(link.send_failures(), 1U);
 }
 
-TEST(UnixSocket, ALinkTakesFromBothSocketsInTurns) {
-  const ScratchFolder folder;
-  UdpLink link(parse_address("127.0.0.1:0"), Reach::kThisMachine, folder.path() / "s");
+TEST_F(UnixSocketTest, ALinkTakesFromBothSocketsInTurns) {
+  UdpLink link(parse_address("127.0.0.1:0"), Reach::kThisMachine, file);
   UdpLink far(parse_address("127.0.0.1:0"));
-  Peer near(folder.path() / "s");
+  Peer near(file);
   for (int i = 0; i < 3; ++i) {
     near.send(bytes(3, 1));
     far.send(link.local_address(), bytes(4, 1));
@@ -137,9 +131,7 @@ TEST(UnixSocket, ALinkTakesFromBothSocketsInTurns) {
   link.wait(std::chrono::milliseconds(1));
 }
 
-TEST(UnixSocket, ReplacesTheFileThatADeadServerHasLeft) {
-  const ScratchFolder folder;
-  const auto file = folder.path() / "s";
+TEST_F(UnixSocketTest, ReplacesTheFileThatADeadServerHasLeft) {
   const int dead = ::socket(AF_UNIX, SOCK_DGRAM, 0);
   const sockaddr_un name = name_of(file);
   ASSERT_EQ(::bind(dead, reinterpret_cast<const sockaddr*>(&name), sizeof name), 0);
@@ -149,31 +141,27 @@ TEST(UnixSocket, ReplacesTheFileThatADeadServerHasLeft) {
   EXPECT_EQ(Peer(file).refused(), 0);
 }
 
-TEST(UnixSocket, RefusesAFileBehindWhichAServerListens) {
-  const ScratchFolder folder;
-  const auto file = folder.path() / "s";
+TEST_F(UnixSocketTest, RefusesAFileBehindWhichAServerListens) {
   const UnixSocket first(file);
   EXPECT_EQ(complaint_about(file),
             "cannot listen on unix:" + file.string() + ": another server is already listening there");
   EXPECT_EQ(Peer(file).refused(), 0) << "the first one still does";
 }
 
-TEST(UnixSocket, LeavesAFileThatIsNoSocketAsItIs) {
-  const ScratchFolder folder;
-  const auto file = folder.path() / "notes";
-  std::ofstream(file) << "mine";
-  EXPECT_EQ(complaint_about(file),
-            "cannot listen on unix:" + file.string() + ": the file exists and is not a socket; it was not changed");
+TEST_F(UnixSocketTest, LeavesAFileThatIsNoSocketAsItIs) {
+  const auto notes = folder.path() / "notes";
+  std::ofstream(notes) << "mine";
+  EXPECT_EQ(complaint_about(notes),
+            "cannot listen on unix:" + notes.string() + ": the file exists and is not a socket; it was not changed");
   std::string text;
-  std::ifstream(file) >> text;
+  std::ifstream(notes) >> text;
   EXPECT_EQ(text, "mine");
   const auto link = folder.path() / "link";
   std::filesystem::create_symlink(folder.path() / "nowhere", link);
   EXPECT_NE(complaint_about(link).find("not a socket"), std::string::npos);
 }
 
-TEST(UnixSocket, SaysWhatIsWrongWithAPath) {
-  const ScratchFolder folder;
+TEST_F(UnixSocketTest, SaysWhatIsWrongWithAPath) {
   const std::string longest = (folder.path() / std::string(107 - folder.path().native().size() - 1, 'x')).string();
   EXPECT_EQ(complaint_about(longest), "");
   EXPECT_EQ(complaint_about(longest + "x"),
@@ -182,9 +170,7 @@ TEST(UnixSocket, SaysWhatIsWrongWithAPath) {
   EXPECT_EQ(complaint_about(nowhere), "cannot listen on unix:" + nowhere.string() + ": No such file or directory");
 }
 
-TEST(UnixSocket, TakesItsFileAwayAndNotThatOfAnother) {
-  const ScratchFolder folder;
-  const auto file = folder.path() / "s";
+TEST_F(UnixSocketTest, TakesItsFileAwayAndNotThatOfAnother) {
   { const UnixSocket server(file); }
   EXPECT_FALSE(std::filesystem::exists(file));
   {
@@ -195,9 +181,7 @@ TEST(UnixSocket, TakesItsFileAwayAndNotThatOfAnother) {
   EXPECT_TRUE(std::filesystem::exists(file));
 }
 
-TEST(UnixSocket, LetsInItsUserAndGroupOnly) {
-  const ScratchFolder folder;
-  const auto file = folder.path() / "s";
+TEST_F(UnixSocketTest, LetsInItsUserAndGroupOnly) {
   const UnixSocket server(file);
   struct stat found {};
   ASSERT_EQ(::stat(file.c_str(), &found), 0);

@@ -3,12 +3,10 @@
 
 #include <fcntl.h>
 #include <gtest/gtest.h>
-#include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include <array>
-#include <csignal>
 #include <cstddef>
 #include <filesystem>
 #include <fstream>
@@ -19,18 +17,21 @@
 
 #include "tests/server/recording/recording_samples.h"
 #include "tests/server/scratch_folder.h"
+#include "tests/support/full_disk.h"
 #include "tests/support/refusal.h"
 
 namespace tendon::byte_sink_test {
 namespace {
 
-using testing::ScratchFolder;
-
 std::span<const std::byte> bytes(std::string_view text) { return std::as_bytes(std::span(text)); }
 
-TEST(FileSink, LeavesTheFileOfAnotherRecordingThatStillRunsAlone) {
+class FileSinkTest : public ::testing::Test {
+ protected:
   const testing::ScratchFolder folder;
-  const auto path = folder.path() / "shared.mcap";
+  const std::filesystem::path path = folder.path() / "run.mcap";
+};
+
+TEST_F(FileSinkTest, LeavesTheFileOfAnotherRecordingThatStillRunsAlone) {
   const std::array<std::byte, 3> piece{};
   FileSink first(path);
   ASSERT_TRUE(first.append(piece));
@@ -41,7 +42,7 @@ TEST(FileSink, LeavesTheFileOfAnotherRecordingThatStillRunsAlone) {
   EXPECT_EQ(std::filesystem::file_size(path), 6U);
 }
 
-TEST(FileSink, SharesWhatHasNothingToLose) {
+TEST_F(FileSinkTest, SharesWhatHasNothingToLose) {
   FileSink one("/dev/null");
   FileSink other("/dev/null");
   const std::array<std::byte, 3> bytes{};
@@ -49,21 +50,19 @@ TEST(FileSink, SharesWhatHasNothingToLose) {
   EXPECT_TRUE(other.append(bytes));
 }
 
-TEST(FileSink, NamesPathAndReasonWhenItCannotOpen) {
+TEST_F(FileSinkTest, NamesPathAndReasonWhenItCannotOpen) {
   EXPECT_EQ(thrown_by<std::runtime_error>([&] { FileSink sink("/nowhere/at/all/run.mcap"); }),
             "cannot write recording /nowhere/at/all/run.mcap: No such file or directory");
 }
 
-TEST(FileSink, ReportsAFullDisk) {
+TEST_F(FileSinkTest, ReportsAFullDisk) {
   FileSink sink("/dev/full");
   EXPECT_EQ(sink.error(), "");
   EXPECT_FALSE(sink.append(bytes("abc")));
   EXPECT_EQ(sink.error(), "cannot write recording /dev/full: No space left on device");
 }
 
-TEST(FileSink, NeverTouchesWhatWasThere) {
-  const ScratchFolder folder;
-  const auto path = folder.path() / "run.mcap";
+TEST_F(FileSinkTest, NeverTouchesWhatWasThere) {
   { ASSERT_TRUE(FileSink(path).append(bytes("old and long"))); }
   EXPECT_EQ(FileSink::open_new(path), nullptr);
   EXPECT_EQ(thrown_by<std::runtime_error>([&] { FileSink sink(path); }),
@@ -71,26 +70,22 @@ TEST(FileSink, NeverTouchesWhatWasThere) {
   EXPECT_EQ(std::filesystem::file_size(path), 12U);
 }
 
-TEST(FileSink, TakesOverAnEmptyFile) {
-  const ScratchFolder folder;
-  const auto path = folder.path() / "run.mcap";
+TEST_F(FileSinkTest, TakesOverAnEmptyFile) {
   std::ofstream{path};
   ASSERT_TRUE(FileSink(path).append(bytes("new")));
   EXPECT_EQ(std::filesystem::file_size(path), 3U);
 }
 
-TEST(FileSink, AnEmptyFileIsOneSinksOnly) {
-  const ScratchFolder folder;
-  const FileSink first(folder.path() / "run.mcap");
-  EXPECT_EQ(FileSink::open_new(folder.path() / "run.mcap"), nullptr);
+TEST_F(FileSinkTest, AnEmptyFileIsOneSinksOnly) {
+  const FileSink first(path);
+  EXPECT_EQ(FileSink::open_new(path), nullptr);
 }
 
-TEST(FileSink, RefusesWhatIsNoFileAndDoesNotHang) {
-  const ScratchFolder folder;
+TEST_F(FileSinkTest, RefusesWhatIsNoFileAndDoesNotHang) {
   const auto pipe = folder.path() / "pipe.mcap";
   ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
-  const auto refusal = [](const std::filesystem::path& path) {
-    return thrown_by<std::runtime_error>([&] { FileSink::open_new(path); });
+  const auto refusal = [](const std::filesystem::path& at) {
+    return thrown_by<std::runtime_error>([&] { FileSink::open_new(at); });
   };
   const std::string cannot = "cannot write recording ";
   EXPECT_EQ(refusal(pipe), cannot + pipe.string() + ": it is a named pipe, expected a regular file");
@@ -100,10 +95,7 @@ TEST(FileSink, RefusesWhatIsNoFileAndDoesNotHang) {
   EXPECT_EQ(refusal(folder.path()), cannot + folder.path().string() + ": Is a directory");
 }
 
-/// A disk with room for a part of the write, simulated by the kernel's file size limit.
-TEST(FileSink, NoticesThatItsFileWasDeletedOrCutOff) {
-  const ScratchFolder folder;
-  const auto path = folder.path() / "run.mcap";
+TEST_F(FileSinkTest, NoticesThatItsFileWasDeletedOrCutOff) {
   const auto outcome = [&](auto harm) {
     FileSink sink(path);
     EXPECT_TRUE(sink.append(bytes("0123")));
@@ -118,32 +110,21 @@ TEST(FileSink, NoticesThatItsFileWasDeletedOrCutOff) {
   EXPECT_EQ(outcome([&] { std::filesystem::resize_file(path, 0); }), begin + "truncated in the meantime");
 }
 
-TEST(FileSink, WritesOnInAFileThatWasMovedAway) {
-  const ScratchFolder folder;
-  FileSink sink(folder.path() / "run.mcap");
+TEST_F(FileSinkTest, WritesOnInAFileThatWasMovedAway) {
+  FileSink sink(path);
   EXPECT_TRUE(sink.append(bytes("0123")));
-  std::filesystem::rename(folder.path() / "run.mcap", folder.path() / "kept.mcap");
+  std::filesystem::rename(path, folder.path() / "kept.mcap");
   EXPECT_TRUE(sink.append(bytes("4567"))) << sink.error();
   EXPECT_EQ(std::filesystem::file_size(folder.path() / "kept.mcap"), 8U);
 }
 
-TEST(FileSink, CutsOffAPieceThatDidNotFit) {
-  const ScratchFolder folder;
-  const auto path = folder.path() / "run.mcap";
-  rlimit before{};
-  ASSERT_EQ(::getrlimit(RLIMIT_FSIZE, &before), 0);
-  const auto handler = std::signal(SIGXFSZ, SIG_IGN);
+TEST_F(FileSinkTest, CutsOffAPieceThatDidNotFit) {
   FileSink sink(path);
   ASSERT_TRUE(sink.append(bytes("whole")));
-
-  rlimit small = before;
-  small.rlim_cur = 8;
-  ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &small), 0);
-  const bool fitted = sink.append(bytes("too long"));
-  ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &before), 0);
-  std::signal(SIGXFSZ, handler);
-
-  EXPECT_FALSE(fitted);
+  {
+    const testing::FullDisk disk(8);  // has room for a part of the write
+    EXPECT_FALSE(sink.append(bytes("too long")));
+  }
   EXPECT_NE(sink.error().find("File too large"), std::string::npos) << sink.error();
   EXPECT_EQ(std::filesystem::file_size(path), 5U);
   EXPECT_TRUE(sink.append(bytes("!")));

@@ -3,10 +3,8 @@
 
 #include <gtest/gtest.h>
 #include <malloc.h>
-#include <sys/resource.h>
 
 #include <algorithm>
-#include <csignal>
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
@@ -18,6 +16,7 @@
 #include "server/recording/flight_file.h"
 #include "tests/server/recording/recording_samples.h"
 #include "tests/server/scratch_folder.h"
+#include "tests/support/full_disk.h"
 #include "tests/support/refusal.h"
 
 namespace tendon::part_recorder_test {
@@ -28,7 +27,6 @@ using testing::Contents;
 using testing::ms;
 using testing::sample_datagram;
 using testing::sample_step;
-using testing::ScratchFolder;
 
 PartRecorder::Config config_at(const fs::path& path) {
   PartRecorder::Config config;
@@ -63,9 +61,13 @@ std::set<std::string> names_in(const fs::path& folder) {
   return names;
 }
 
-TEST(PartFiles, ANameThatExistsIsNumberedOn) {
-  const ScratchFolder folder;
-  const auto path = folder.path() / "run.mcap";
+class PartRecorderTest : public ::testing::Test {
+ protected:
+  const testing::ScratchFolder folder;
+  const std::filesystem::path path = folder.path() / "run.mcap";
+};
+
+TEST_F(PartRecorderTest, ANameThatExistsIsNumberedOn) {
   EXPECT_EQ(whole_run(path, 11), "run.mcap");
   EXPECT_EQ(whole_run(path, 12), "run-2.mcap");
   EXPECT_EQ(whole_run(path, 13), "run-3.mcap");
@@ -80,27 +82,24 @@ TEST(PartFiles, ANameThatExistsIsNumberedOn) {
   EXPECT_EQ(whole_run(path), "run-11.mcap");
 }
 
-TEST(PartFiles, AFileThatIsNoRecordingIsRefusedAndLeftAsItIs) {
-  const ScratchFolder folder;
-  const auto path = folder.path() / "scene.toml";
-  std::ofstream(path) << "[device]\nkind = \"simulated\"\n";
-  const auto size = fs::file_size(path);
-  EXPECT_EQ(thrown_by<std::runtime_error>([&] { PartRecorder recorder(config_at(path)); }),
-            "cannot write recording " + path.string() + ": the file exists and is not a recording; it was not changed");
-  EXPECT_EQ(fs::file_size(path), size);
+TEST_F(PartRecorderTest, AFileThatIsNoRecordingIsRefusedAndLeftAsItIs) {
+  const auto toml = folder.path() / "scene.toml";
+  std::ofstream(toml) << "[device]\nkind = \"simulated\"\n";
+  const auto size = fs::file_size(toml);
+  EXPECT_EQ(thrown_by<std::runtime_error>([&] { PartRecorder recorder(config_at(toml)); }),
+            "cannot write recording " + toml.string() + ": the file exists and is not a recording; it was not changed");
+  EXPECT_EQ(fs::file_size(toml), size);
   EXPECT_EQ(names_in(folder.path()).size(), 1U);
 }
 
-TEST(PartFiles, ARecordingThatAnotherServerWritesIsNumberedOn) {
-  const ScratchFolder folder;
-  PartRecorder first(config_at(folder.path() / "run.mcap"));
-  PartRecorder second(config_at(folder.path() / "run.mcap"));
+TEST_F(PartRecorderTest, ARecordingThatAnotherServerWritesIsNumberedOn) {
+  PartRecorder first(config_at(path));
+  PartRecorder second(config_at(path));
   EXPECT_EQ(second.status().path.filename(), "run-2.mcap");
 }
 
-TEST(PartRecorder, EachPartIsAWholeRecordingAndNoStepIsMissing) {
-  const ScratchFolder folder;
-  PartRecorder::Config config = config_at(folder.path() / "run.mcap");
+TEST_F(PartRecorderTest, EachPartIsAWholeRecordingAndNoStepIsMissing) {
+  PartRecorder::Config config = config_at(path);
   config.run.more_devices = {{"left", config.run.scene}};
   config.rotate_after = std::chrono::seconds(1);
   PartRecorder recorder(config);
@@ -124,13 +123,12 @@ TEST(PartRecorder, EachPartIsAWholeRecordingAndNoStepIsMissing) {
   EXPECT_EQ(tick, 3500U);
 }
 
-TEST(PartRecorder, CountsTheStepsOfADeletedFileAsMissingAndGoesOnInItsFolder) {
-  const ScratchFolder folder;
-  const auto path = folder.path() / "runs" / "run.mcap";
-  fs::create_directory(path.parent_path());
-  PartRecorder recorder(config_at(path));
+TEST_F(PartRecorderTest, CountsTheStepsOfADeletedFileAsMissingAndGoesOnInItsFolder) {
+  const auto inner = folder.path() / "runs" / "run.mcap";
+  fs::create_directory(inner.parent_path());
+  PartRecorder recorder(config_at(inner));
   record_run(recorder, 0, 1000);
-  fs::remove_all(path.parent_path());
+  fs::remove_all(inner.parent_path());
   record_run(recorder, 1000, 1000);
   const auto missing = recorder.status();
   EXPECT_EQ(missing.steps, 0U);
@@ -139,10 +137,10 @@ TEST(PartRecorder, CountsTheStepsOfADeletedFileAsMissingAndGoesOnInItsFolder) {
   const auto notices = recorder.take_notices();
   ASSERT_EQ(notices.size(), 1U) << "not one each second";
   EXPECT_TRUE(notices[0].warning);
-  EXPECT_NE(notices[0].text.find(path.string() + ": it was deleted in the meantime"), std::string::npos)
+  EXPECT_NE(notices[0].text.find(inner.string() + ": it was deleted in the meantime"), std::string::npos)
       << notices[0].text;
 
-  fs::create_directory(path.parent_path());
+  fs::create_directory(inner.parent_path());
   record_run(recorder, 2000, 2000);
   recorder.close(ms(4000));
   const auto status = recorder.status();
@@ -150,15 +148,13 @@ TEST(PartRecorder, CountsTheStepsOfADeletedFileAsMissingAndGoesOnInItsFolder) {
   EXPECT_GE(status.steps, 900U);
   EXPECT_FALSE(status.complete());
   EXPECT_EQ(status.error, "");
-  const Contents again = read_file(path);
+  const Contents again = read_file(inner);
   EXPECT_EQ(again.steps.size(), status.steps);
   ASSERT_EQ(again.losses.size(), 1U);
   EXPECT_EQ(again.losses[0].steps, status.lost_steps);
 }
 
-TEST(PartRecorder, AFileThatIsDeletedAsItClosesIsMissing) {
-  const ScratchFolder folder;
-  const auto path = folder.path() / "run.mcap";
+TEST_F(PartRecorderTest, AFileThatIsDeletedAsItClosesIsMissing) {
   PartRecorder recorder(config_at(path));
   record_run(recorder, 0, 100);
   fs::remove(path);
@@ -177,15 +173,14 @@ void record_seconds(PartRecorder& recorder, int from, int until, int first_fault
   }
 }
 
-PartRecorder::Config config_of_faults(const ScratchFolder& folder) {
-  PartRecorder::Config config = config_at(folder.path() / "run.mcap");
+PartRecorder::Config config_of_faults(const fs::path& path) {
+  PartRecorder::Config config = config_at(path);
   config.keep = Keep::kFaults;
   return config;
 }
 
-TEST(PartRecorder, OfFaultsKeepsTheMinuteOfEachAndTheOneBefore) {
-  const ScratchFolder folder;
-  PartRecorder recorder(config_of_faults(folder));
+TEST_F(PartRecorderTest, OfFaultsKeepsTheMinuteOfEachAndTheOneBefore) {
+  PartRecorder recorder(config_of_faults(path));
   record_seconds(recorder, 0, 900, 330, 700);
   recorder.close(ms(900'000));
   EXPECT_EQ(names_in(folder.path()), (std::set<std::string>{"run-5.mcap", "run-6.mcap"}))
@@ -201,9 +196,8 @@ TEST(PartRecorder, OfFaultsKeepsTheMinuteOfEachAndTheOneBefore) {
   EXPECT_TRUE(recorder.status().complete()) << "what is not kept is not missing";
 }
 
-TEST(PartRecorder, OfFaultsKeepsEnoughBeforeOneThatComesFirstInAPart) {
-  const ScratchFolder folder;
-  PartRecorder::Config config = config_of_faults(folder);
+TEST_F(PartRecorderTest, OfFaultsKeepsEnoughBeforeOneThatComesFirstInAPart) {
+  PartRecorder::Config config = config_of_faults(path);
   config.rotate_after = std::chrono::seconds(20);
   PartRecorder recorder(config);
   record_seconds(recorder, 0, 400, 200, 201);
@@ -214,9 +208,8 @@ TEST(PartRecorder, OfFaultsKeepsEnoughBeforeOneThatComesFirstInAPart) {
   EXPECT_LE(read_file(folder.path() / "run-7.mcap").steps.front().tick, 140'000U);
 }
 
-TEST(PartRecorder, OfFaultsOneInSoManyStaysWithoutAFault) {
-  const ScratchFolder folder;
-  PartRecorder::Config config = config_of_faults(folder);
+TEST_F(PartRecorderTest, OfFaultsOneInSoManyStaysWithoutAFault) {
+  PartRecorder::Config config = config_of_faults(path);
   config.one_in = 4;
   PartRecorder recorder(config);
   record_seconds(recorder, 0, 600);
@@ -224,22 +217,20 @@ TEST(PartRecorder, OfFaultsOneInSoManyStaysWithoutAFault) {
   EXPECT_EQ(names_in(folder.path()), (std::set<std::string>{"run.mcap", "run-5.mcap", "run-9.mcap"}));
 }
 
-TEST(PartRecorder, OfFaultsAKilledRunLeavesItsLastMinutes) {
-  const ScratchFolder folder;
+TEST_F(PartRecorderTest, OfFaultsAKilledRunLeavesItsLastMinutes) {
   {
-    PartRecorder recorder(config_of_faults(folder));
+    PartRecorder recorder(config_of_faults(path));
     record_seconds(recorder, 0, 290);
   }
   EXPECT_TRUE(fs::exists(folder.path() / "run-5.mcap"));
   EXPECT_TRUE(fs::exists(folder.path() / "run-4.mcap"));
   EXPECT_FALSE(fs::exists(folder.path() / "run-2.mcap"));
-  PartRecorder next(config_of_faults(folder));
+  PartRecorder next(config_of_faults(path));
   EXPECT_EQ(next.status().path.filename(), "run-6.mcap") << "the order of the numbers is that of the runs";
 }
 
-TEST(PartRecorder, APartIsNoLargerThanItMayBe) {
-  const ScratchFolder folder;
-  PartRecorder::Config config = config_at(folder.path() / "run.mcap");
+TEST_F(PartRecorderTest, APartIsNoLargerThanItMayBe) {
+  PartRecorder::Config config = config_at(path);
   config.rotate_bytes = 1'000'000;
   PartRecorder recorder(config);
   record_run(recorder, 0, 8000);
@@ -248,9 +239,7 @@ TEST(PartRecorder, APartIsNoLargerThanItMayBe) {
   for (const auto& entry : fs::directory_iterator(folder.path())) EXPECT_LE(entry.file_size(), 1'000'000U);
 }
 
-TEST(PartRecorder, ABudgetDeletesItsOwnOldestPartsAndNothingElse) {
-  const ScratchFolder folder;
-  const auto path = folder.path() / "run.mcap";
+TEST_F(PartRecorderTest, ABudgetDeletesItsOwnOldestPartsAndNothingElse) {
   EXPECT_EQ(whole_run(path, 3000), "run.mcap") << "without a budget: it is kept";
   {
     const auto fault = open_flight(path, "");
@@ -297,33 +286,11 @@ TEST(PartRecorder, ABudgetDeletesItsOwnOldestPartsAndNothingElse) {
   EXPECT_FALSE(fs::exists(folder.path() / "run-2.mcap"));
 }
 
-/// A full disk for the open part, simulated by the kernel's file size limit.
-class FullDisk {
- public:
-  FullDisk() : handler_(std::signal(SIGXFSZ, SIG_IGN)) {
-    ::getrlimit(RLIMIT_FSIZE, &before_);
-    rlimit small = before_;
-    small.rlim_cur = 1;
-    ::setrlimit(RLIMIT_FSIZE, &small);
-  }
-  ~FullDisk() {
-    ::setrlimit(RLIMIT_FSIZE, &before_);
-    std::signal(SIGXFSZ, handler_);
-  }
-  FullDisk(const FullDisk&) = delete;
-  FullDisk& operator=(const FullDisk&) = delete;
-
- private:
-  rlimit before_{};
-  void (*handler_)(int);
-};
-
-TEST(PartRecorder, GoesOnWhenThereIsRoomAgainAndSaysWhatIsMissing) {
-  const ScratchFolder folder;
-  PartRecorder recorder(config_at(folder.path() / "run.mcap"));
+TEST_F(PartRecorderTest, GoesOnWhenThereIsRoomAgainAndSaysWhatIsMissing) {
+  PartRecorder recorder(config_at(path));
   record_run(recorder, 0, 1000);
   {
-    const FullDisk disk;
+    const testing::FullDisk disk(1);
     record_run(recorder, 1000, 5000);
     recorder.record(sample_datagram(ms(6000), 100, true));
     EXPECT_NE(recorder.status().error.find("File too large"), std::string::npos);
@@ -335,7 +302,7 @@ TEST(PartRecorder, GoesOnWhenThereIsRoomAgainAndSaysWhatIsMissing) {
   const PartRecorder::Status status = recorder.status();
   EXPECT_EQ(status.error, "");
   EXPECT_FALSE(status.complete());
-  const Contents first = read_file(folder.path() / "run.mcap");
+  const Contents first = read_file(path);
   const Contents second = read_file(folder.path() / "run-2.mcap");
   EXPECT_TRUE(first.truncated);
   EXPECT_FALSE(second.truncated);
@@ -360,7 +327,7 @@ TEST(PartRecorder, GoesOnWhenThereIsRoomAgainAndSaysWhatIsMissing) {
       << said;
 }
 
-TEST(PartRecorder, OnADeviceWithoutSpaceCountsEverythingAndSaysSoOnce) {
+TEST_F(PartRecorderTest, OnADeviceWithoutSpaceCountsEverythingAndSaysSoOnce) {
   PartRecorder recorder(config_at("/dev/full"));
   record_run(recorder, 0, 5000);
   recorder.close(ms(5000));
@@ -370,7 +337,7 @@ TEST(PartRecorder, OnADeviceWithoutSpaceCountsEverythingAndSaysSoOnce) {
   EXPECT_EQ(recorder.take_notices().size(), 1U);
 }
 
-TEST(PartRecorder, HoldsNoMoreMemoryAfterADayThanAfterTwoHours) {
+TEST_F(PartRecorderTest, HoldsNoMoreMemoryAfterADayThanAfterTwoHours) {
   PartRecorder::Config config = config_at("/dev/null");
   config.rotate_after = std::chrono::hours(1);
   PartRecorder recorder(config);

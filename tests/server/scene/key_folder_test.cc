@@ -2,16 +2,15 @@
 #include "server/scene/key_folder.h"
 
 #include <gtest/gtest.h>
-#include <sys/resource.h>
 #include <sys/stat.h>
 
-#include <csignal>
 #include <filesystem>
 #include <fstream>
 #include <stdexcept>
 #include <string>
 
 #include "tests/server/scratch_folder.h"
+#include "tests/support/full_disk.h"
 #include "tests/support/refusal.h"
 
 namespace tendon::key_folder_test {
@@ -51,38 +50,13 @@ TEST(KeyFolder, AKeyIsWrittenForItsOwnerOnlyAndNeverOverAnother) {
   EXPECT_EQ(read_key_folder(folder.path())[0].key.bytes(), some_key("wall", 1).key.bytes());
 }
 
-/// A full disk: limits every file of this process to `bytes`.
-class FullDisk {
- public:
-  explicit FullDisk(rlim_t bytes) {
-    getrlimit(RLIMIT_FSIZE, &before_);
-    const rlimit less{.rlim_cur = bytes, .rlim_max = before_.rlim_max};
-    signal_ = std::signal(SIGXFSZ, SIG_IGN);
-    setrlimit(RLIMIT_FSIZE, &less);
-  }
-  ~FullDisk() {
-    setrlimit(RLIMIT_FSIZE, &before_);
-    std::signal(SIGXFSZ, signal_);
-  }
-  FullDisk(const FullDisk&) = delete;
-  FullDisk& operator=(const FullDisk&) = delete;
-
- private:
-  rlimit before_{};
-  void (*signal_)(int) = nullptr;
-};
-
 TEST(KeyFolder, AFullDiskLeavesNothingBehindAndTheRetryWorks) {
   const ScratchFolder folder;
   const auto file = folder.path() / "wall.key";
   std::string refusal;
   {
-    const FullDisk full(10);
-    try {
-      write_key_file(file, some_key("wall", 1));
-    } catch (const std::runtime_error& error) {
-      refusal = error.what();
-    }
+    const testing::FullDisk full(10);
+    refusal = thrown_by<std::runtime_error>([&] { write_key_file(file, some_key("wall", 1)); });
   }
   EXPECT_EQ(refusal, "cannot write key file " + file.string() + ": File too large");
   EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
