@@ -99,22 +99,15 @@ TEST(McapWriter, WritesNothingBeforeTheFirstFlush) {
   EXPECT_EQ(writer.chunk_size(), 0U);
 }
 
-TEST(McapWriter, MakesNoChunkOutOfNothing) {
-  MemorySink sink;
-  McapWriter writer("lib", sink);
-  ASSERT_TRUE(writer.flush_chunk());
-  const auto size = sink.bytes().size();
-  ASSERT_TRUE(writer.flush_chunk());
-  EXPECT_EQ(sink.bytes().size(), size);
-}
-
-TEST(McapWriter, EndsTheFileOnlyOnce) {
-  MemorySink sink;
-  McapWriter writer("lib", sink);
-  ASSERT_TRUE(writer.close());
-  const auto size = sink.bytes().size();
-  EXPECT_TRUE(writer.close());
-  EXPECT_EQ(sink.bytes().size(), size);
+TEST(McapWriter, MakesNoChunkOutOfNothingAndEndsTheFileOnlyOnce) {
+  for (const auto write : {&McapWriter::flush_chunk, &McapWriter::close}) {
+    MemorySink sink;
+    McapWriter writer("lib", sink);
+    ASSERT_TRUE((writer.*write)());
+    const auto size = sink.bytes().size();
+    ASSERT_TRUE((writer.*write)());
+    EXPECT_EQ(sink.bytes().size(), size);
+  }
 }
 
 TEST(McapWriter, RefusesMessagesWithoutAChannelAndAfterTheEnd) {

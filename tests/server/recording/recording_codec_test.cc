@@ -8,8 +8,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <memory>
-#include <sstream>
+#include <iterator>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -99,6 +98,7 @@ TEST(RecordingCodec, KeepsWhatFitsOfADatagramThatWasTooLarge) {
 PortRecord a_port() {
   PortRecord port;
   port.tick = 77;
+  port.channel = 2;
   port.at = testing::ms(77);
   port.settled = {.credit = 1.25e-3, .withdraw = 0.5e-3};
   port.grip_settled = {.credit = 0.75e-3, .withdraw = 0.25e-3};
@@ -122,11 +122,12 @@ PortRecord a_port() {
   port.sent.taken = 0.75;
   port.peer = port.sent;
   port.peer_arrived = testing::ms(76);
-  port.peer->contact_force = Vec3(0.5, 0, -0.5);
-  port.peer->surface = {.normal = {0, 0.6, 0.8}, .offset = -0.125, .stiffness = 500};
-  port.peer->wave_integral = {0.25, 0, -1};
+  port.peer->contact_force = Vec3(0.5, 0.25, -0.5);
+  port.peer->surface = {.normal = {0.48, 0.6, 0.64}, .offset = -0.125, .stiffness = 500};
+  port.peer->wave_integral = {0.25, 0.5, -1};
   port.peer->wave_energy = 0.5;
-  port.peer->turn = {.turn = {.w = 0.6, .x = 0, .y = 0.8, .z = 0}, .angular_velocity = {1, 2, 3}, .torque = {4, -5, 6}};
+  port.peer->turn = {
+      .turn = {.w = 0.5, .x = 0.5, .y = -0.5, .z = 0.5}, .angular_velocity = {1, 2, 3}, .torque = {4, -5, 6}};
   port.peer->grip = {
       .opening = 0.0625, .velocity = -0.125, .force = 2, .account = -0.25, .need = 0.5, .given = 0.75, .taken = 1.25};
   port.peer->energy_in = 3.5;
@@ -136,46 +137,30 @@ PortRecord a_port() {
   return port;
 }
 
+/// Returns the names of the fields that have no value in `message` and in the messages within it.
+std::vector<std::string> unset_in(const google::protobuf::Message& message) {
+  std::vector<std::string> unset;
+  for (int i = 0; i < message.GetDescriptor()->field_count(); ++i) {
+    const auto* const field = message.GetDescriptor()->field(i);
+    if (!message.GetReflection()->HasField(message, field)) {
+      unset.push_back(field->full_name());
+    } else if (field->message_type() != nullptr) {
+      std::ranges::copy(unset_in(message.GetReflection()->GetMessage(message, field)), std::back_inserter(unset));
+    }
+  }
+  return unset;
+}
+
 TEST(RecordingCodec, APortComesBackWithAllThatItHad) {
-  const PortRecord port = a_port();
+  PortRecord port = a_port();
   const PortRecord read = recording::decode_port(recording::encode(port), port.at);
   EXPECT_EQ(recording::encode(read), recording::encode(port));
   EXPECT_EQ(read.at, port.at);
-  EXPECT_EQ(read.peer_arrived, port.peer_arrived);
-  EXPECT_EQ(read.settled.credit, port.settled.credit);
-  EXPECT_EQ(read.settled.withdraw, port.settled.withdraw);
-  EXPECT_EQ(read.grip_settled.credit, port.grip_settled.credit);
-  EXPECT_EQ(read.grip_settled.withdraw, port.grip_settled.withdraw);
-  EXPECT_EQ(read.sent.phase, PortPhase::kClutched);
-  EXPECT_EQ(read.sent.position, port.sent.position);
-  EXPECT_EQ(read.sent.time, port.sent.time);
-  EXPECT_EQ(read.sent.taken, 0.75);
-  EXPECT_FALSE(read.sent.contact_force);
-  ASSERT_TRUE(read.peer);
-  EXPECT_EQ(read.peer->contact_force, port.peer->contact_force);
-  ASSERT_TRUE(read.peer->surface);
-  EXPECT_EQ(read.peer->surface->normal, port.peer->surface->normal);
-  EXPECT_EQ(read.peer->surface->offset, -0.125);
-  EXPECT_EQ(read.peer->surface->stiffness, 500);
-  EXPECT_EQ(read.peer->wave_integral, port.peer->wave_integral);
-  EXPECT_EQ(read.peer->wave_energy, 0.5);
-  ASSERT_TRUE(read.peer->turn);
-  EXPECT_EQ(read.peer->turn->turn, port.peer->turn->turn);
-  EXPECT_EQ(read.peer->turn->angular_velocity, port.peer->turn->angular_velocity);
-  EXPECT_EQ(read.peer->turn->torque, port.peer->turn->torque);
-  ASSERT_TRUE(read.peer->grip);
-  EXPECT_EQ(read.peer->grip->opening, 0.0625);
-  EXPECT_EQ(read.peer->grip->velocity, -0.125);
-  EXPECT_EQ(read.peer->grip->force, 2);
-  EXPECT_EQ(read.peer->grip->account, -0.25);
-  EXPECT_EQ(read.peer->grip->need, 0.5);
-  EXPECT_EQ(read.peer->grip->given, 0.75);
-  EXPECT_EQ(read.peer->grip->taken, 1.25);
-  EXPECT_EQ(read.peer->energy_in, 3.5);
-  EXPECT_EQ(read.peer->share, 0.0);
-  EXPECT_EQ(read.peer->position_scale, 0.5);
-  EXPECT_EQ(read.peer->force_scale, 4);
-  EXPECT_FALSE(read.sent.surface || read.sent.turn || read.sent.grip || read.sent.share);
+  EXPECT_FALSE(read.sent.contact_force || read.sent.surface || read.sent.turn || read.sent.grip || read.sent.share);
+  port.sent = *port.peer;
+  pb::Port message;
+  ASSERT_TRUE(message.ParseFromString(recording::encode(port)));
+  EXPECT_EQ(unset_in(message), std::vector<std::string>()) << "every field of the schema is written";
   PortRecord alone = port;
   alone.peer.reset();
   EXPECT_FALSE(recording::decode_port(recording::encode(alone), port.at).peer);
@@ -193,10 +178,7 @@ TEST(RecordingCodec, APortIsInTheFileBeforeItsStepAndOnlyOfACoupledDevice) {
     if (coupled) recorder.record(a_port());
     recorder.record(testing::sample_step(77));
     recorder.close();
-    const auto bytes = sink.bytes();
-    RecordingReader reader(
-        std::make_unique<std::istringstream>(std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size())),
-        "x");
+    RecordingReader reader(testing::stream(sink.bytes()), "x");
     std::vector<std::size_t> kinds;
     while (const auto record = reader.next()) kinds.push_back(record->index());
     EXPECT_EQ(kinds, coupled ? (std::vector<std::size_t>{0, 4, 1}) : (std::vector<std::size_t>{0, 1}));

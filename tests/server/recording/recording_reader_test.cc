@@ -162,27 +162,6 @@ TEST(Recording, AStepOfAnEngineThatSaysNoWayTakesTheBytesThatItAlwaysTook) {
       << "a tag of two bytes, a length, and the name";
 }
 
-TEST(RecordingReader, GivesTheWholeChunksOfARecordingCutAnywhere) {
-  Recorder::Config config = sample_config();
-  config.flush_after = std::chrono::milliseconds(5);
-  MemorySink sink;
-  Recorder recorder(config, sink);
-  record_samples(recorder, 20);
-  recorder.close();
-
-  const std::span<const std::byte> file = sink.bytes();
-  std::size_t seen = 0;
-  for (std::size_t size = 0; size < file.size(); ++size) {
-    const Contents contents = read_all(file.first(size));
-    EXPECT_EQ(contents.error, "") << "cut at " << size;
-    EXPECT_TRUE(contents.truncated) << "cut at " << size;
-    EXPECT_GE(contents.records(), seen) << "cut at " << size;
-    for (std::size_t i = 0; i < contents.steps.size(); ++i) EXPECT_TRUE(same(contents.steps[i], sample_step(i)));
-    seen = contents.records();
-  }
-  EXPECT_EQ(seen, 1U + 20U + 4U);
-}
-
 TEST(RecordingReader, SaysWhyItHasNoStep) {
   MemorySink sink;
   Recorder recorder(sample_config(), sink);
@@ -196,23 +175,6 @@ TEST(RecordingReader, SaysWhyItHasNoStep) {
   EXPECT_EQ(said(file.first(0)), "a.mcap: the file is empty");
   EXPECT_EQ(said(file.first(20)), "a.mcap: truncated before the first haptic step");
   EXPECT_EQ(said(file), "a.mcap: contains no haptic step");
-}
-
-TEST(RecordingReader, ReadsAFile) {
-  const ScratchFolder folder;
-  const auto path = folder.path() / "run.mcap";
-  {
-    FileSink sink(path);
-    Recorder recorder(sample_config(), sink);
-    record_samples(recorder, 2000);
-    recorder.close();
-  }
-  RecordingReader reader(path);
-  const Contents contents = read_all(reader);
-  EXPECT_EQ(contents.error, "");
-  EXPECT_EQ(contents.steps.size(), 2000U);
-  EXPECT_EQ(contents.datagrams.size(), 400U);
-  EXPECT_FALSE(contents.truncated);
 }
 
 TEST(RecordingReader, PutsWallClockTimeInTheFileAndLocalTimeInTheRecords) {
