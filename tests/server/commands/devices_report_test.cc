@@ -40,27 +40,24 @@ TEST(DevicesReport, NamesWhatTendonHasADriverForAndNothingElse) {
   EXPECT_EQ(in_json({}), "");
 }
 
-TEST(DevicesReport, ASpaceMouseWantsNoFirmwareButTheRightToBeOpened) {
-  std::vector<usb::PluggedIn> plugged = {falcon(true)};
-  plugged[0].id = {0x256F, 0xC635};
-  const auto devices = report_devices(plugged, std::nullopt);
-  ASSERT_EQ(devices.size(), 1U);
-  EXPECT_EQ(devices[0].kind, "spacemouse");
-  EXPECT_TRUE(devices[0].lacks.empty());
-  plugged[0].may_open = false;
-  EXPECT_EQ(report_devices(plugged, std::nullopt)[0].lacks.size(), 1U);
-}
-
-TEST(DevicesReport, AWoodenHapticsIsNamedWithADoubt) {
-  std::vector<usb::PluggedIn> plugged = {falcon(true)};
-  plugged[0].id = {0x1234, 0x0006};
-  const auto devices = report_devices(plugged, std::nullopt);
-  ASSERT_EQ(devices.size(), 1U);
-  EXPECT_EQ(devices[0].kind, "woodenhaptics");
-  EXPECT_NE(devices[0].name.find("or another HID gadget of mbed"), std::string::npos);
-  EXPECT_TRUE(devices[0].lacks.empty()) << "it wants no firmware from us";
-  plugged[0].may_open = false;
-  EXPECT_EQ(report_devices(plugged, std::nullopt)[0].lacks.size(), 1U);
+TEST(DevicesReport, SomeWantNoFirmwareButTheRightToBeOpened) {
+  const struct {
+    usb::Id id;
+    const char* kind;
+    const char* name;
+  } cases[] = {{{0x256F, 0xC635}, "spacemouse", ""},
+               {{0x1234, 0x0006}, "woodenhaptics", "or another HID gadget of mbed"}};
+  for (const auto& [id, kind, name] : cases) {
+    std::vector<usb::PluggedIn> plugged = {falcon(true)};
+    plugged[0].id = id;
+    const auto devices = report_devices(plugged, std::nullopt);
+    ASSERT_EQ(devices.size(), 1U);
+    EXPECT_EQ(devices[0].kind, kind);
+    EXPECT_NE(devices[0].name.find(name), std::string::npos);
+    EXPECT_TRUE(devices[0].lacks.empty());
+    plugged[0].may_open = false;
+    EXPECT_EQ(report_devices(plugged, std::nullopt)[0].lacks.size(), 1U);
+  }
 }
 
 TEST(DevicesReport, AMissingNodeIsMendedByTheContainerNotByRights) {

@@ -4,21 +4,18 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <nlohmann/json.hpp>
 #include <set>
 #include <sstream>
 #include <string>
 #include <vector>
 
+#include "tests/server/scene/scene_text.h"
+
 namespace tendon::explain_test {
 namespace {
 
 using namespace std::chrono_literals;
-
-Scene shipped(const char* name) { return read_scene(std::filesystem::path(TENDON_SCENES) / name); }
 
 constexpr int kRounds = 4;
 
@@ -54,21 +51,23 @@ TEST(Explain, NamesEveryPartThatASceneMayLeaveOut) {
   EXPECT_EQ(named, optional_parts());
 }
 
-TEST(Explain, OnlyWhatIsListedHasACost) {
+std::set<std::string> listed_in(const char* scene) {
   std::set<std::string> listed;
-  for (const auto& part : explain(shipped("admittance.toml"), ticking(), kRounds).parts) {
+  for (const auto& part : explain(shipped(scene), ticking(), kRounds).parts) {
     if (part.cost_ns) listed.insert(std::string(part.key));
   }
-  EXPECT_EQ(listed, (std::set<std::string>{"admittance", "device.effects.coulomb_friction_n",
-                                           "device.effects.force_sensor", "device.effects.max_force_n",
-                                           "device.effects.viscous_friction_n_s_per_m", "device.hand", "limiter"}));
+  return listed;
+}
+
+TEST(Explain, OnlyWhatIsListedHasACost) {
+  EXPECT_EQ(listed_in("admittance.toml"),
+            (std::set<std::string>{"admittance", "device.effects.coulomb_friction_n", "device.effects.force_sensor",
+                                   "device.effects.max_force_n", "device.effects.viscous_friction_n_s_per_m",
+                                   "device.hand", "limiter"}));
 }
 
 TEST(Explain, NamesWhatOfAHandleIsCoupled) {
-  std::set<std::string> listed;
-  for (const auto& part : explain(shipped("stylus_leader.toml"), ticking(), kRounds).parts) {
-    if (part.cost_ns) listed.insert(std::string(part.key));
-  }
+  const std::set<std::string> listed = listed_in("stylus_leader.toml");
   for (const char* const part :
        {"device.rotation", "device.gripper", "teleoperation", "teleoperation.turn", "teleoperation.grip"}) {
     EXPECT_TRUE(listed.contains(part)) << part;
@@ -76,8 +75,6 @@ TEST(Explain, NamesWhatOfAHandleIsCoupled) {
 }
 
 TEST(Explain, SaysHowACouplingIsFeltByEachMethod) {
-  std::ifstream shipped_scene(std::filesystem::path(TENDON_SCENES) / "leader.toml");
-  const std::string text{std::istreambuf_iterator<char>(shipped_scene), {}};
   for (const CouplingMethod method : kCouplingMethods) {
     const std::string name(to_string(method));
     const bool rate = method == CouplingMethod::kRate;
@@ -87,7 +84,7 @@ TEST(Explain, SaysHowACouplingIsFeltByEachMethod) {
         settings.push_back(std::string("teleoperation.rate.") + key);
       }
     }
-    const Scene scene = parse_scene(text, "leader.toml", ".", settings);
+    const Scene scene = shipped("leader.toml", settings);
     const Explanation explanation = explain(scene, ticking(), kRounds);
     EXPECT_TRUE(std::ranges::any_of(explanation.parts, [](const auto& part) {
       return part.key == "teleoperation" && part.cost_ns;

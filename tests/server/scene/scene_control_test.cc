@@ -214,12 +214,8 @@ TEST(Scene, TheDevicesOfAllCountsHaveNamesOfTheirOwnAndAreNotTooMany) {
     const std::string b = (folder.path() / "b.toml").string();
     write(a, std::string(kMinimal) + first);
     write(b, std::string(kMinimal) + second);
-    try {
-      read_scenes({a, b});
-    } catch (const SceneError& error) {
-      return std::string(error.what()).substr(b.size());
-    }
-    return "none";
+    const std::string error = thrown_by<SceneError>([&] { read_scenes({a, b}); });
+    return error.empty() ? "none" : error.substr(b.size());
   };
   EXPECT_EQ(
       error_of("count = 2\n", "name = \"a-1\"\n"),
@@ -235,12 +231,8 @@ TEST(Scene, NetworkThreadsAreAPowerOfTwoThatTheBanksAndTheSocketsAllow) {
   const std::string file = (folder.path() / "a.toml").string();
   const auto error_of = [&](int devices, const std::string& network) -> std::string {
     write(file, std::string(kMinimal) + "count = " + std::to_string(devices) + "\n[network]\n" + network);
-    try {
-      read_scenes({file});
-    } catch (const SceneError& error) {
-      return std::string(error.what()).substr(file.size());
-    }
-    return "none";
+    const std::string error = thrown_by<SceneError>([&] { read_scenes({file}); });
+    return error.empty() ? "none" : error.substr(file.size());
   };
   const std::string expected =
       ": network.threads: expected a power of two, at most the number of banks of 16 devices, ";

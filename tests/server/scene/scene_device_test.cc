@@ -91,12 +91,12 @@ TEST(Scene, AFalconIsARealDeviceWhoseFrictionIsToldNotTaken) {
       "port = \"1-2.3\"\nfirmware = \"mine.bin\"\naccept_unknown_firmware = true\nname = \"left\"\n";
   const Scene told =
       parse("[device]\nkind = \"falcon\"\n" + keys + std::string(kFalcon.substr(kFalcon.find("[l"))), "/scenes");
-  EXPECT_EQ(std::get<falcon::Config>(told.device).port, "1-2.3");
-  EXPECT_EQ(std::get<falcon::Config>(told.device).firmware, "/scenes/mine.bin");
-  EXPECT_TRUE(std::get<falcon::Config>(told.device).accept_unknown_firmware);
+  const auto& config = std::get<falcon::Config>(told.device);
+  EXPECT_EQ(config.port, "1-2.3");
+  EXPECT_EQ(config.firmware, "/scenes/mine.bin");
+  EXPECT_TRUE(config.accept_unknown_firmware);
   EXPECT_EQ(told.name, "left");
-  EXPECT_TRUE(
-      std::holds_alternative<falcon::Config>(read_scene(std::filesystem::path(TENDON_SCENES) / "falcon.toml").device));
+  EXPECT_TRUE(std::holds_alternative<falcon::Config>(shipped("falcon.toml").device));
 }
 
 TEST(Scene, AFalconHasNoKeysOfTheSimulatedDeviceAndIsNotWithoutALimiter) {
@@ -131,15 +131,13 @@ TEST(Scene, AReplayedCsvFileNeedsNothingElseBecauseNobodyFeelsAForce) {
                                 "at_end = \"repeat\"\nencoder_step_um = 30\n[device.csv]\nfile = \"hand.csv\"\n"
                                 "position_column = \"angle\"\nscale_m = 0.5\ndirection = [0, 3, 0]\n",
                             folder.path());
-  ASSERT_TRUE(std::holds_alternative<ReplayDevice::Config>(scene.device));
   EXPECT_FALSE(scene.driver().exerts_force);
-  ASSERT_EQ(std::get<ReplayDevice::Config>(scene.device).samples.size(), 3U);
-  EXPECT_EQ(std::get<ReplayDevice::Config>(scene.device).samples[2].position, Vec3(0, 2, 0));
-  EXPECT_EQ(std::get<ReplayDevice::Config>(scene.device).samples[2].at -
-                std::get<ReplayDevice::Config>(scene.device).samples[0].at,
-            15ms);
-  EXPECT_EQ(std::get<ReplayDevice::Config>(scene.device).at_end, ReplayDevice::AtEnd::kRepeat);
-  EXPECT_EQ(std::get<ReplayDevice::Config>(scene.device).position_resolution, 3e-5);
+  const auto& replay = std::get<ReplayDevice::Config>(scene.device);
+  ASSERT_EQ(replay.samples.size(), 3U);
+  EXPECT_EQ(replay.samples[2].position, Vec3(0, 2, 0));
+  EXPECT_EQ(replay.samples[2].at - replay.samples[0].at, 15ms);
+  EXPECT_EQ(replay.at_end, ReplayDevice::AtEnd::kRepeat);
+  EXPECT_EQ(replay.position_resolution, 3e-5);
   EXPECT_EQ(scene.loop.control.limiter.friction.coulomb, 0);
   EXPECT_TRUE(parse(std::string(kMinimal)).driver().exerts_force);
 }
@@ -161,10 +159,11 @@ TEST(Scene, AReplayedRecordingIsTheHandThatWasSeenBitForBit) {
   }
   const Scene scene = parse(std::string(kReplay) + "recording = \"run.mcap\"\n", folder.path());
   std::erase_if(steps, [](const StepRecord& step) { return step.reasons.has(Reason::kUnseen); });
-  ASSERT_EQ(std::get<ReplayDevice::Config>(scene.device).samples.size(), steps.size());
+  const auto& replay = std::get<ReplayDevice::Config>(scene.device);
+  ASSERT_EQ(replay.samples.size(), steps.size());
   for (std::size_t i = 0; i < steps.size(); ++i) {
-    EXPECT_EQ(std::get<ReplayDevice::Config>(scene.device).samples[i].position, steps[i].hand.position);
-    EXPECT_EQ(std::get<ReplayDevice::Config>(scene.device).samples[i].at, steps[i].hand.at.time_since_epoch());
+    EXPECT_EQ(replay.samples[i].position, steps[i].hand.position);
+    EXPECT_EQ(replay.samples[i].at, steps[i].hand.at.time_since_epoch());
   }
 }
 
@@ -193,7 +192,8 @@ TEST(Scene, AReplayRunsTheLoopAsTheHandDidAndAFieldOfForceChangesNothing) {
   write(folder.path() / "hand.csv", "t_s,x\n0,0\n0.002,0.001\n0.004,0.002\n0.006,0.003\n");
   const Scene scene =
       parse(std::string(kReplay) + "[device.csv]\nfile = \"hand.csv\"\nposition_column = \"x\"\n", folder.path());
-  ReplayDevice device(std::get<ReplayDevice::Config>(scene.device));
+  const auto& replay = std::get<ReplayDevice::Config>(scene.device);
+  ReplayDevice device(replay);
   Mailboxes mail({.steps = 64, .flight = 2, .datagrams = 1});
   HapticLoop loop(scene.loop, device, mail);
   LocalTime now{1s};
@@ -210,8 +210,7 @@ TEST(Scene, AReplayRunsTheLoopAsTheHandDidAndAFieldOfForceChangesNothing) {
     EXPECT_EQ(step->applied, Vec3::Zero());
     asked = std::max(asked, step->wanted.norm());
     if (i % 2 == 0 && i <= 6) {
-      EXPECT_EQ(step->hand.position,
-                std::get<ReplayDevice::Config>(scene.device).samples[static_cast<std::size_t>(i / 2)].position);
+      EXPECT_EQ(step->hand.position, replay.samples[static_cast<std::size_t>(i / 2)].position);
     }
     mail.steps.pop();
   }
@@ -231,8 +230,7 @@ TEST(Scene, ASpaceMouseNeedsNothingElseEither) {
   EXPECT_EQ(std::get<spacemouse::Config>(told.device).motion.reach, 0.07);
   EXPECT_EQ(error_of(mouse + "dead_band = 1\n"),
             "s.toml:3: device.dead_band: expected a number from 0 to 0.9, found 1");
-  EXPECT_TRUE(std::holds_alternative<spacemouse::Config>(
-      read_scene(std::filesystem::path(TENDON_SCENES) / "spacemouse.toml").device));
+  EXPECT_TRUE(std::holds_alternative<spacemouse::Config>(shipped("spacemouse.toml").device));
 }
 
 constexpr std::string_view kArm =
@@ -265,15 +263,13 @@ TEST(Scene, AWoodenHapticsIsARealDeviceOfAModelWhoseWatchdogIsCountedOn) {
   EXPECT_EQ(std::get<woodenhaptics::Config>(told.device).port, "1-2.3");
   EXPECT_EQ(std::get<woodenhaptics::Config>(told.device).drive.max_current, 0.7);
   EXPECT_FALSE(std::holds_alternative<woodenhaptics::Config>(parse(std::string(kFalcon)).device));
-  EXPECT_TRUE(std::holds_alternative<woodenhaptics::Config>(
-      read_scene(std::filesystem::path(TENDON_SCENES) / "woodenhaptics.toml").device));
+  EXPECT_TRUE(std::holds_alternative<woodenhaptics::Config>(shipped("woodenhaptics.toml").device));
 }
 
 TEST(Scene, AWoodenHapticsSaysWhichModelsCanBeDrivenAndWhyTwoCannot) {
   const std::string kind = "[device]\nkind = \"woodenhaptics\"\n";
   const std::string models =
-      "expected one of \"woodenhaptics_v2019\", \"woodenhaptics_v2015\", \"polhem_v1\", \"aluhaptics_v2\", "
-      "\"vintage\"";
+      "expected one of \"woodenhaptics_v2019\", \"woodenhaptics_v2015\", \"polhem_v1\", \"aluhaptics_v2\", \"vintage\"";
   EXPECT_EQ(error_of(kind), "s.toml:1: device.model: missing, " + models);
   EXPECT_EQ(error_of(kind + "model = \"hawk\"\n"), "s.toml:3: device.model: " + models + ", found \"hawk\"");
   for (const std::string name : {"polhem_v2", "polhem_v3"}) {

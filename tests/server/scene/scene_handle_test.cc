@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <numbers>
 #include <string>
+#include <vector>
 
 #include "core/base/rotation.h"
 #include "server/scene/scene.h"
@@ -34,72 +35,52 @@ TEST(SceneHandle, WithoutItsTablesAHandleIsAPoint) {
   EXPECT_TRUE(device.presses.empty());
 }
 
+SimulatedRotation::Config rotation(S scene) { return *scene.simulated().rotation; }
+Vec3 turned(S scene) { return rotation(scene).hand->motion.at(0.125).position; }
+
 TEST(SceneHandle, ARotationHasWhatItListsInItsUnits) {
   const auto bare = *minimal_and(kRotation).simulated().rotation;
   EXPECT_EQ(bare.inertia, 2e-5);
   EXPECT_FALSE(bare.viscous_friction || bare.coulomb_friction || bare.max_torque || bare.encoder_step || bare.start ||
                bare.hand);
-  const auto all = *minimal_and(kRotation + R"(viscous_friction_nm_s_per_rad = 2e-4
-coulomb_friction_nm = 1e-3
-max_torque_nm = 0.2
-encoder_step_rad = 0.0005
-start_deg = [0, 90, 0]
-[device.rotation.hand]
-stiffness_nm_per_rad = 0.3
-damping_nm_s_per_rad = 0.002
-[device.rotation.hand.motion]
-kind = "sine"
-amplitude_deg = 45
-frequency_hz = 2
-centre_deg = [10, 20, 30]
-direction = [0, 0, 5]
-[limiter.rotation]
-coulomb_friction_nm = 0
-viscous_friction_nm_s_per_rad = 1e-4
-)")
-                        .simulated()
-                        .rotation;
-  EXPECT_EQ(all.viscous_friction, 2e-4);
-  EXPECT_EQ(all.coulomb_friction, 1e-3);
-  EXPECT_EQ(all.max_torque, 0.2);
-  EXPECT_EQ(all.encoder_step, 0.0005);
-  EXPECT_NEAR((*all.start - Vec3(0, 90 * kDegree, 0)).norm(), 0, 1e-15);
-  EXPECT_EQ(all.hand->stiffness, 0.3);
-  EXPECT_EQ(all.hand->damping, 0.002);
-  EXPECT_NEAR((all.hand->motion.at(0.125).position - Vec3(10, 20, 75) * kDegree).norm(), 0, 1e-14);
+  const std::string bounds = "[limiter.rotation]\ncoulomb_friction_nm = 0\nviscous_friction_nm_s_per_rad = 1e-4\n";
+  const std::vector<Setting> settings = {
+      {"device.rotation.viscous_friction_nm_s_per_rad=2e-4", 2e-4, [](S s) { return *rotation(s).viscous_friction; }},
+      {"device.rotation.coulomb_friction_nm=1e-3", 1e-3, [](S s) { return *rotation(s).coulomb_friction; }},
+      {"device.rotation.max_torque_nm=0.2", 0.2, [](S s) { return *rotation(s).max_torque; }},
+      {"device.rotation.encoder_step_rad=0.0005", 0.0005, [](S s) { return *rotation(s).encoder_step; }},
+      {"device.rotation.start_deg=[0, 90, 0]", 90 * kDegree, [](S s) { return rotation(s).start->y(); }},
+      {"device.rotation.hand.stiffness_nm_per_rad=0.3", 0.3, [](S s) { return rotation(s).hand->stiffness; }},
+      {"device.rotation.hand.damping_nm_s_per_rad=0.002", 0.002, [](S s) { return rotation(s).hand->damping; }},
+      {"device.rotation.hand.motion.kind=sine", 10 * kDegree, [](S s) { return turned(s).x(); }},
+      {"device.rotation.hand.motion.amplitude_deg=45", 75 * kDegree, [](S s) { return turned(s).z(); }},
+      {"device.rotation.hand.motion.frequency_hz=2", 75 * kDegree, [](S s) { return turned(s).z(); }},
+      {"device.rotation.hand.motion.centre_deg=[10, 20, 30]", 20 * kDegree, [](S s) { return turned(s).y(); }},
+      {"device.rotation.hand.motion.direction=[0, 0, 5]", 75 * kDegree, [](S s) { return turned(s).z(); }}};
+  expect_made(std::string(kMinimal) + kRotation + bounds, settings);
 }
 
+SimulatedGripper::Config gripper(S scene) { return *scene.simulated().gripper; }
+double gripped(S scene, double t) { return gripper(scene).hand->motion.at(t).position.x(); }
+
 TEST(SceneHandle, AGripperHasWhatItListsInItsUnits) {
-  const auto all = *minimal_and(kGripper + R"(viscous_friction_n_s_per_m = 0.5
-coulomb_friction_n = 0.1
-max_force_n = 3
-encoder_step_rad = 0.001
-start_deg = 12
-[device.gripper.hand]
-stiffness_n_per_m = 300
-damping_n_s_per_m = 3
-[device.gripper.hand.motion]
-kind = "ramp-hold"
-from_deg = 25
-to_deg = 5
-ramp_ms = 500
-[limiter.gripper]
-coulomb_friction_n = 0.05
-viscous_friction_n_s_per_m = 0.25
-)")
-                        .simulated()
-                        .gripper;
-  EXPECT_NEAR(all.open, 30 * kDegree, 1e-15);
-  EXPECT_EQ(all.arm, 0.06);
-  EXPECT_EQ(all.mass, 0.02);
-  EXPECT_EQ(all.viscous_friction, 0.5);
-  EXPECT_EQ(all.coulomb_friction, 0.1);
-  EXPECT_EQ(all.max_force, 3);
-  EXPECT_EQ(all.encoder_step, 0.001);
-  EXPECT_NEAR(*all.start, 12 * kDegree, 1e-15);
-  EXPECT_EQ(all.hand->stiffness, 300);
-  EXPECT_EQ(all.hand->damping, 3);
-  EXPECT_NEAR((all.hand->motion.at(0.25).position - Vec3(15 * kDegree, 0, 0)).norm(), 0, 1e-15);
+  const std::string bounds = "[limiter.gripper]\ncoulomb_friction_n = 0.05\nviscous_friction_n_s_per_m = 0.25\n";
+  const std::vector<Setting> settings = {
+      {"device.gripper.open_deg=30", 30 * kDegree, [](S s) { return gripper(s).open; }},
+      {"device.gripper.arm_mm_per_rad=60", 0.06, [](S s) { return gripper(s).arm; }},
+      {"device.gripper.mass_kg=0.02", 0.02, [](S s) { return gripper(s).mass; }},
+      {"device.gripper.viscous_friction_n_s_per_m=0.5", 0.5, [](S s) { return *gripper(s).viscous_friction; }},
+      {"device.gripper.coulomb_friction_n=0.1", 0.1, [](S s) { return *gripper(s).coulomb_friction; }},
+      {"device.gripper.max_force_n=3", 3, [](S s) { return *gripper(s).max_force; }},
+      {"device.gripper.encoder_step_rad=0.001", 0.001, [](S s) { return *gripper(s).encoder_step; }},
+      {"device.gripper.start_deg=12", 12 * kDegree, [](S s) { return *gripper(s).start; }},
+      {"device.gripper.hand.stiffness_n_per_m=300", 300, [](S s) { return gripper(s).hand->stiffness; }},
+      {"device.gripper.hand.damping_n_s_per_m=3", 3, [](S s) { return gripper(s).hand->damping; }},
+      {"device.gripper.hand.motion.kind=ramp-hold", 15 * kDegree, [](S s) { return gripped(s, 0.25); }},
+      {"device.gripper.hand.motion.from_deg=25", 25 * kDegree, [](S s) { return gripped(s, 0); }},
+      {"device.gripper.hand.motion.to_deg=5", 5 * kDegree, [](S s) { return gripped(s, 0.5); }},
+      {"device.gripper.hand.motion.ramp_ms=500", 15 * kDegree, [](S s) { return gripped(s, 0.25); }}};
+  expect_made(std::string(kMinimal) + kGripper + bounds, settings);
   EXPECT_FALSE(minimal_and(kGripper).simulated().gripper->max_force);
 }
 
@@ -167,10 +148,7 @@ TEST(SceneHandle, ASimulatedDeviceHasTheOutputsThatItLists) {
 
 TEST(SceneHandle, ErrorsNameFileLineAndKey) {
   const std::string finger = "[device.gripper.hand]\nstiffness_n_per_m = 1\n[device.gripper.hand.motion]\n";
-  const struct {
-    std::string text;
-    std::string error;
-  } cases[] = {
+  expect_errors({
       {"[device.rotation]\n", "s.toml:4: device.rotation.inertia_kg_m2: missing, expected a number above 0 kg·m²"},
       {kRotation + "max_torque_nm = 0\n",
        "s.toml:6: device.rotation.max_torque_nm: expected a number above 0 N·m, found 0"},
@@ -193,30 +171,22 @@ TEST(SceneHandle, ErrorsNameFileLineAndKey) {
       {"[safety.torque_limit]\n", "s.toml:4: safety.torque_limit.max_nm: missing, expected a number above 0 N·m"},
       {"[safety.turn_trip]\nmax_deg_per_s = 0\n",
        "s.toml:5: safety.turn_trip.max_deg_per_s: expected a number above 0 °/s, found 0"},
-  };
-  for (const auto& [text, error] : cases) EXPECT_EQ(error_of_minimal_and(text), error);
+  });
 }
 
 TEST(SceneHandle, TheSafetyLayerHasPartsForTorqueAndGrip) {
-  const auto safety = *minimal_and(kRotation + R"([safety]
-rest_torque_nm = 0.02
-torque_limit.max_nm = 0.1
-torque_growth_limit.rate_nm_per_s = 5
-turn_trip.max_deg_per_s = 720
-grip_limit.max_n = 2
-grip_growth_limit.rate_n_per_s = 100
-)")
-                           .safety;
-  EXPECT_EQ(safety.arming.rest_torque, 0.02);
-  EXPECT_EQ(safety.torque_limit->max, 0.1);
-  EXPECT_EQ(safety.torque_growth_limit->rate, 5);
-  EXPECT_NEAR(safety.turn_trip->max, 4 * std::numbers::pi, 1e-14);
-  EXPECT_EQ(safety.grip_limit->max, 2);
-  EXPECT_EQ(safety.grip_growth_limit->rate, 100);
+  const std::vector<Setting> settings = {
+      {"safety.rest_torque_nm=0.02", 0.02, [](S s) { return s.safety->arming.rest_torque; }},
+      {"safety.torque_limit.max_nm=0.1", 0.1, [](S s) { return s.safety->torque_limit->max; }},
+      {"safety.torque_growth_limit.rate_nm_per_s=5", 5, [](S s) { return s.safety->torque_growth_limit->rate; }},
+      {"safety.turn_trip.max_deg_per_s=720", 4 * std::numbers::pi, [](S s) { return s.safety->turn_trip->max; }},
+      {"safety.grip_limit.max_n=2", 2, [](S s) { return s.safety->grip_limit->max; }},
+      {"safety.grip_growth_limit.rate_n_per_s=100", 100, [](S s) { return s.safety->grip_growth_limit->rate; }}};
+  expect_made(std::string(kMinimal) + kRotation, settings);
 }
 
 TEST(SceneHandle, TheShippedOneTurnsGripsAndPressesItsButton) {
-  SimulatedDevice device(read_scene(std::filesystem::path(TENDON_SCENES) / "handle.toml").simulated());
+  SimulatedDevice device(shipped("handle.toml").simulated());
   EXPECT_TRUE(device.info().measures_orientation);
   EXPECT_GT(device.info().max_torque, 0);
   EXPECT_GT(device.info().gripper.value().max_force, 0);
@@ -262,19 +232,17 @@ TEST(SceneHandle, MotorsHaveLimitsOfTheirOwn) {
 TEST(SceneHandle, AMotorWithoutABoundOfItsFrictionIsRefused) {
   EXPECT_EQ(error_of_minimal_and(kMotors),
             "s.toml: limiter.rotation.coulomb_friction_nm: missing, expected a number of 0 N·m or more, because the "
-            "device has motors "
-            "that turn its handle");
+            "device has motors that turn its handle");
   const std::string higher = "[limiter.rotation]\ncoulomb_friction_nm = 2e-3\nviscous_friction_nm_s_per_rad = 1e-4\n";
   EXPECT_NE(
       error_of_minimal_and(kMotors + higher).find("limiter.rotation.coulomb_friction_nm: expected at most 0.001 N·m"),
       std::string::npos)
       << error_of_minimal_and(kMotors + higher);
   const std::string truth = "[limiter.rotation]\ncoulomb_friction_nm = 1e-3\nviscous_friction_nm_s_per_rad = 2e-4\n";
-  EXPECT_NE(
-      error_of_minimal_and(kMotors + truth)
-          .find("limiter.rotation.viscous_friction_nm_s_per_rad: expected at most 0.000196 N·m·s/rad, 98 % of the "
-                "true friction of the simulated device"),
-      std::string::npos)
+  EXPECT_NE(error_of_minimal_and(kMotors + truth)
+                .find("limiter.rotation.viscous_friction_nm_s_per_rad: expected at most 0.000196 N·m·s/rad, 98 % of "
+                      "the true friction of the simulated device"),
+            std::string::npos)
       << error_of_minimal_and(kMotors + truth);
   EXPECT_NE(error_of_minimal_and(kRotation + kBounds).find("expected a device with motors that turn its handle"),
             std::string::npos)

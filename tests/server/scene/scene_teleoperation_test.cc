@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <string>
+#include <vector>
 
 #include "core/base/rotation.h"
 #include "server/scene/scene.h"
@@ -12,13 +13,13 @@ namespace {
 
 using namespace std::chrono_literals;
 
-const std::string kLeader =
-    "[teleoperation]\n"
-    "role = \"leader\"\n"
-    "[teleoperation.coupling]\n"
-    "stiffness_n_per_m = 400\n"
-    "damping_n_s_per_m = 4\n"
-    "[teleoperation.purse]\n";
+/// `more` continues the table [teleoperation], and `what` the table [teleoperation.coupling].
+std::string coupled(const std::string& role, const std::string& what, const std::string& more = {}) {
+  return "[teleoperation]\nrole = \"" + role + "\"\n" + more +
+         "[teleoperation.coupling]\nstiffness_n_per_m = 400\ndamping_n_s_per_m = 4\n" + what;
+}
+const std::string kPurse = "[teleoperation.purse]\n";
+const std::string kLeader = coupled("leader", kPurse);
 
 const std::string kRate = "[teleoperation.rate]\ndead_zone_mm = 3\ngain_per_s = 4\nmax_speed_mm_per_s = 50\n";
 
@@ -55,47 +56,34 @@ TEST(SceneTeleoperation, KnowsTheCountsOfItsDevice) {
   EXPECT_EQ(step("[device.effects]\nencoder_step_um = false\n"), 0);
 }
 
+const Coupling::Config& coupling(S scene) { return *scene.loop.control.coupling; }
+
 TEST(SceneTeleoperation, TakesEveryKeyInItsUnit) {
-  const Scene scene = minimal_and(R"([teleoperation]
-role = "follower"
-method = "position-force"
-dial = "[::1]:47999"
-device = "right"
-channel = "robot"
-on_loss = "hold"
-[teleoperation.map]
-position_scale = 0.5
-force_scale = 2
-rotation_deg = [0, 0, 90]
-axes = "xz"
-[teleoperation.coupling]
-stiffness_n_per_m = 300
-damping_n_s_per_m = 3
-mutual_damping_n_s_per_m = 1
-adapt_to_delay = false
-max_force_n = 2
-[teleoperation.purse]
-max_account_mj = 50
-max_power_w = 1
-[teleoperation.engage]
-ramp_ms = 100
-)");
-  EXPECT_EQ(to_string(*scene.teleoperation->dial), "[::1]:47999");
-  EXPECT_EQ(scene.teleoperation->device, "right");
-  EXPECT_EQ(scene.teleoperation->channel, "robot");
-  const Coupling::Config& coupling = *scene.loop.control.coupling;
-  EXPECT_EQ(coupling.method, CouplingMethod::kPositionForce);
-  EXPECT_TRUE(coupling.holds_place);
-  EXPECT_EQ(coupling.map.position_scale, 0.5);
-  EXPECT_EQ(coupling.map.force_scale, 2);
-  EXPECT_LT((rotated(coupling.map.rotation, Vec3(1, 0, 0)) - Vec3(0, 1, 0)).norm(), 1e-15);
-  EXPECT_EQ(coupling.map.axes, (std::array{true, false, true}));
-  EXPECT_EQ(coupling.spring.damping, 1);
-  EXPECT_FALSE(coupling.spring.adapt_to_delay);
-  EXPECT_EQ(coupling.spring.max_force, 2);
-  EXPECT_EQ(coupling.purse->max_account, 0.05);
-  EXPECT_EQ(coupling.purse->max_power, 1);
-  EXPECT_EQ(coupling.ramp, 100ms);
+  const std::vector<Setting> settings = {
+      {"teleoperation.role=follower", 1, [](S s) -> double { return coupling(s).role == PortRole::kFollower; }},
+      {"teleoperation.method=position-force", 1,
+       [](S s) -> double { return coupling(s).method == CouplingMethod::kPositionForce; }},
+      {"teleoperation.dial=[::1]:47999", 1,
+       [](S s) -> double { return to_string(*s.teleoperation->dial) == "[::1]:47999"; }},
+      {"teleoperation.device=right", 1, [](S s) -> double { return s.teleoperation->device == "right"; }},
+      {"teleoperation.channel=robot", 1, [](S s) -> double { return s.teleoperation->channel == "robot"; }},
+      {"teleoperation.on_loss=hold", 1, [](S s) -> double { return coupling(s).holds_place; }},
+      {"teleoperation.map.position_scale=0.5", 0.5, [](S s) { return coupling(s).map.position_scale; }},
+      {"teleoperation.map.force_scale=2", 2, [](S s) { return coupling(s).map.force_scale; }},
+      {"teleoperation.map.rotation_deg=[0, 0, 90]", 1,
+       [](S s) { return rotated(coupling(s).map.rotation, Vec3(1, 0, 0)).y(); }},
+      {"teleoperation.map.axes=xz", 1,
+       [](S s) -> double {
+         return coupling(s).map.axes == std::array{true, false, true};
+       }},
+      {"teleoperation.coupling.mutual_damping_n_s_per_m=1", 1, [](S s) { return coupling(s).spring.damping; }},
+      {"teleoperation.coupling.adapt_to_delay=false", 0,
+       [](S s) -> double { return coupling(s).spring.adapt_to_delay; }},
+      {"teleoperation.coupling.max_force_n=2", 2, [](S s) { return coupling(s).spring.max_force; }},
+      {"teleoperation.purse.max_account_mj=50", 0.05, [](S s) { return coupling(s).purse->max_account; }},
+      {"teleoperation.purse.max_power_w=1", 1, [](S s) { return coupling(s).purse->max_power; }},
+      {"teleoperation.engage.ramp_ms=100", 0.1, [](S s) { return seconds(coupling(s).ramp); }}};
+  expect_made(std::string(kMinimal) + kLeader, settings);
 }
 
 TEST(SceneTeleoperation, OfALeaderTheButtons) {
@@ -106,20 +94,18 @@ toggle = true
 by = "button"
 button = 0
 )");
-  const Coupling::Config& coupling = *scene.loop.control.coupling;
-  EXPECT_EQ(coupling.clutch->bit, 1U);
-  EXPECT_TRUE(coupling.clutch->toggles);
-  EXPECT_EQ(coupling.engage_by, 0U);
+  EXPECT_EQ(coupling(scene).clutch->bit, 1U);
+  EXPECT_TRUE(coupling(scene).clutch->toggles);
+  EXPECT_EQ(coupling(scene).engage_by, 0U);
 }
 
 TEST(SceneTeleoperation, NamesEachMethodAndWavesShareAccountsWithoutAPurse) {
   const auto by = [](const std::string& method, const std::string& more = "") {
-    return "[teleoperation]\nrole = \"leader\"\nmethod = \"" + method +
-           "\"\n[teleoperation.coupling]\nstiffness_n_per_m = 400\ndamping_n_s_per_m = 4\n" + more;
+    return coupled("leader", more, "method = \"" + method + "\"\n");
   };
   for (const CouplingMethod method : kCouplingMethods) {
     const std::string more = method == CouplingMethod::kRate ? kRate : "";
-    const Scene scene = minimal_and(by(std::string(to_string(method)), "[teleoperation.purse]\n" + more));
+    const Scene scene = minimal_and(by(std::string(to_string(method)), kPurse + more));
     EXPECT_EQ(scene.loop.control.coupling->method, method) << to_string(method);
   }
   EXPECT_TRUE(minimal_and(by("waves")).loop.control.limiter.shared_account);
@@ -150,19 +136,14 @@ TEST(SceneTeleoperation, AnAbsoluteMapAlignsAndHasNoClutch) {
       error_of_minimal_and(kLeader + "[teleoperation.map]\nabsolute = true\n[teleoperation.clutch]\nbutton = 1\n"),
       "s.toml:12: teleoperation.clutch: expected no clutch with map.absolute: a clutch changes the offset, which is "
       "always 0");
-  EXPECT_EQ(
-      error_of_minimal_and("[teleoperation]\nrole = \"leader\"\nmethod = \"waves\"\n[teleoperation.coupling]\n"
-                           "stiffness_n_per_m = 400\ndamping_n_s_per_m = 4\n[teleoperation.map]\nabsolute = true\n"),
-      "s.toml:11: teleoperation.map.absolute: expected the method position-position, position-force, surface or "
-      "set-position with map.absolute: the other methods have no absolute positions");
+  EXPECT_EQ(error_of_minimal_and(coupled("leader", "[teleoperation.map]\nabsolute = true\n", "method = \"waves\"\n")),
+            "s.toml:11: teleoperation.map.absolute: expected the method position-position, position-force, surface or "
+            "set-position with map.absolute: the other methods have no absolute positions");
 }
 
 TEST(SceneTeleoperation, TakesWhatPassivityRateAndSlowLinksNeed) {
   const auto by = [](const std::string& role, const std::string& method, const std::string& more) {
-    return "[teleoperation]\nrole = \"" + role + "\"\nmethod = \"" + method +
-           "\"\nmax_delay_ms = 800\n[teleoperation.purse]\n[teleoperation.coupling]\nstiffness_n_per_m = 400\n"
-           "damping_n_s_per_m = 4\n" +
-           more;
+    return coupled(role, more, "method = \"" + method + "\"\nmax_delay_ms = 800\n" + kPurse);
   };
   const Scene passivity = minimal_and(by("follower", "passivity", "drift_rate_per_s = 50\n"));
   EXPECT_EQ(passivity.loop.control.coupling->drift_rate, 50);
@@ -209,8 +190,7 @@ TEST(SceneTeleoperation, SaysWhichMethodHasNoUseForAKey) {
 
 TEST(SceneTeleoperation, SaysWhatCannotBeTogether) {
   const auto refusal = [](const std::string& more) { return error_of_minimal_and(more); };
-  EXPECT_EQ(refusal("[teleoperation]\nrole = \"leader\"\n[teleoperation.coupling]\nstiffness_n_per_m = 400\n"
-                    "damping_n_s_per_m = 4\n"),
+  EXPECT_EQ(refusal(coupled("leader", "")),
             "s.toml:4: teleoperation.purse: missing, expected this table: with its own limiter, a follower can only "
             "move with energy from the leader");
   EXPECT_EQ(refusal("[limiter]\nkind = \"tdpa\"\n" + kLeader),
@@ -224,34 +204,21 @@ TEST(SceneTeleoperation, SaysWhatCannotBeTogether) {
       "s.toml:11: teleoperation.map.axes: expected one or more of the letters x, y, z, in this order, found \"zx\"");
   EXPECT_EQ(refusal(kLeader + "[teleoperation.engage]\nby = \"button\"\n"),
             "s.toml:11: teleoperation.engage.by: expected \"button\" together with button, or \"request\" without");
-  EXPECT_EQ(refusal("[teleoperation]\nrole = \"leader\"\ndial = \"192.0.2.7:47100\"\n[teleoperation.coupling]\n"
-                    "stiffness_n_per_m = 400\ndamping_n_s_per_m = 4\n[teleoperation.purse]\n"),
+  EXPECT_EQ(refusal(coupled("leader", kPurse, "dial = \"192.0.2.7:47100\"\n")),
             "s.toml:6: teleoperation.dial: expected a loopback address, or a key: connections over a network must be "
             "encrypted");
-  EXPECT_EQ(refusal("[teleoperation]\nrole = \"leader\"\nkey = \"a.key\"\n[teleoperation.coupling]\n"
-                    "stiffness_n_per_m = 400\ndamping_n_s_per_m = 4\n[teleoperation.purse]\n"),
+  EXPECT_EQ(refusal(coupled("leader", kPurse, "key = \"a.key\"\n")),
             "s.toml:6: teleoperation.key: expected no key without dial, because a server that is dialled uses the keys "
             "of [network]");
-  EXPECT_EQ(refusal("[teleoperation]\nrole = \"leader\"\non_loss = \"hold\"\n[teleoperation.coupling]\n"
-                    "stiffness_n_per_m = 400\ndamping_n_s_per_m = 4\n[teleoperation.purse]\n"),
+  EXPECT_EQ(refusal(coupled("leader", kPurse, "on_loss = \"hold\"\n")),
             "s.toml:6: teleoperation.on_loss: expected \"release\" for a leader, which is held by a hand");
-  EXPECT_EQ(refusal("[teleoperation]\nrole = \"follower\"\n[teleoperation.coupling]\nstiffness_n_per_m = 400\n"
-                    "damping_n_s_per_m = 4\n[teleoperation.purse]\n[teleoperation.clutch]\nbutton = 1\n"),
+  EXPECT_EQ(refusal(coupled("follower", kPurse + "[teleoperation.clutch]\nbutton = 1\n")),
             "s.toml:10: teleoperation.clutch: expected no clutch for a follower: only the leader has a clutch");
 }
 
-/// Twelve lines after kMinimal, so the rest begins at line 16.
+/// Ten lines after kMinimal, so the rest begins at line 14.
 const std::string kTwoLeaders =
-    "[[channel]]\n"
-    "name = \"trainer\"\n"
-    "[[channel]]\n"
-    "name = \"trainee\"\n"
-    "[teleoperation]\n"
-    "role = \"follower\"\n"
-    "[teleoperation.coupling]\n"
-    "stiffness_n_per_m = 400\n"
-    "damping_n_s_per_m = 4\n"
-    "[teleoperation.purse]\n";
+    "[[channel]]\nname = \"trainer\"\n[[channel]]\nname = \"trainee\"\n" + coupled("follower", kPurse);
 
 std::string leader(const std::string& channel, const std::string& share) {
   return "[[teleoperation.leader]]\nchannel = \"" + channel + "\"\nshare = " + share + "\n";
@@ -312,17 +279,12 @@ const std::string kGripBounds = "[limiter.gripper]\ncoulomb_friction_n = 0\nvisc
 const std::string kMotors = "max_torque_nm = 0.2\n";
 const std::string kGripMotor = "max_force_n = 3\n";
 
-std::string coupled_handle(const std::string& role, const std::string& what, const std::string& more = {}) {
-  return "[teleoperation]\nrole = \"" + role + "\"\n" + more +
-         "[teleoperation.coupling]\nstiffness_n_per_m = 400\ndamping_n_s_per_m = 4\n" + what;
-}
 const std::string kTurn = "[teleoperation.turn]\nstiffness_nm_per_rad = 0.5\ndamping_nm_s_per_rad = 0.005\n";
 const std::string kGrip = "[teleoperation.grip]\nstiffness_n_per_m = 300\ndamping_n_s_per_m = 3\nspeed_mm_per_s = 40\n";
-const std::string kPurse = "[teleoperation.purse]\n";
 
 TEST(SceneTeleoperation, CouplesOrientationsAndGrippersThatItLists) {
   const Scene scene = minimal_and(kRotation + kMotors + kGripper + kGripMotor + kTurnBounds + kGripBounds +
-                                  coupled_handle("follower", kTurn + kGrip + kPurse));
+                                  coupled("follower", kTurn + kGrip + kPurse));
   const Coupling::Config& coupling = *scene.loop.control.coupling;
   ASSERT_TRUE(coupling.turn && coupling.grip);
   EXPECT_EQ(coupling.turn->stiffness, 0.5);
@@ -336,35 +298,35 @@ TEST(SceneTeleoperation, CouplesOrientationsAndGrippersThatItLists) {
   const Scene points = minimal_and(kRotation + kMotors + kTurnBounds + kLeader);
   EXPECT_TRUE(points.loop.control.rotation && points.loop.control.coupling);
   EXPECT_FALSE(points.loop.control.coupling->turn) << "a position alone, on a device with six motors";
-  EXPECT_TRUE(minimal_and(kRotation + coupled_handle("leader", kTurn + kPurse)).loop.control.coupling->turn)
+  EXPECT_TRUE(minimal_and(kRotation + coupled("leader", kTurn + kPurse)).loop.control.coupling->turn)
       << "a leader that measures its orientation and feels no torque";
 }
 
 TEST(SceneTeleoperation, RefusesHandlesThatCannotBeCoupled) {
-  EXPECT_EQ(error_of_minimal_and(coupled_handle("leader", kTurn + kPurse)),
+  EXPECT_EQ(error_of_minimal_and(coupled("leader", kTurn + kPurse)),
             "s.toml:9: teleoperation.turn: expected a device with [device.rotation]: this device does not measure the "
             "orientation of its handle");
-  EXPECT_EQ(error_of_minimal_and(kRotation + coupled_handle("follower", kTurn + kPurse)),
+  EXPECT_EQ(error_of_minimal_and(kRotation + coupled("follower", kTurn + kPurse)),
             "s.toml:12: teleoperation.turn: expected a device with max_torque_nm in [device.rotation]: a follower "
             "requires motors that turn its handle");
-  EXPECT_EQ(error_of_minimal_and(coupled_handle("follower", kGrip + kPurse)),
+  EXPECT_EQ(error_of_minimal_and(coupled("follower", kGrip + kPurse)),
             "s.toml:9: teleoperation.grip: expected a device with [device.gripper]: this device does not measure the "
             "opening of a gripper");
-  EXPECT_EQ(error_of_minimal_and(kGripper + coupled_handle("leader", kGrip + kPurse)),
+  EXPECT_EQ(error_of_minimal_and(kGripper + coupled("leader", kGrip + kPurse)),
             "s.toml:14: teleoperation.grip: expected a device with max_force_n in [device.gripper]: a gripper without "
             "a motor cannot follow and cannot be felt");
-  EXPECT_EQ(error_of_minimal_and(kGripper + kGripMotor + kGripBounds +
-                                 coupled_handle("follower", kGrip, "method = \"surface\"\n")),
-            "s.toml:19: teleoperation.purse: missing, expected this table: with its own limiter, a gripper can only "
-            "move with energy from the leader");
-  EXPECT_EQ(error_of_minimal_and(kRotation + kMotors + kTurnBounds +
-                                 coupled_handle("follower", kTurn, "method = \"waves\"\n")),
-            "s.toml:17: teleoperation.purse: missing, expected this table: waves do not transmit rotations, so the "
-            "energy that turns the follower must come from the leader");
-  EXPECT_EQ(error_of_minimal_and(kRotation + coupled_handle("leader",
-                                                            "[teleoperation.turn]\n"
-                                                            "stiffness_nm_per_rad = 0.5\n" +
-                                                                kPurse)),
+  EXPECT_EQ(
+      error_of_minimal_and(kGripper + kGripMotor + kGripBounds + coupled("follower", kGrip, "method = \"surface\"\n")),
+      "s.toml:19: teleoperation.purse: missing, expected this table: with its own limiter, a gripper can only "
+      "move with energy from the leader");
+  EXPECT_EQ(
+      error_of_minimal_and(kRotation + kMotors + kTurnBounds + coupled("follower", kTurn, "method = \"waves\"\n")),
+      "s.toml:17: teleoperation.purse: missing, expected this table: waves do not transmit rotations, so the "
+      "energy that turns the follower must come from the leader");
+  EXPECT_EQ(error_of_minimal_and(kRotation + coupled("leader",
+                                                     "[teleoperation.turn]\n"
+                                                     "stiffness_nm_per_rad = 0.5\n" +
+                                                         kPurse)),
             "s.toml:7: teleoperation: turn.damping = 0: expected a number above 0 N·m·s/rad, because adapt_to_delay "
             "limits the stiffness to 2 B divided by the round-trip time");
 }

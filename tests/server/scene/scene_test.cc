@@ -20,7 +20,7 @@ using testing::ScratchFolder;
 
 // A recording contains the scene with its command-line settings.
 TEST(Scene, WithSettingsItsTextIsTheSceneThatTheyMake) {
-  const Scene as_written = read_scene(std::string(TENDON_SCENES) + "/demo.toml");
+  const Scene as_written = shipped("demo.toml");
   const Friction friction = as_written.loop.control.limiter.friction;
   const auto settings = limiter_settings("none", as_written.loop.control);
   const Scene changed = parse_scene(as_written.text, "demo.toml", TENDON_SCENES, settings);
@@ -90,124 +90,65 @@ TEST(Scene, TakesWhatItDoesNotSayFromTheProfileAndTheStructs) {
 }
 
 TEST(Scene, ReadsEveryKey) {
-  const Scene scene = parse(R"(
-[device]
-kind = "simulated"
-profile = "phantom-premium"
-start_position_mm = [1, -2.5, 3]
-[device.effects]
-mass_kg = 0.1
-viscous_friction_n_s_per_m = 0.2
-coulomb_friction_n = 0.3
-encoder_step_um = 43
-max_force_n = 9
-amplifier_bandwidth_hz = 250
-watchdog_ms = 5.5
-[device.hand]
-stiffness_n_per_m = 300
-damping_n_s_per_m = 3
-mass_kg = 0.05
-[device.hand.motion]
-kind = "sine"
-amplitude_mm = 15
-frequency_hz = 0.5
-centre_mm = [0, 10, 0]
-direction = [0, 0, 2]
-[loop]
-period_us = 500
-longest_hold_us = 1500
-hold_memory_ms = 5000
-hold_margin = 0.5
-hold_most = 3
-max_speed_m_per_s = 10
-[limiter]
-kind = "aol-per-axis"
-coulomb_friction_n = 0.1
-viscous_friction_n_s_per_m = 0.15
-[force]
-max_force_n = 5
-max_slew_n_per_s = inf
-hold_ms = 10
-decay_ms = 20
-safe_stop_ms = 30
-ramp_in_ms = 40
-max_valid_for_ms = 50
-[network]
-listen = "[::1]:5000"
-keys = "keys"
-suites = ["chacha20-poly1305"]
-unix = "/run/tendon.sock"
-max_observers = 3
-controller_timeout_ms = 1500
-observer_timeout_ms = 2500
-adapt_state_rate = true
-busy = true
-[discovery]
-announce = true
-name = "falcon at bench 3"
-
-[recording]
-path = "run.mcap"
-rotate_mb = 50
-rotate_min = 90
-budget_mb = 200.5
-keep = "faults"
-one_in = 1000
-datagrams_kb_per_s = 100
-)");
-  EXPECT_EQ(scene.simulated().start_position, Vec3(0.001, -0.0025, 0.003));
-  EXPECT_EQ(scene.simulated().mass, 0.1);
-  EXPECT_EQ(scene.simulated().viscous_friction, 0.2);
-  EXPECT_EQ(scene.simulated().coulomb_friction, 0.3);
-  EXPECT_EQ(scene.simulated().encoder_step, 43e-6);
-  EXPECT_EQ(scene.simulated().max_force, 9);
-  EXPECT_EQ(scene.simulated().amplifier_bandwidth, 250);
-  EXPECT_EQ(scene.simulated().watchdog, 5500us);
-  ASSERT_TRUE(scene.simulated().hand);
-  EXPECT_EQ(scene.simulated().hand->stiffness, 300);
-  EXPECT_EQ(scene.simulated().hand->damping, 3);
-  EXPECT_EQ(scene.simulated().hand->mass, 0.05);
-  EXPECT_EQ(target(scene, 0).position, Vec3(0, 0.01, 0));
-  EXPECT_EQ(target(scene, 0.5).position, Vec3(0, 0.01, 0.015));  // a quarter of the cycle
-
-  const HapticController::Config& control = scene.loop.control;
-  EXPECT_EQ(scene.loop.period, 500us);
-  EXPECT_EQ(control.limiter.longest_hold, 1500us);
-  ASSERT_TRUE(control.limiter.follow_holds);
-  EXPECT_EQ(control.limiter.follow_holds->memory, 5s);
-  EXPECT_EQ(control.limiter.follow_holds->margin, 0.5);
-  EXPECT_EQ(control.limiter.follow_holds->most, 3);
-  EXPECT_EQ(control.max_speed, 10);
-  EXPECT_EQ(control.watchdog, 5500us);
-  EXPECT_EQ(control.limiter.law, Law::kAolPerAxis);
-  EXPECT_EQ(control.limiter.friction.coulomb, 0.1);
-  EXPECT_EQ(control.limiter.friction.viscous, 0.15);
-  EXPECT_EQ(control.max_force, 5);
-  EXPECT_EQ(control.max_slew, std::numeric_limits<double>::infinity());
-  EXPECT_EQ(control.hold.hold, 10ms);
-  EXPECT_EQ(control.hold.decay, 20ms);
-  EXPECT_EQ(control.hold.safe_stop, 30ms);
-  EXPECT_EQ(control.hold.ramp_in, 40ms);
-  EXPECT_EQ(control.hold.max_valid_for, 50ms);
-  EXPECT_EQ(to_string(scene.network.listen), "[::1]:5000");
-  EXPECT_EQ(scene.network.suites, Suites{Suite::kNoise});
-  EXPECT_EQ(scene.network.unix_path, "/run/tendon.sock");
-  EXPECT_EQ(scene.network.max_observers, 3U);
-  EXPECT_EQ(scene.network.controller_timeout, 1500ms);
-  EXPECT_EQ(scene.network.observer_timeout, 2500ms);
-  EXPECT_TRUE(scene.network.adapt_state_rate);
-  EXPECT_TRUE(scene.network.busy);
-  ASSERT_TRUE(scene.discovery);
-  EXPECT_TRUE(scene.discovery->announce);
-  EXPECT_EQ(scene.discovery->name, "falcon at bench 3");
-  ASSERT_TRUE(scene.recording);
-  EXPECT_EQ(scene.recording->path, "run.mcap");
-  EXPECT_DOUBLE_EQ(scene.recording->rotate_bytes, 50e6);
-  EXPECT_DOUBLE_EQ(scene.recording->rotate_after, 5400);
-  EXPECT_DOUBLE_EQ(scene.recording->budget_bytes.value(), 200.5e6);
-  EXPECT_EQ(scene.recording->keep, Keep::kFaults);
-  EXPECT_EQ(scene.recording->one_in, 1000U);
-  EXPECT_DOUBLE_EQ(scene.recording->datagram_bytes_per_s, 100e3);
+  const std::string head = "[device]\nkind = \"simulated\"\nprofile = \"phantom-premium\"\n";
+  const std::vector<Setting> settings = {
+      {"device.start_position_mm=[1, -2.5, 3]", 1,
+       [](S s) -> double { return s.simulated().start_position == Vec3(0.001, -0.0025, 0.003); }},
+      {"device.effects.mass_kg=0.1", 0.1, [](S s) { return s.simulated().mass; }},
+      {"device.effects.viscous_friction_n_s_per_m=0.2", 0.2, [](S s) { return *s.simulated().viscous_friction; }},
+      {"device.effects.coulomb_friction_n=0.3", 0.3, [](S s) { return *s.simulated().coulomb_friction; }},
+      {"device.effects.encoder_step_um=43", 43e-6, [](S s) { return *s.simulated().encoder_step; }},
+      {"device.effects.max_force_n=9", 9, [](S s) { return *s.simulated().max_force; }},
+      {"device.effects.amplifier_bandwidth_hz=250", 250, [](S s) { return *s.simulated().amplifier_bandwidth; }},
+      {"device.effects.watchdog_ms=5.5", 5.5e-3, [](S s) { return seconds(*s.simulated().watchdog); }},
+      {"device.hand.stiffness_n_per_m=300", 300, [](S s) { return s.simulated().hand->stiffness; }},
+      {"device.hand.damping_n_s_per_m=3", 3, [](S s) { return s.simulated().hand->damping; }},
+      {"device.hand.mass_kg=0.05", 0.05, [](S s) { return s.simulated().hand->mass; }},
+      {"device.hand.motion.kind=sine", 0, [](S s) { return target(s, 0).position.x(); }},
+      {"device.hand.motion.amplitude_mm=15", 0.015, [](S s) { return target(s, 0.5).position.z(); }},
+      {"device.hand.motion.frequency_hz=0.5", -0.015, [](S s) { return target(s, 1.5).position.z(); }},
+      {"device.hand.motion.centre_mm=[0, 10, 0]", 0.01, [](S s) { return target(s, 0.5).position.y(); }},
+      {"device.hand.motion.direction=[0, 0, 2]", 0, [](S s) { return target(s, 0.5).position.x(); }},
+      {"loop.period_us=500", 500e-6, [](S s) { return seconds(s.loop.period); }},
+      {"loop.longest_hold_us=1500", 1500e-6, [](S s) { return seconds(s.loop.control.limiter.longest_hold); }},
+      {"loop.hold_memory_ms=5000", 5, [](S s) { return seconds(s.loop.control.limiter.follow_holds->memory); }},
+      {"loop.hold_margin=0.5", 0.5, [](S s) { return s.loop.control.limiter.follow_holds->margin; }},
+      {"loop.hold_most=3", 3, [](S s) { return s.loop.control.limiter.follow_holds->most; }},
+      {"loop.max_speed_m_per_s=10", 10, [](S s) { return *s.loop.control.max_speed; }},
+      {"limiter.kind=aol-per-axis", 1, [](S s) -> double { return s.loop.control.limiter.law == Law::kAolPerAxis; }},
+      {"limiter.coulomb_friction_n=0.1", 0.1, [](S s) { return s.loop.control.limiter.friction.coulomb; }},
+      {"limiter.viscous_friction_n_s_per_m=0.15", 0.15, [](S s) { return s.loop.control.limiter.friction.viscous; }},
+      {"force.max_force_n=5", 5, [](S s) { return s.loop.control.max_force; }},
+      {"force.max_slew_n_per_s=inf", std::numeric_limits<double>::infinity(),
+       [](S s) { return s.loop.control.max_slew; }},
+      {"force.hold_ms=10", 10e-3, [](S s) { return seconds(s.loop.control.hold.hold); }},
+      {"force.decay_ms=20", 20e-3, [](S s) { return seconds(s.loop.control.hold.decay); }},
+      {"force.safe_stop_ms=30", 30e-3, [](S s) { return seconds(s.loop.control.hold.safe_stop); }},
+      {"force.ramp_in_ms=40", 40e-3, [](S s) { return seconds(s.loop.control.hold.ramp_in); }},
+      {"force.max_valid_for_ms=50", 50e-3, [](S s) { return seconds(s.loop.control.hold.max_valid_for); }},
+      {"network.listen=[::1]:5000", 1, [](S s) -> double { return to_string(s.network.listen) == "[::1]:5000"; }},
+      {"network.keys=keys", 1, [](S s) -> double { return s.network.keys == "keys"; }},
+      {"network.suites=[\"chacha20-poly1305\"]", 1,
+       [](S s) -> double { return s.network.suites == Suites{Suite::kNoise}; }},
+      {"network.unix=/run/tendon.sock", 1, [](S s) -> double { return s.network.unix_path == "/run/tendon.sock"; }},
+      {"network.max_observers=3", 3, [](S s) -> double { return static_cast<double>(s.network.max_observers); }},
+      {"network.controller_timeout_ms=1500", 1.5, [](S s) { return seconds(s.network.controller_timeout); }},
+      {"network.observer_timeout_ms=2500", 2.5, [](S s) { return seconds(s.network.observer_timeout); }},
+      {"network.adapt_state_rate=true", 1, [](S s) -> double { return s.network.adapt_state_rate; }},
+      {"network.busy=true", 1, [](S s) -> double { return s.network.busy; }},
+      {"discovery.announce=true", 1, [](S s) -> double { return s.discovery->announce; }},
+      {"discovery.name=\"falcon at bench 3\"", 1,
+       [](S s) -> double { return s.discovery->name == "falcon at bench 3"; }},
+      {"recording.path=\"run.mcap\"", 1, [](S s) -> double { return s.recording->path == "run.mcap"; }},
+      {"recording.rotate_mb=50", 50e6, [](S s) { return s.recording->rotate_bytes; }},
+      {"recording.rotate_min=90", 5400, [](S s) { return s.recording->rotate_after; }},
+      {"recording.budget_mb=200.5", 200.5e6, [](S s) { return *s.recording->budget_bytes; }},
+      {"recording.keep=faults", 1, [](S s) -> double { return s.recording->keep == Keep::kFaults; }},
+      {"recording.one_in=1000", 1000, [](S s) -> double { return static_cast<double>(*s.recording->one_in); }},
+      {"recording.datagrams_kb_per_s=100", 100e3, [](S s) { return s.recording->datagram_bytes_per_s; }},
+  };
+  expect_made(head, settings);
+  EXPECT_EQ(parse(head + "[device.effects]\nwatchdog_ms = 5.5\n").loop.control.watchdog, 5500us);
 }
 
 TEST(Scene, ReadsAMotionOfRampAndHold) {
@@ -293,50 +234,42 @@ TEST(Scene, OfTheSafetyLayerThereIsWhatItLists) {
                bare.safety->heat_limit || bare.safety->workspace || bare.safety->speed_trip ||
                bare.safety->step_bound || bare.safety->command_watchdog || bare.safety->link_watchdog ||
                bare.safety->dead_man);
-  const SafeDevice::Config all = *minimal_and(R"([device.hand]
-stiffness_n_per_m = 300
-button_after_ms = 500
-[device.hand.motion]
-kind = "sine"
-amplitude_mm = 0
-frequency_hz = 0
-[safety]
-arm = "by dead man"
-rest_speed_m_per_s = 0.03
-rest_force_n = 0.2
-patience_ms = 400
-force_limit.max_n = 7
-growth_limit.rate_n_per_s = 500
-ramp_in.time_ms = 200
-heat_limit = {peak_n = 8, continuous_n = 2, time_constant_ms = 30000}
-workspace = {kind = "box", half_mm = [50, 40, 30], centre_mm = [0, 0, 125], margin_mm = 10}
-speed_trip.max_m_per_s = 1.5
-step_bound.max_speed_m_per_s = 10
-command_watchdog = {timeout_ms = 30, ramp_ms = 10}
-link_watchdog.timeout_ms = 20
-dead_man.button = 0
-)")
-                                      .safety;
-  EXPECT_EQ(all.arming.by, SafeDevice::Arming::By::kDeadMan);
-  EXPECT_EQ(all.arming.rest_speed, 0.03);
-  EXPECT_EQ(all.arming.rest_force, 0.2);
-  EXPECT_EQ(all.arming.patience, 400ms);
-  EXPECT_EQ(all.force_limit->max, 7);
-  EXPECT_EQ(all.growth_limit->rate, 500);
-  EXPECT_EQ(all.ramp_in->time, 200ms);
-  EXPECT_EQ(all.heat_limit->peak, 8);
-  EXPECT_EQ(all.heat_limit->continuous, 2);
-  EXPECT_EQ(all.heat_limit->time_constant, 30s);
-  EXPECT_EQ(std::get<Workspace::Box>(all.workspace->shape).half, Vec3(0.05, 0.04, 0.03));
-  EXPECT_EQ(all.workspace->centre, Vec3(0, 0, 0.125));
-  EXPECT_EQ(all.workspace->margin, 0.01);
-  EXPECT_EQ(all.speed_trip->max, 1.5);
-  EXPECT_EQ(all.step_bound->max_speed, 10);
-  EXPECT_EQ(all.command_watchdog->timeout, 30ms);
-  EXPECT_EQ(all.command_watchdog->ramp, 10ms);
-  EXPECT_EQ(all.link_watchdog->timeout, 20ms);
-  EXPECT_EQ(all.link_watchdog->ramp, Watchdog::Config{}.ramp);
-  EXPECT_EQ(all.dead_man->button, 0U);
+  const std::string hand =
+      "[device.hand]\nstiffness_n_per_m = 300\nbutton_after_ms = 500\n"
+      "[device.hand.motion]\nkind = \"sine\"\namplitude_mm = 0\nfrequency_hz = 0\n";
+  const std::vector<Setting> settings = {
+      {"safety.arm=\"by dead man\"", 1,
+       [](S s) -> double { return s.safety->arming.by == SafeDevice::Arming::By::kDeadMan; }},
+      {"safety.rest_speed_m_per_s=0.03", 0.03, [](S s) { return s.safety->arming.rest_speed; }},
+      {"safety.rest_force_n=0.2", 0.2, [](S s) { return s.safety->arming.rest_force; }},
+      {"safety.patience_ms=400", 0.4, [](S s) { return seconds(s.safety->arming.patience); }},
+      {"safety.force_limit.max_n=7", 7, [](S s) { return s.safety->force_limit->max; }},
+      {"safety.growth_limit.rate_n_per_s=500", 500, [](S s) { return s.safety->growth_limit->rate; }},
+      {"safety.ramp_in.time_ms=200", 0.2, [](S s) { return seconds(s.safety->ramp_in->time); }},
+      {"safety.heat_limit.peak_n=8", 8, [](S s) { return s.safety->heat_limit->peak; }},
+      {"safety.heat_limit.continuous_n=2", 2, [](S s) { return s.safety->heat_limit->continuous; }},
+      {"safety.heat_limit.time_constant_ms=30000", 30,
+       [](S s) { return seconds(s.safety->heat_limit->time_constant); }},
+      {"safety.workspace.kind=box", 1,
+       [](S s) -> double { return std::holds_alternative<Workspace::Box>(s.safety->workspace->shape); }},
+      {"safety.workspace.half_mm=[50, 40, 30]", 1,
+       [](S s) -> double {
+         return std::get<Workspace::Box>(s.safety->workspace->shape).half == Vec3(0.05, 0.04, 0.03);
+       }},
+      {"safety.workspace.centre_mm=[0, 0, 125]", 1,
+       [](S s) -> double { return s.safety->workspace->centre == Vec3(0, 0, 0.125); }},
+      {"safety.workspace.margin_mm=10", 0.01, [](S s) { return s.safety->workspace->margin; }},
+      {"safety.speed_trip.max_m_per_s=1.5", 1.5, [](S s) { return s.safety->speed_trip->max; }},
+      {"safety.step_bound.max_speed_m_per_s=10", 10, [](S s) { return s.safety->step_bound->max_speed; }},
+      {"safety.command_watchdog.timeout_ms=30", 30e-3,
+       [](S s) { return seconds(s.safety->command_watchdog->timeout); }},
+      {"safety.command_watchdog.ramp_ms=10", 10e-3, [](S s) { return seconds(s.safety->command_watchdog->ramp); }},
+      {"safety.link_watchdog.timeout_ms=20", 20e-3, [](S s) { return seconds(s.safety->link_watchdog->timeout); }},
+      {"safety.dead_man.button=0", 0, [](S s) -> double { return s.safety->dead_man->button; }},
+  };
+  expect_made(std::string(kMinimal) + hand, settings);
+  EXPECT_EQ(minimal_and("[safety.link_watchdog]\ntimeout_ms = 20\n").safety->link_watchdog->ramp,
+            Watchdog::Config{}.ramp);
 }
 
 TEST(Scene, ReadsDelaysAStructuralModeAndFrictionOfTheJoints) {

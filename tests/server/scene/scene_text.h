@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "devices/simulated/scripted_motion.h"
 #include "server/scene/scene.h"
@@ -20,10 +21,28 @@ extern const std::string_view kHand;
 /// Reads `text` as the file s.toml.
 Scene parse(const std::string& text, const std::filesystem::path& directory = {});
 Scene minimal_and(const std::string& more);
+/// Reads deploy/scenes/`file`.
+Scene shipped(const std::string& file, const std::vector<std::string>& settings = {});
+
+/// A setting "TABLE.KEY=VALUE" of a scene, and the value that it must have in SI units (1 for true).
+using S = const Scene&;
+struct Setting {
+  const char* text;
+  double expected;
+  double (*made)(S scene);
+};
+/// Parses `text` with all settings and checks the value of each one.
+void expect_made(const std::string& text, const std::vector<Setting>& settings);
 
 /// Returns the error message, or "no error".
 std::string error_of(const std::string& text, const std::filesystem::path& directory = {});
 std::string error_of_minimal_and(const std::string& more);
+
+struct Broken {
+  std::string more;  ///< appended to kMinimal
+  std::string error;
+};
+void expect_errors(const std::vector<Broken>& scenes);
 
 void write(const std::filesystem::path& file, std::string_view text);
 
