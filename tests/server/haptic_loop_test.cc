@@ -30,46 +30,6 @@ class Handle final : public Device {
   DeviceInfo info_{.name = "handle", .max_force = 8};
 };
 
-TEST(HapticLoop, ASafetyFaultFreezesTheFlightRecorderAtItsStep) {
-  Handle handle;
-  SafeDevice::Config safety;
-  safety.arming.by = SafeDevice::Arming::By::kStart;
-  SafeDevice safe(safety, handle);
-  HapticLoop::Config config;
-  config.control.limiter.law = Law::kNone;
-  config.control.limiter.longest_hold = milliseconds(2);
-  config.control.max_force = 8;
-  config.control.max_slew = 1e6;
-  const auto mail = std::make_unique<Mailboxes>();
-  HapticLoop loop(config, safe, *mail);
-  LocalTime now(milliseconds(1));
-  const auto step = [&] { now = loop.step(now); };
-
-  for (int i = 0; i < 100; ++i) step();
-  ASSERT_EQ(safe.status().state, SafetyState::kArmed);
-  RemoteForce force;
-  force.sequence = 1;
-  force.received = force.answers = now;
-  force.force = Vec3(-2, 0, 0);
-  force.valid_for = milliseconds(500);
-  mail->forces[0].put(force);
-  for (int i = 0; i < 200; ++i) step();  // end of the ramp
-  EXPECT_FALSE(mail->flight.frozen());
-  handle.plugged = false;
-  for (int i = 0; i < 5; ++i) step();
-  EXPECT_EQ(loop.stats().fault, HapticController::Fault::kNone) << "5 steps are none of the controller's";
-
-  ASSERT_TRUE(mail->flight.frozen());
-  ASSERT_EQ(mail->flight.size(), 301U);
-  EXPECT_EQ(mail->flight[299].applied, Vec3(-2, 0, 0));
-  EXPECT_EQ(mail->flight[300].applied, Vec3(0, 0, 0));
-
-  // Recording resumes after the flight was written.
-  mail->flight.thaw();
-  for (int i = 0; i < 5; ++i) step();
-  EXPECT_FALSE(mail->flight.frozen());
-}
-
 /// A loop around any device with an engine that always pushes.
 struct Pushed {
   explicit Pushed(Device& device) : loop(config(), device, *mail) {}
@@ -82,17 +42,21 @@ struct Pushed {
     config.control.max_slew = 100;
     return config;
   }
-  StepRecord steps(int count) {
+  void push() {
+    RemoteForce force;
+    force.sequence = ++sequence;
+    force.source = source;
+    force.received = force.answers = now;
+    force.force = Vec3(-2, 0, 0);
+    force.valid_for = valid_for;
+    force.error = error;
+    force.way = way;
+    mail->forces[0].put(force);
+  }
+  StepRecord steps(int count, bool pushes = true) {
     StepRecord last;
     for (int i = 0; i < count; ++i) {
-      RemoteForce force;
-      force.sequence = ++sequence;
-      force.received = force.answers = now;
-      force.force = Vec3(-2, 0, 0);
-      force.valid_for = milliseconds(20);
-      force.error = error;
-      force.way = way;
-      mail->forces[0].put(force);
+      if (pushes) push();
       now = loop.step(now);
       while (const StepRecord* step = mail->steps.front()) {
         last = *step;
@@ -107,9 +71,17 @@ struct Pushed {
   HapticLoop loop;
   LocalTime now{milliseconds(1)};
   std::uint64_t sequence = 0;
+  std::uint32_t source = 0;
+  Duration valid_for = milliseconds(20);
   std::optional<double> error{};  ///< reported by the engine, like `way`
   std::uint8_t way = 0;
 };
+
+SafeDevice::Config armed_at_start() {
+  SafeDevice::Config safety;
+  safety.arming.by = SafeDevice::Arming::By::kStart;
+  return safety;
+}
 
 using Kind = HapticOrder::Kind;
 
@@ -154,9 +126,7 @@ SimulatedDevice::Config circling(bool jointed) {
 TEST(HapticLoop, JointsAreInTheRecordAndTheStateAndChangeNothingElse) {
   SimulatedDevice plain(circling(true));
   const Mechanism mechanism(Mechanism::Falcon{});
-  SafeDevice::Config safety;
-  safety.arming.by = SafeDevice::Arming::By::kStart;
-  SafeDevice safe(safety, plain);
+  SafeDevice safe(armed_at_start(), plain);
   Pushed world(safe);
   for (int i = 0; i < 50; ++i) {
     const StepRecord record = world.steps(1);
@@ -214,11 +184,30 @@ TEST(HapticLoop, EachNewSettingOfAnOutputIsCarriedOutOnce) {
   EXPECT_EQ(plain.outputs().amplitude(world.now, 1), 1) << "the same pulse, asked for again";
 }
 
+TEST(HapticLoop, ASafetyFaultFreezesTheFlightRecorderAtItsStep) {
+  Handle handle;
+  SafeDevice safe(armed_at_start(), handle);
+  Pushed world(safe);
+  world.steps(400);  // end of the ramp
+  ASSERT_EQ(safe.status().state, SafetyState::kArmed);
+  EXPECT_FALSE(world.mail->flight.frozen());
+  handle.plugged = false;
+  world.steps(5);
+  EXPECT_EQ(world.loop.stats().fault, HapticController::Fault::kNone) << "5 steps are none of the controller's";
+  ASSERT_TRUE(world.mail->flight.frozen());
+  ASSERT_EQ(world.mail->flight.size(), 401U);
+  EXPECT_EQ(world.mail->flight[399].applied, Vec3(-2, 0, 0));
+  EXPECT_EQ(world.mail->flight[400].applied, Vec3(0, 0, 0));
+
+  // Recording resumes after the flight was written.
+  world.mail->flight.thaw();
+  world.steps(5);
+  EXPECT_FALSE(world.mail->flight.frozen());
+}
+
 TEST(HapticLoop, ADisarmedDeviceIsHomedAtOnceAndArmedAgainByAnOrderOnly) {
   Handle handle;
-  SafeDevice::Config safety;
-  safety.arming.by = SafeDevice::Arming::By::kStart;
-  SafeDevice safe(safety, handle);
+  SafeDevice safe(armed_at_start(), handle);
   Pushed world(safe);
   ASSERT_EQ(world.steps(400).applied, Vec3(-2, 0, 0));
   world.order(Kind::kDisarm);
@@ -280,28 +269,12 @@ TEST(HapticLoop, OfTwoOrdersTheLaterOneCounts) {
 Vec3 applied_after_release(bool again) {
   Handle handle;
   Pushed pushed(handle);
-  LocalTime now(milliseconds(1));
-  std::uint64_t sequence = 0;
-  const auto push = [&] {
-    RemoteForce force;
-    force.sequence = ++sequence;
-    force.source = 7;
-    force.received = force.answers = now;
-    force.force = Vec3(-2, 0, 0);
-    force.valid_for = milliseconds(500);
-    pushed.mail->forces[0].put(force);
-  };
-  for (int i = 0; i < 300; ++i) {
-    push();
-    now = pushed.loop.step(now);
-  }
-  if (again) push();
+  pushed.source = 7;
+  pushed.valid_for = milliseconds(500);
+  pushed.steps(300);
+  if (again) pushed.push();
   pushed.mail->orders.try_push({HapticOrder::Kind::kRelease, 0, 7});
-  Vec3 applied = Vec3::Zero();
-  for (int i = 0; i < 450; ++i) now = pushed.loop.step(now);
-  const DeviceState* const state = pushed.mail->state.take();
-  if (state != nullptr) applied = state->force_applied;
-  return applied;
+  return pushed.steps(450, false).applied;
 }
 
 TEST(HapticLoop, AForceThatComesWithTheReleaseOfItsSourceIsNotFresh) {

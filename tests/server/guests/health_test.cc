@@ -139,22 +139,17 @@ TEST(Health, IsToldAsWhatHasHappenedBetween) {
   EXPECT_EQ(told.degraded, "");
 }
 
-TEST(Health, DatagramsThatTheSystemDidNotTakeDegradeTheirOwnReportOnly) {
-  Health before;
-  before.unsent = 3;
-  Health now = before;
-  now.unsent = 5;
-  EXPECT_EQ(report(before, now).degraded, "unsent datagrams");
-  EXPECT_EQ(report(now, now).degraded, "");
-}
-
-TEST(Health, StepsThatWereNotRecordedDegradeTheirOwnReportOnly) {
-  Health before;
-  before.steps_lost = 3;
-  Health now = before;
-  now.steps_lost = 4;
-  EXPECT_EQ(report(before, now).degraded, "the log thread is too slow");
-  EXPECT_EQ(report(now, now).degraded, "");
+TEST(Health, WhatWasNotSentOrRecordedDegradesItsOwnReportOnly) {
+  const std::pair<std::uint64_t Health::*, const char*> cases[] = {{&Health::unsent, "unsent datagrams"},
+                                                                   {&Health::steps_lost, "the log thread is too slow"}};
+  for (const auto& [count, words] : cases) {
+    Health before;
+    before.*count = 3;
+    Health now = before;
+    now.*count = 4;
+    EXPECT_EQ(report(before, now).degraded, words);
+    EXPECT_EQ(report(now, now).degraded, "");
+  }
 }
 
 TEST(Health, SaysAllThatTheServerDoesLessOfWithinTheBoundOfAText) {

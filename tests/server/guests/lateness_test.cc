@@ -87,25 +87,17 @@ TEST(Lateness, AForceThatIsStillMissingIsTheEnginesFaultWhileItIsHeard) {
             "forces were late once, by up to 970 ms: the engine (its datagrams arrive, but without a usable force)");
 }
 
-TEST(Lateness, SilenceOfARemoteEngineHasNoKnownCause) {
-  Engine silent;
-  silent.answer_times(50);
-  const auto report = silent.lateness.report(silent.now() + seconds(1));
-  EXPECT_EQ(report.late_unknown, 1U);
-  EXPECT_EQ(report.late(), 1U);
-  EXPECT_EQ(
-      report.text,
-      "forces were late once, by up to 970 ms: the engine has stopped, or the network is down (no datagrams arrive)");
-}
-
-TEST(Lateness, SilenceOfAnEngineOnThisMachineIsTheEngines) {
-  Engine silent(true);
-  silent.answer_times(50);
-  const auto report = silent.lateness.report(silent.now() + seconds(1));
-  EXPECT_EQ(report.late_engine, 1U);
-  EXPECT_EQ(
-      report.text,
-      "forces were late once, by up to 970 ms: the engine (no datagrams arrive from its program on this machine)");
+TEST(Lateness, SilenceOfARemoteEngineHasNoKnownCauseAndThatOfALocalOneIsItsFault) {
+  for (const bool local : {false, true}) {
+    Engine silent(local);
+    silent.answer_times(50);
+    const auto report = silent.lateness.report(silent.now() + seconds(1));
+    EXPECT_EQ(local ? report.late_engine : report.late_unknown, 1U);
+    EXPECT_EQ(report.late(), 1U);
+    EXPECT_EQ(report.text, std::string("forces were late once, by up to 970 ms: the engine ") +
+                               (local ? "(no datagrams arrive from its program on this machine)"
+                                      : "has stopped, or the network is down (no datagrams arrive)"));
+  }
 }
 
 /// Two consecutive datagrams with time stamps `apart`, then a force with a long round trip.
@@ -125,12 +117,9 @@ TEST(Lateness, AProgramThatStoodStillIsBlamedWhateverTheRoundTripSays) {
   EXPECT_EQ(report.text, "forces were late once, by up to 570 ms: the engine (its program was stopped for 598 ms)");
 }
 
-TEST(Lateness, ASilenceInWhichDatagramsWereLostIsNoStandstill) {
-  EXPECT_EQ(after_silence(milliseconds(598), 3).late_network, 1U);
-}
-
-TEST(Lateness, AStandstillThatExplainsLittleOfTheDelayIsNotBlamed) {
-  EXPECT_EQ(after_silence(milliseconds(150), 0).late_network, 1U);
+TEST(Lateness, ASilenceWithLossesOrTooShortAStandstillIsOfTheNetwork) {
+  EXPECT_EQ(after_silence(milliseconds(598), 3).late_network, 1U) << "datagrams were lost";
+  EXPECT_EQ(after_silence(milliseconds(150), 0).late_network, 1U) << "explains little of the delay";
 }
 
 /// The forces are in time, and there is a state in each millisecond. Then our process is stopped for `pause`.

@@ -1,38 +1,32 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <gtest/gtest.h>
+
 #include <algorithm>
-#include <filesystem>
-#include <fstream>
-#include <iterator>
+#include <functional>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "devices/simulated/simulated_device.h"
 #include "server/assembly.h"
 #include "server/guests/couple.h"
+#include "tests/server/guests/foreign.h"
+#include "tests/server/scene/scene_text.h"
+#include "tests/support/dice.h"
 #include "tests/support/wire.h"
 
 namespace tendon {
 
-/// Returns the text of a shipped scene and the scene with `settings`.
-inline std::string text_of(const std::string& scene) {
-  std::ifstream file(std::filesystem::path(TENDON_SOURCE_DIR) / "deploy" / "scenes" / scene);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
-inline Scene scene_of(const std::string& name, const std::vector<std::string>& settings = {}) {
-  return parse_scene(text_of(name), name, ".", settings);
-}
-
-/// A server with one coupled or uncoupled device in virtual time.
+/// Runs a server with one device in virtual time.
 struct Place {
   /// `key`: of the connection between both servers.
-  Place(Wire& wire, const Scene& the_scene, std::uint64_t epoch, LocalTime now, bool is_coupled = true,
-        const std::optional<Key>& key = {})
+  Place(Wire& wire, const Scene& the_scene, std::uint64_t epoch, LocalTime now, const std::optional<Key>& key = {})
       : scene(the_scene), end(wire, scene.network.listen), device(scene.simulated()) {
-    if (!is_coupled) scene.teleoperation.reset();
     Assembly::Config config{.now = now,
                             .epoch = epoch,
                             .watched = Mailboxes::Capacities{.steps = 16, .ports = 32, .flight = 2, .datagrams = 1}};
@@ -85,6 +79,93 @@ struct Place {
 
  private:
   std::map<std::uint32_t, PortRecord> ports_;  ///< by channel
+};
+
+/// A client of a place. It stores the coupling states and the last answer that it receives.
+class Guest : public Foreign {
+ public:
+  struct Seen {
+    LocalTime at;
+    PortFrame port;
+  };
+
+  using Foreign::Foreign;
+  void turn(LocalTime now) {
+    Foreign::turn(now, [&](const Session::Event& event) {
+      if (const auto* told = std::get_if<Session::PortArrived>(&event)) {
+        (told->port.of_peer ? peers : own).push_back({now, told->port});
+      }
+      if (const auto* told = std::get_if<Session::RequestAnswered>(&event)) answer = *told;
+      states += std::holds_alternative<Session::StateArrived>(event) ? 1 : 0;
+    });
+  }
+
+  std::vector<Seen> own;
+  std::vector<Seen> peers;
+  std::size_t states = 0;
+  std::optional<Session::RequestAnswered> answer;
+};
+
+/// Two or three servers with coupled devices and haptic loops in virtual time, and clients.
+class Places : public ::testing::Test {
+ protected:
+  std::unique_ptr<Place> place(const Scene& scene, std::uint64_t epoch, const std::optional<Key>& key = {}) {
+    return std::make_unique<Place>(wire_, scene, epoch, now_, key);
+  }
+
+  void run(Duration length, const std::function<void()>& each = {}) {
+    for (const LocalTime until = now_ + length; now_ < until; now_ += std::chrono::milliseconds(1)) {
+      for (Place* one : places()) one->step(now_);
+      for (Guest* one : guests_) one->turn(now_);
+      for (const std::size_t count = wire_.size(); count_ < count; ++count_) {
+        if (is_cut(wire_[count_]) || dice_.chance(loss_)) continue;
+        under_way_.emplace_back(now_ + delay_ + dice_.milliseconds(0, jitter_ms_), wire_[count_]);
+      }
+      std::erase_if(under_way_, [&](const auto& one) {
+        if (one.first > now_) return false;
+        for (Place* place : places()) deliver(one.second, place->end);
+        for (Guest* guest : guests_) deliver(one.second, guest->end);
+        return true;
+      });
+      if (each) each();
+    }
+  }
+
+  void expect_phase(PortPhase phase) {
+    for (Place* one : places()) EXPECT_EQ(one->phase(), phase) << one->scene.name;
+  }
+  void expect_sound() {
+    for (const Place* one : places()) EXPECT_GE(one->least_energy, -1e-9) << one->scene.name;
+  }
+
+  Wire wire_;
+  LocalTime now_{std::chrono::seconds(1)};
+  Duration delay_{};
+  double jitter_ms_ = 0;
+  double loss_ = 0;
+  bool cut_ = false;                  ///< the network is down
+  std::optional<Address> cut_off_{};  ///< unreachable address
+  Dice dice_{7};
+  std::unique_ptr<Place> leader_;
+  std::unique_ptr<Place> second_leader_;
+  std::unique_ptr<Place> follower_;
+  std::vector<Guest*> guests_;
+
+ private:
+  std::vector<Place*> places() {
+    std::vector<Place*> all = {leader_.get(), second_leader_.get(), follower_.get()};
+    std::erase(all, nullptr);
+    return all;
+  }
+  bool is_cut(const Datagram& datagram) const {
+    return cut_ || (cut_off_ && (datagram.from == *cut_off_ || datagram.to == *cut_off_));
+  }
+  static void deliver(const Datagram& datagram, End& end) {
+    if (end.self == datagram.to) end.inbox.push_back(datagram);
+  }
+
+  std::size_t count_ = 0;
+  std::vector<std::pair<LocalTime, Datagram>> under_way_;
 };
 
 }  // namespace tendon

@@ -22,20 +22,19 @@ Recorded take_recorded(Mailboxes& mail, const Address& guest) {
 }
 
 TEST_F(SealedServer, AFloodOfStrangersIsASampleAndACountAndGuestsAreWhole) {
-  Client client = controller(wall_, "198.51.100.1:1000");
-  run(milliseconds(500), {&client});
-  take_recorded(*mail_, client.end->self);
+  Client client = opened(wall_, "198.51.100.1:1000");
+  take_recorded(mail(), client.end->self);
   const Bytes junk(1200, std::byte{0x5a});
   const Bytes hello = wire_.front().bytes;  // without a cookie
   Bytes forged;                             // a datagram of the session with a modified end
   const std::size_t before = wire_.size();
   run(milliseconds(100), {&client});
   for (std::size_t i = before; i < wire_.size(); ++i) {
-    if (wire_[i].to == server_.self) forged = wire_[i].bytes;
+    if (wire_[i].to == server_) forged = wire_[i].bytes;
   }
   ASSERT_FALSE(forged.empty());
   forged.back() ^= std::byte{1};
-  take_recorded(*mail_, client.end->self);
+  take_recorded(mail(), client.end->self);
 
   const std::size_t on_the_wire = wire_.size();
   constexpr int kFlood = 39;  // per millisecond, of each of three kinds
@@ -52,27 +51,25 @@ TEST_F(SealedServer, AFloodOfStrangersIsASampleAndACountAndGuestsAreWhole) {
   for (std::size_t i = on_the_wire; i < wire_.size(); ++i) {
     guests += wire_[i].from == client.end->self || wire_[i].to == client.end->self ? 1U : 0U;
   }
-  const Recorded recorded = take_recorded(*mail_, client.end->self);
+  const Recorded recorded = take_recorded(mail(), client.end->self);
   EXPECT_EQ(recorded.guests, guests);
   EXPECT_GE(recorded.strangers, 16U);
   EXPECT_LE(recorded.strangers, 2 * 16U) << "seconds begin where datagrams do";
-  EXPECT_EQ(mail_->datagrams_lost, 0U);
-  EXPECT_EQ(mail_->datagrams_over_budget, 0U);
-  EXPECT_GT(mail_->strangers_left_out, 39'000U);
+  EXPECT_EQ(mail().datagrams_lost, 0U);
+  EXPECT_EQ(mail().datagrams_over_budget, 0U);
+  EXPECT_GT(mail().strangers_left_out, 39'000U);
 }
 
 TEST_F(SealedServer, AGuestThatSendsMoreThanTheBudgetIsCountedAndNotRecorded) {
-  NetworkLoop::Config config;
-  config.keys = {wall_};
-  config.recorded.bytes_per_s = 20'000;
-  restart(config);
+  config_.recorded.bytes_per_s = 20'000;
+  restart();
   Client client = controller(wall_, "198.51.100.1:1000");
   run(seconds(3), {&client});
   std::size_t bytes = 0;
-  for (; const DatagramRecord* datagram = mail_->datagrams.front(); mail_->datagrams.pop()) bytes += datagram->size;
+  for (; const DatagramRecord* datagram = mail().datagrams.front(); mail().datagrams.pop()) bytes += datagram->size;
   EXPECT_LE(bytes, 4 * 20'000U);
   EXPECT_GE(bytes, 2 * 20'000U);
-  EXPECT_GT(mail_->datagrams_over_budget, 1000U);
+  EXPECT_GT(mail().datagrams_over_budget, 1000U);
 }
 
 }  // namespace
