@@ -1,19 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "clients/dashboard/observer.h"
 
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <memory>
+#include <cstddef>
 #include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
-#include "server/network_loop.h"
-#include "tests/support/wire.h"
+#include "tests/server/servers.h"
 
-// The observer and the server's NetworkLoop on virtual time, over a network without loss.
+// The observer and the network loop of a server in virtual time, over a network without loss.
 
 namespace tendon::dash::observer_test {
 namespace {
@@ -21,46 +17,50 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-class ObserverTest : public testing::Test {
+const std::string kCoupled =
+    "[teleoperation]\nrole = \"leader\"\n[teleoperation.purse]\n"
+    "[teleoperation.coupling]\nstiffness_n_per_m = 400\ndamping_n_s_per_m = 4\n";
+
+class ObserverTest : public Servers {
  protected:
-  void serve(const std::vector<std::string>& names, std::uint32_t first_id = 1) {
-    NetworkLoop::Config config;
-    config.secret.fill(static_cast<std::byte>(first_id));
-    config.first_connection_id = first_id;
-    mail_.clear();
+  void serve(const std::vector<std::string>& names, std::uint32_t first_id = 1, std::size_t max_observers = 8) {
+    std::vector<Scene> scenes;
     for (const std::string& name : names) {
-      mail_.push_back(std::make_unique<Mailboxes>(Mailboxes::Capacities{.steps = 16, .flight = 16, .datagrams = 1}));
-      const std::string number = std::to_string(config.devices.size());
-      ServedDevice::Config& device = config.devices.emplace_back();
-      device.about = {
-          .name = name, .model = "model of " + name, .max_force = 8, .loop_hz = 1000, .channels = {{.name = "main"}}};
-      device.handle.buttons = {"button " + number};
-      if (port_) device.coupling = Couple{.role = PortRole::kLeader};
-      device.mail = mail_.back().get();
+      const std::string group = "group = \"of-" + name + "\"\n";
+      scenes.push_back(device_named(name, group + (port_ ? kCoupled : "")));
     }
-    server_.inbox.clear();
-    loop_ = std::make_unique<NetworkLoop>(config, server_, now_);
+    scenes[0].network.max_observers = max_observers;
+    Assembly::Config config{.watched = Mailboxes::Capacities{.steps = 16, .flight = 16, .datagrams = 1}};
+    config.network.secret.fill(static_cast<std::byte>(first_id));
+    config.network.first_connection_id = first_id;
+    Servers::serve(scenes, 1, config);
   }
   void run(Duration length) {
     for (const LocalTime end = now_ + length; now_ < end; now_ += milliseconds(1)) {
       ++tick_;
-      for (std::size_t i = 0; i < mail_.size(); ++i) {
-        DeviceState state;
-        state.tick = tick_;
-        state.sampled = PeerTime(now_.time_since_epoch());
-        state.device = static_cast<std::uint32_t>(i);
-        state.force_wanted = Vec3(1, 2, 3);
-        state.buttons = 2;
-        mail_[i]->state.put(state);
-        if (port_) mail_[i]->port_out[0].put(*port_);
-      }
-      if (loop_) loop_->turn(now_);
+      if (assembly_) run_server();
       observer_->turn(now_);
       for (; !wire_.empty(); wire_.pop_front()) {
         Datagram& datagram = wire_.front();
-        (datagram.to == server_.self ? server_ : own_).inbox.push_back(std::move(datagram));
+        if (datagram.to == own_.self)
+          own_.inbox.push_back(std::move(datagram));
+        else if (assembly_ && datagram.to == server_)
+          ends_[0].inbox.push_back(std::move(datagram));
       }
     }
+  }
+  void run_server() {
+    for (std::size_t i = 0; i < devices_.size(); ++i) {
+      DeviceState state;
+      state.tick = tick_;
+      state.sampled = PeerTime(now_.time_since_epoch());
+      state.device = static_cast<std::uint32_t>(i);
+      state.force_wanted = Vec3(1, 2, 3);
+      state.buttons = 2;
+      mail(i).state.put(state);
+      if (port_) mail(i).port_out[0].put(*port_);
+    }
+    assembly_->turn_network(0, now_);
   }
   static std::vector<std::string> many(int devices) {
     std::vector<std::string> names;
@@ -68,7 +68,7 @@ class ObserverTest : public testing::Test {
     return names;
   }
   void watch(const std::string& device) {
-    observer_.emplace(own_, server_.self, Observer::Config{.device = device, .seed = 1}, board_, now_);
+    observer_.emplace(own_, server_, Observer::Config{.device = device, .seed = 1}, board_, now_);
   }
   std::vector<std::string> names() const {
     std::vector<std::string> names;
@@ -78,36 +78,31 @@ class ObserverTest : public testing::Test {
   double seconds_since(PeerTime at) const { return tendon::seconds(now_.time_since_epoch() - at.time_since_epoch()); }
   using Names = std::vector<std::string>;
 
-  LocalTime now_{seconds(1000)};
-  Wire wire_;
-  End server_{wire_, parse_address("127.0.0.1:47100")};
   End own_{wire_, parse_address("127.0.0.1:5000")};
-  std::vector<std::unique_ptr<Mailboxes>> mail_;
-  std::unique_ptr<NetworkLoop> loop_;
   std::uint64_t tick_ = 0;
   std::optional<PortState> port_;  ///< if set, the state of the coupling of every device
   Board board_;
-  std::optional<Observer> observer_{std::in_place, own_, server_.self, Observer::Config{.seed = 1}, board_, now_};
+  std::optional<Observer> observer_{std::in_place, own_, server_, Observer::Config{.seed = 1}, board_, now_};
 };
 
 TEST_F(ObserverTest, TriesEveryAddressOfTheServerAndStaysWhereItIsAnswered) {
   serve({"left"});
   const Address first = parse_address("[::1]:47100");
   const Address second = parse_address("192.0.2.1:47100");
-  observer_.emplace(own_, first, Observer::Config{.further = {second, server_.self}, .seed = 1}, board_, now_);
+  observer_.emplace(own_, first, Observer::Config{.further = {second, server_}, .seed = 1}, board_, now_);
   run(milliseconds(2500));
   EXPECT_EQ(observer_->server(), second);
   EXPECT_EQ(board_.words(), "no answer from [::1]:47100: is tendond running there?");
   run(seconds(3));
   EXPECT_EQ(board_.contact(), Contact::kOpen);
-  EXPECT_EQ(observer_->server(), server_.self);
-  loop_.reset();
+  EXPECT_EQ(observer_->server(), server_);
+  stop();
   run(seconds(5));
   EXPECT_EQ(board_.contact(), Contact::kUnanswered);
   serve({"left"}, 2);
   run(seconds(15));
   EXPECT_EQ(board_.contact(), Contact::kOpen);
-  EXPECT_EQ(observer_->server(), server_.self);
+  EXPECT_EQ(observer_->server(), server_);
 }
 
 TEST_F(ObserverTest, WatchesTheOnlyDeviceOfAServer) {
@@ -126,7 +121,7 @@ TEST_F(ObserverTest, ComesBackForAllTheDevicesOfAServerWithSeveral) {
   EXPECT_EQ(names(), (Names{"left", "right", "foot"}));
   EXPECT_EQ(board_.sessions(), 2U);
   for (std::uint32_t device : {0U, 1U, 2U}) EXPECT_GT(board_.devices().at(device).states, 1800U) << device;
-  EXPECT_EQ(loop_->stats().timed_out, 0U) << "the first session was ended by a Bye";
+  EXPECT_EQ(assembly_->network().stats().timed_out, 0U) << "the first session was ended by a Bye";
 }
 
 TEST_F(ObserverTest, OfALargeServerItWatchesTheBankOfTheDeviceThatItIsTold) {
@@ -180,7 +175,7 @@ TEST_F(ObserverTest, IsToldWhatTheHandlesAre) {
   for (std::uint32_t device : {0U, 1U}) {
     const auto& handle = board_.devices().at(device).handle;
     ASSERT_TRUE(handle) << device;
-    EXPECT_EQ(handle->buttons, Names{"button " + std::to_string(device)});
+    EXPECT_EQ(handle->group, device == 0 ? "of-left" : "of-right");
   }
   const auto version = board_.version();
   run(seconds(3));
@@ -215,8 +210,7 @@ TEST_F(ObserverTest, FindsAServerThatComesLate) {
 TEST_F(ObserverTest, FindsAServerAgainThatHasOtherDevicesNow) {
   serve({"left", "right", "foot"});
   run(seconds(1));
-  loop_.reset();
-  mail_.clear();
+  stop();
   run(seconds(5));
   EXPECT_EQ(board_.contact(), Contact::kUnanswered);
   serve({"only"}, 77);
@@ -229,13 +223,7 @@ TEST_F(ObserverTest, FindsAServerAgainThatHasOtherDevicesNow) {
 }
 
 TEST_F(ObserverTest, SaysWhyItIsRefused) {
-  serve({"left"});
-  loop_.reset();
-  NetworkLoop::Config config;
-  config.max_observers = 0;
-  config.devices = {{.about = {.name = "left", .model = "model", .loop_hz = 1000, .channels = {{.name = "main"}}},
-                     .mail = mail_[0].get()}};
-  loop_ = std::make_unique<NetworkLoop>(config, server_, now_);
+  serve({"left"}, 1, 0);
   run(seconds(1));
   EXPECT_EQ(board_.contact(), Contact::kRefused);
   EXPECT_EQ(board_.words(), "127.0.0.1:47100 refused the connection: there are 0 observers already");
@@ -252,7 +240,7 @@ TEST_F(ObserverTest, IsToldTheEndsOfACoupling) {
   EXPECT_NEAR(seconds_since(board_.devices().at(0).ports->at), 0, 0.03);
   EXPECT_GT(board_.take_ports(0).size(), 10U);
   port_.reset();
-  loop_.reset();
+  stop();
   run(seconds(4));
   serve({"left"}, 1000);
   run(seconds(3));
@@ -264,7 +252,7 @@ TEST_F(ObserverTest, SaysByeWhenItStops) {
   run(seconds(1));
   observer_->stop(now_);
   run(seconds(1));
-  EXPECT_EQ(loop_->stats().timed_out, 0U);
+  EXPECT_EQ(assembly_->network().stats().timed_out, 0U);
   EXPECT_EQ(observer_->turn(now_), LocalTime::max());
   const auto states = board_.devices().at(0).states;
   run(seconds(1));
