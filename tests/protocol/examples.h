@@ -7,6 +7,7 @@
 #include <limits>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "protocol/wire/codec.h"
@@ -19,6 +20,17 @@ namespace tendon::examples {
 using Bytes = std::vector<std::byte>;
 
 inline constexpr std::uint32_t kConnection = 0x11223344;
+
+inline std::string hex(std::span<const std::byte> bytes, std::string_view between = {}) {
+  constexpr std::string_view kDigits = "0123456789abcdef";
+  std::string out;
+  for (const std::byte b : bytes) {
+    if (!out.empty()) out += between;
+    out += kDigits[std::to_integer<unsigned>(b) >> 4U];
+    out += kDigits[std::to_integer<unsigned>(b) & 15U];
+  }
+  return out;
+}
 
 /// Returns the 16 bytes first, first + 1, …
 inline std::array<std::byte, 16> sixteen(unsigned first) {

@@ -65,49 +65,28 @@ TEST(Codec, SeveralFramesAndAnEchoShareOneDatagram) {
 
 TEST(Codec, AWriterUsedAgainRemembersNothingOfTheLastDatagram) {
   DataWriter writer;
-  DataReader reader;
   std::array<std::byte, kMaxDatagram> buffer;
-  writer.begin(buffer, {.connection_id = 1}, LocalTime{}, examples::echo());
-  writer.add(examples::force_with_torque());
-  ForceCommand plain = examples::force();
-  plain.model.reset();
-  writer.begin(buffer, {.connection_id = 1, .packet_number = 1}, LocalTime{}, {});
-  writer.add(plain);
-  const auto* content = reader.read(std::span(buffer).first(writer.size()).subspan(kHeaderSize));
-  ASSERT_NE(content, nullptr);
-  EXPECT_FALSE(content->echo.has_value());
-  ASSERT_EQ(content->frames.size(), 1U);
-  EXPECT_FALSE(std::get<ForceCommand>(content->frames[0]).model.has_value());
-}
-
-TEST(Codec, AWriterUsedAgainRemembersNothingOfTheLastHandle) {
-  DataWriter writer;
-  std::array<std::byte, kMaxDatagram> buffer;
-  const auto write = [&](const auto&... frames) {
-    writer.begin(buffer, {.connection_id = examples::kConnection}, LocalTime{Duration{1'000'100'000}}, {});
+  const auto write = [&](const std::optional<OutgoingEcho>& echo, const auto&... frames) {
+    writer.begin(buffer, {.connection_id = examples::kConnection}, LocalTime{Duration{1'000'100'000}}, echo);
     (writer.add(frames), ...);
     return examples::Bytes(buffer.begin(), buffer.begin() + static_cast<std::ptrdiff_t>(writer.size()));
   };
-  write(examples::state_with_handle(), examples::force_with_torque(), examples::handle_described(1));
-  HandleDescription little{.device = 1};
+  ForceCommand force = examples::force();
+  force.model.reset();
   ControlAck ack = examples::handle_described(1);
-  ack.handle = little;
-  EXPECT_EQ(write(examples::state(), examples::force(), ack), data(0, {}, examples::state(), examples::force(), ack));
-}
+  ack.handle = HandleDescription{.device = 1};
+  write(examples::echo(), examples::state_with_handle(), examples::force_with_torque(), examples::handle_described(1));
+  EXPECT_EQ(write({}, examples::state(), force, ack), data(0, {}, examples::state(), force, ack));
 
-TEST(Codec, AWriterUsedAgainRemembersNothingOfTheLastCoupling) {
-  DataWriter writer;
-  std::array<std::byte, kMaxDatagram> buffer;
-  const auto write = [&](const auto&... frames) {
-    writer.begin(buffer, {.connection_id = examples::kConnection}, LocalTime{Duration{1'000'100'000}}, {});
-    (writer.add(frames), ...);
-    return examples::Bytes(buffer.begin(), buffer.begin() + static_cast<std::ptrdiff_t>(writer.size()));
-  };
-  write(examples::port_with_all());
-  EXPECT_EQ(write(examples::port()), data(0, {}, examples::port()));
   const Control couple{.id = 1, .request = examples::couple()};
-  write(Control{.id = 1, .request = examples::couple_with_all()});
-  EXPECT_EQ(write(couple), data(0, {}, couple));
+  write({}, examples::port_with_all(), Control{.id = 1, .request = examples::couple_with_all()});
+  EXPECT_EQ(write({}, examples::port(), couple), data(0, {}, examples::port(), couple));
+
+  const DeviceReport device{.number = 8};
+  PeerReport peer;
+  peer.link.number = 1;
+  write({}, examples::state_with_wanted(), examples::device_report(), examples::peer_report_with_way());
+  EXPECT_EQ(write({}, examples::state(), device, peer), data(0, {}, examples::state(), device, peer));
 }
 
 TEST(Codec, AReaderUsedAgainRemembersNothingOfTheLastCoupling) {
@@ -120,34 +99,6 @@ TEST(Codec, AReaderUsedAgainRemembersNothingOfTheLastCoupling) {
   EXPECT_FALSE(port.turn || port.grip || port.share || port.of_peer);
   EXPECT_EQ(port.energy_in + port.position_scale + port.force_scale, 0);
   EXPECT_EQ(std::get<Couple>(*std::get<Control>(content->frames[1]).request), examples::couple());
-}
-
-TEST(Codec, AWriterUsedAgainRemembersNothingOfTheLastReports) {
-  DataWriter writer;
-  DataReader reader;
-  std::array<std::byte, kMaxDatagram> buffer;
-  writer.begin(buffer, {.connection_id = 1}, LocalTime{}, {});
-  writer.add(examples::state_with_wanted());
-  writer.add(examples::device_report());
-  writer.add(examples::peer_report_with_way());
-  writer.begin(buffer, {.connection_id = 1, .packet_number = 1}, LocalTime{}, {});
-  writer.add(examples::state());
-  writer.add(DeviceReport{.number = 8});
-  PeerReport quiet;
-  quiet.link.number = 1;
-  writer.add(quiet);
-  const auto* content = reader.read(std::span(buffer).first(writer.size()).subspan(kHeaderSize));
-  ASSERT_NE(content, nullptr);
-  ASSERT_EQ(content->frames.size(), 3U);
-  EXPECT_FALSE(std::get<DeviceState>(content->frames[0]).force_wanted.has_value());
-  const auto& device = std::get<DeviceReport>(content->frames[1]);
-  EXPECT_EQ(device.lateness, LatenessHistogram{});
-  EXPECT_EQ(device.fault + device.degraded, "");
-  const auto& peer = std::get<PeerReport>(content->frames[2]);
-  EXPECT_FALSE(peer.forces_refused);
-  EXPECT_FALSE(peer.link.round_trip.has_value());
-  EXPECT_EQ(peer.name + peer.link.words + peer.way, "");
-  EXPECT_FALSE(peer.error.has_value());
 }
 
 TEST(Codec, TheLargestReportsFitIntoASealedDatagramOfTheirOwn) {

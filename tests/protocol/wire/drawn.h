@@ -100,6 +100,62 @@ inline ForceCommand a_force(Dice& dice) {
   return command;
 }
 
+// The largest state and force: eight bytes for every component, ten for every counter.
+
+inline const Vec3 kThirds = Vec3::Constant(-1.0 / 3);
+inline const Mat3 kNineEntries{{1.1, 2.1, 3.1}, {4.1, 5.1, 6.1}, {7.1, 8.1, 9.1}};
+inline constexpr Quat kTurned{.w = 0.5, .x = -0.5, .y = 0.5, .z = 0.5};
+
+inline DeviceState fullest_state() {
+  DeviceState state{.tick = ~std::uint64_t{0},
+                    .sampled = PeerTime{limits::kMaxTime},
+                    .position = kThirds,
+                    .velocity = kThirds,
+                    .force_applied = kThirds,
+                    .energy = -0.1,
+                    .permitted_force = kInf,
+                    .reasons = ~0U,
+                    .force_sequence = ~std::uint64_t{0},
+                    .force_age = limits::kMaxTime,
+                    .mode = Mode::kFault,
+                    .device = limits::kMaxDevices - 1,
+                    .channel = limits::kMaxChannels - 1,
+                    .force_wanted = kThirds,
+                    .stiffness_wanted = kNineEntries,
+                    .buttons = ~0U,
+                    .turning = Turning{.orientation = kTurned, .angular_velocity = kThirds},
+                    .torque_applied = kThirds,
+                    .grip = Grip{.opening = 0.1, .velocity = -0.1},
+                    .grip_applied = 0.1,
+                    .hand_force = kThirds,
+                    .joints = Joints{.count = Joints::kMost, .angle = {}, .velocity = {}}};
+  state.joints->angle.fill(-0.1);
+  state.joints->velocity.fill(0.1);
+  return state;
+}
+
+inline ForceCommand fullest_force() {
+  ForceTable table{.first = -0.1, .step = 0.1, .size = ForceTable::kMaxEntries, .force = {}};
+  table.force.fill(0.1);
+  ForceCommand force{.sequence = ~std::uint64_t{0},
+                     .based_on_tick = ~std::uint64_t{0},
+                     .force = kThirds,
+                     .model = LocalModel{.at = kThirds,
+                                         .stiffness = kNineEntries,
+                                         .valid_radius = 0.1,
+                                         .contact = Contact{.normal = {0.6, 0.64, 0.48}, .gap = -0.1, .table = table}},
+                     .valid_for = limits::kMaxValidFor,
+                     .device = limits::kMaxDevices - 1,
+                     .channel = limits::kMaxChannels - 1,
+                     .topology_changed = true,
+                     .error = 0.1,
+                     .torque = RemoteTorque{.torque = kThirds, .model = RotationModel{}},
+                     .grip_force = -0.1};
+  force.torque->model->at = kTurned;
+  force.torque->model->stiffness = kNineEntries;
+  return force;
+}
+
 inline void spoil(Dice& dice, DeviceState& state) {
   constexpr std::array kBad = {kNan, kInf, -kInf, 2 * limits::kMaxValue};
   const double bad = kBad[dice.bits() % kBad.size()];

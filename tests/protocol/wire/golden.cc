@@ -28,16 +28,7 @@ constexpr std::string_view kOpening = "```golden ";
 constexpr std::string_view kClosing = "```";
 constexpr std::size_t kAcross = 16;  ///< bytes per line
 
-std::string hex(Bytes bytes) {
-  constexpr std::string_view kDigits = "0123456789abcdef";
-  std::string out;
-  for (const std::byte b : bytes) {
-    if (!out.empty()) out += ' ';
-    out += kDigits[std::to_integer<unsigned>(b) >> 4U];
-    out += kDigits[std::to_integer<unsigned>(b) & 15U];
-  }
-  return out;
-}
+std::string hex(Bytes bytes) { return examples::hex(bytes, " "); }
 
 std::string hex_number(std::uint32_t value) {
   std::array<char, 8> digits;

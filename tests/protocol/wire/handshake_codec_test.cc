@@ -6,6 +6,7 @@
 #include <rapidcheck/gtest.h>
 
 #include <array>
+#include <functional>
 #include <limits>
 #include <string>
 #include <vector>
@@ -14,6 +15,7 @@
 #include "protocol/secrets/client_key.h"
 #include "protocol/secrets/noise.h"
 #include "tests/protocol/examples.h"
+#include "tests/protocol/wire/drawn.h"
 #include "tests/protocol/wire/read_back.h"
 
 namespace tendon::handshake_codec_test {
@@ -79,20 +81,6 @@ TEST(Codec, TheFullestHelloAndWelcomeFit) {
   EXPECT_TRUE(read_answer(decode_answer(bytes)->body).has_value());
 }
 
-TEST(Codec, WaysAreReadInTheirOrderAndRefusedWhenTheyAreTooManyOrTooLong) {
-  const auto hello = read_hello(write_body(examples::hello_with_ways()));
-  ASSERT_TRUE(hello.has_value());
-  EXPECT_EQ(hello->ways, (std::vector<std::string>{"tabulated", "near"}));
-  const auto reads = [](std::size_t count, std::size_t length) {
-    RawProtobuf raw = RawProtobuf().varint(1, 1).varint(2, 1).varint(3, 2);
-    for (std::size_t i = 0; i < count; ++i) raw.text(7, std::string(length, 'w'));
-    return read_hello(raw.bytes()).has_value();
-  };
-  EXPECT_TRUE(reads(limits::kMaxWays, limits::kMaxLabel));
-  EXPECT_FALSE(reads(limits::kMaxWays + 1, 1));
-  EXPECT_FALSE(reads(1, limits::kMaxLabel + 1));
-}
-
 TEST(Codec, AnEngineThatNamesNoWaySendsTheBytesThatItAlwaysSent) {
   Hello hello = examples::hello();
   const Bytes before = write_body(hello);
@@ -105,7 +93,8 @@ TEST(Codec, AnEngineThatNamesNoWaySendsTheBytesThatItAlwaysSent) {
   EXPECT_EQ(said.size(), examples::data(1, {}, force).size() + 2);
 }
 
-TEST(Codec, ClaimsAndGrantsComeOutAsTheyWentIn) {
+TEST(Codec, WaysClaimsAndGrantsComeOutAsTheyWentIn) {
+  EXPECT_EQ(read_hello(write_body(examples::hello_with_ways())).value().ways, examples::hello_with_ways().ways);
   const auto hello = read_hello(write_body(examples::hello_with_claims()));
   ASSERT_TRUE(hello.has_value());
   ASSERT_EQ(hello->claims.size(), 2U);
@@ -119,6 +108,18 @@ TEST(Codec, ClaimsAndGrantsComeOutAsTheyWentIn) {
   EXPECT_EQ(grants[0].role, Role::kObserver);
   EXPECT_EQ(grants[1].device, 1U);
   EXPECT_EQ(grants[1].channel, 1U);
+}
+
+/// Writes a datagram with an echo, leaves room for the tag of the seal, and reads it back.
+ControlAck read_from_a_sealed_datagram(const ControlAck& answer) {
+  std::array<std::byte, kMaxDatagram> buffer;
+  DataWriter writer;
+  writer.begin(std::span(buffer).first(kMaxDatagram - crypto::kTagSize), {}, LocalTime{limits::kMaxTime},
+               examples::echo());
+  EXPECT_TRUE(writer.add(answer));
+  DataReader reader;
+  const DataContent* content = reader.read(std::span(buffer).subspan(kHeaderSize, writer.size() - kHeaderSize));
+  return content == nullptr ? ControlAck{} : std::get<ControlAck>(content->frames.at(0));
 }
 
 TEST(Codec, TheLongestDescriptionFitsIntoADatagramOfItsOwn) {
@@ -137,16 +138,7 @@ TEST(Codec, TheLongestDescriptionFitsIntoADatagramOfItsOwn) {
   answer.device->channels.resize(
       limits::kMaxChannels + 1,
       {.name = name, .rule = ChannelRule::kPriority, .lease = limits::kMaxTimeout, .holder = name});
-  std::array<std::byte, kMaxDatagram> buffer;
-  DataWriter writer;
-  writer.begin(std::span(buffer).first(kMaxDatagram - crypto::kTagSize), {}, LocalTime{limits::kMaxTime},
-               examples::echo());
-  ASSERT_TRUE(writer.add(answer));
-  DataReader reader;
-  const DataContent* content = reader.read(std::span(buffer).subspan(kHeaderSize, writer.size() - kHeaderSize));
-  ASSERT_NE(content, nullptr);
-  ASSERT_EQ(content->frames.size(), 1U);
-  const auto& device = std::get<ControlAck>(content->frames[0]).device;
+  const auto device = read_from_a_sealed_datagram(answer).device;
   ASSERT_TRUE(device.has_value());
   EXPECT_EQ(device->channels.size(), limits::kMaxChannels);
   EXPECT_EQ(device->name.size(), limits::kMaxLabel);
@@ -164,16 +156,7 @@ TEST(Codec, TheLongestDescriptionOfAHandleFitsIntoADatagramOfItsOwn) {
                                     .group = std::string(limits::kMaxName, 'g'),
                                     .hand = Hand::kRight,
                                     .joints = std::vector(limits::kMaxJoints + 1, std::string(limits::kMaxName, 'j'))};
-  std::array<std::byte, kMaxDatagram> buffer;
-  DataWriter writer;
-  writer.begin(std::span(buffer).first(kMaxDatagram - crypto::kTagSize), {}, LocalTime{limits::kMaxTime},
-               examples::echo());
-  ASSERT_TRUE(writer.add(answer));
-  DataReader reader;
-  const DataContent* content = reader.read(std::span(buffer).subspan(kHeaderSize, writer.size() - kHeaderSize));
-  ASSERT_NE(content, nullptr);
-  ASSERT_EQ(content->frames.size(), 1U);
-  const auto& handle = std::get<ControlAck>(content->frames[0]).handle;
+  const auto handle = read_from_a_sealed_datagram(answer).handle;
   ASSERT_TRUE(handle.has_value());
   EXPECT_EQ(handle->operator_from_device, answer.handle->operator_from_device);
   EXPECT_TRUE(handle->orientation_measured);
@@ -187,53 +170,7 @@ TEST(Codec, TheLongestDescriptionOfAHandleFitsIntoADatagramOfItsOwn) {
   EXPECT_EQ(handle->buttons.back().size(), limits::kMaxLabel);
 }
 
-/// Worst case of both: eight bytes for every component, ten for every counter.
 TEST(Codec, AStateAndAForceAlwaysFitTogetherIntoASealedDatagram) {
-  const Vec3 vector = Vec3::Constant(-1.0 / 3);
-  const Mat3 matrix{{1.1, 2.1, 3.1}, {4.1, 5.1, 6.1}, {7.1, 8.1, 9.1}};
-  const Quat turned{.w = 0.5, .x = -0.5, .y = 0.5, .z = 0.5};
-  DeviceState state{.tick = ~std::uint64_t{0},
-                    .sampled = PeerTime{limits::kMaxTime},
-                    .position = vector,
-                    .velocity = vector,
-                    .force_applied = vector,
-                    .energy = -0.1,
-                    .permitted_force = kInf,
-                    .reasons = ~0U,
-                    .force_sequence = ~std::uint64_t{0},
-                    .force_age = limits::kMaxTime,
-                    .mode = Mode::kFault,
-                    .device = limits::kMaxDevices - 1,
-                    .channel = limits::kMaxChannels - 1,
-                    .force_wanted = vector,
-                    .stiffness_wanted = matrix,
-                    .buttons = ~0U,
-                    .turning = Turning{.orientation = turned, .angular_velocity = vector},
-                    .torque_applied = vector,
-                    .grip = Grip{.opening = 0.1, .velocity = -0.1},
-                    .grip_applied = 0.1,
-                    .hand_force = vector,
-                    .joints = Joints{.count = Joints::kMost, .angle = {}, .velocity = {}}};
-  state.joints->angle.fill(-0.1);
-  state.joints->velocity.fill(0.1);
-  ForceTable table{.first = -0.1, .step = 0.1, .size = ForceTable::kMaxEntries, .force = {}};
-  table.force.fill(0.1);
-  ForceCommand force{.sequence = ~std::uint64_t{0},
-                     .based_on_tick = ~std::uint64_t{0},
-                     .force = vector,
-                     .model = LocalModel{.at = vector,
-                                         .stiffness = matrix,
-                                         .valid_radius = 0.1,
-                                         .contact = Contact{.normal = {0.6, 0.64, 0.48}, .gap = -0.1, .table = table}},
-                     .valid_for = limits::kMaxValidFor,
-                     .device = limits::kMaxDevices - 1,
-                     .channel = limits::kMaxChannels - 1,
-                     .topology_changed = true,
-                     .error = 0.1,
-                     .torque = RemoteTorque{.torque = vector, .model = RotationModel{}},
-                     .grip_force = -0.1};
-  force.torque->model->at = turned;
-  force.torque->model->stiffness = matrix;
   OutgoingEcho echo = examples::echo();
   echo.packet_number = ~std::uint64_t{0};
 
@@ -241,9 +178,9 @@ TEST(Codec, AStateAndAForceAlwaysFitTogetherIntoASealedDatagram) {
   DataWriter writer;
   writer.begin(std::span(buffer).first(kMaxDatagram - crypto::kTagSize), {}, LocalTime{limits::kMaxTime}, echo);
   const std::size_t empty = writer.size();
-  ASSERT_TRUE(writer.add(state));
+  ASSERT_TRUE(writer.add(drawn::fullest_state()));
   EXPECT_EQ(writer.size() - empty, 565U);
-  ASSERT_TRUE(writer.add(force));
+  ASSERT_TRUE(writer.add(drawn::fullest_force()));
   EXPECT_EQ(writer.size() + crypto::kTagSize, 1179U);
 
   DataReader reader;
@@ -253,17 +190,32 @@ TEST(Codec, AStateAndAForceAlwaysFitTogetherIntoASealedDatagram) {
   EXPECT_EQ(content->invalid, 0U);
 }
 
+constexpr std::uint64_t kOne = 0x3ff0'0000'0000'0000;  // 1.0
+constexpr std::uint64_t kFar = 0x7ff0'0000'0000'0000;  // infinity
+
+template <class Frame>
+std::optional<Frame> read_frame(const Bytes& body) {
+  DataReader reader;
+  const auto* content = reader.read(body);
+  if (content == nullptr || content->frames.empty()) return {};
+  return std::get<Frame>(content->frames[0]);
+}
+
+std::optional<DeviceState> read_state(const std::function<void(RawProtobuf&)>& add) {
+  RawProtobuf state;
+  state.varint(11, 2);
+  add(state);
+  return read_frame<DeviceState>(datagram_with(RawProtobuf().message(1, state)));
+}
+
 TEST(Codec, AMissingVelocityOfAJointIs0AndOneWithoutAnAngleSaysNothing) {
-  constexpr std::uint64_t kOne = 0x3ff0'0000'0000'0000;  // 1.0
-  const auto read_joints = [](int angles, int velocities) -> std::optional<Joints> {
-    RawProtobuf state;
-    state.varint(11, 2);
-    for (int i = 0; i < angles; ++i) state.fixed64(23, kOne);
-    for (int i = 0; i < velocities; ++i) state.fixed64(24, kOne);
-    DataReader reader;
-    const auto* content = reader.read(datagram_with(RawProtobuf().message(1, state)));
-    if (content == nullptr || content->frames.empty()) return {};
-    return std::get<DeviceState>(content->frames[0]).joints;
+  const auto read_joints = [](int angles, int velocities) {
+    return read_state([&](RawProtobuf& state) {
+             for (int i = 0; i < angles; ++i) state.fixed64(23, kOne);
+             for (int i = 0; i < velocities; ++i) state.fixed64(24, kOne);
+           })
+        .value()
+        .joints;
   };
   EXPECT_EQ(read_joints(2, 1), (Joints{.count = 2, .angle = {1, 1}, .velocity = {1}}));
   EXPECT_EQ(read_joints(1, 3), (Joints{.count = 1, .angle = {1}, .velocity = {1}}));
@@ -271,17 +223,6 @@ TEST(Codec, AMissingVelocityOfAJointIs0AndOneWithoutAnAngleSaysNothing) {
 }
 
 TEST(Codec, AVelocityOfWhatIsNotMeasuredSaysNothing) {
-  const auto read_state = [](const std::function<void(RawProtobuf&)>& add) -> std::optional<DeviceState> {
-    RawProtobuf state;
-    state.varint(11, 2);
-    add(state);
-    DataReader reader;
-    const auto* content = reader.read(datagram_with(RawProtobuf().message(1, state)));
-    if (content == nullptr || content->frames.empty()) return {};
-    return std::get<DeviceState>(content->frames[0]);
-  };
-  constexpr std::uint64_t kOne = 0x3ff0'0000'0000'0000;  // 1.0
-  constexpr std::uint64_t kFar = 0x7ff0'0000'0000'0000;  // infinity
   const auto vector = [](std::uint64_t x) { return RawProtobuf().fixed64(1, x); };
   const auto neither = read_state([&](RawProtobuf& state) { state.message(16, vector(kOne)).fixed64(20, kOne); });
   ASSERT_TRUE(neither);
@@ -295,58 +236,17 @@ TEST(Codec, AVelocityOfWhatIsNotMeasuredSaysNothing) {
 }
 
 TEST(Codec, ARotationModelNeedsAnOrientationAndNoTorque) {
-  const auto read_torque = [](const RawProtobuf& model) -> std::optional<RemoteTorque> {
-    DataReader reader;
-    const auto* content = reader.read(datagram_with(raw_force([&](RawProtobuf& force) { force.message(14, model); })));
-    if (content == nullptr || content->frames.empty()) return {};
-    return std::get<ForceCommand>(content->frames[0]).torque;
+  const auto read_torque = [](const RawProtobuf& model) {
+    const auto command =
+        read_frame<ForceCommand>(datagram_with(raw_force([&](RawProtobuf& force) { force.message(14, model); })));
+    return command ? command->torque : std::nullopt;
   };
-  constexpr std::uint64_t kOne = 0x3ff0'0000'0000'0000;  // 1.0
   const RawProtobuf one = RawProtobuf().fixed64(1, kOne);
   const auto torque = read_torque(RawProtobuf().message(1, one).fixed64(2, kOne));
   ASSERT_TRUE(torque && torque->model);
   EXPECT_EQ(torque->torque, Vec3::Zero());
   EXPECT_EQ(torque->model->stiffness, Mat3::Identity());
   EXPECT_FALSE(read_torque(RawProtobuf().fixed64(2, kOne))) << "no orientation";
-  EXPECT_FALSE(read_torque(RawProtobuf().message(1, one))) << "no stiffness";
-  EXPECT_FALSE(read_torque(RawProtobuf().message(1, one).fixed64(2, kOne).fixed64(2, kOne))) << "two entries";
-}
-
-TEST(Codec, AxesThatAreNoRotationMakeADescriptionRefused) {
-  const auto accepted = [](const Quat& q) {
-    ControlAck ack = examples::handle_described(1);
-    ack.handle->operator_from_device = q;
-    DataReader reader;
-    const DataContent* content = read(reader, data(1, {}, ack));
-    return content != nullptr && std::get<ControlAck>(content->frames.at(0)).code == Code::kOk;
-  };
-  EXPECT_TRUE(accepted({.w = 0, .x = 0.6, .y = 0, .z = -0.8}));
-  EXPECT_TRUE(accepted({.w = 1.0009, .x = 0, .y = 0, .z = 0}));
-  EXPECT_FALSE(accepted({.w = 1.0011, .x = 0, .y = 0, .z = 0}));
-  EXPECT_FALSE(accepted({.w = 0.9989, .x = 0, .y = 0, .z = 0}));
-  EXPECT_FALSE(accepted({.w = 0, .x = 0, .y = 0, .z = 0}));
-  EXPECT_FALSE(accepted({.w = kNan, .x = 0, .y = 0, .z = 1}));
-  EXPECT_FALSE(accepted({.w = kInf, .x = 0, .y = 0, .z = 0}));
-}
-
-TEST(Codec, ADeviceOrChannelThatCannotBeIsRefused) {
-  const auto refused = [](const RawProtobuf& frame) {
-    DataReader reader;
-    const DataContent* content = reader.read(datagram_with(frame));
-    return content != nullptr && content->invalid == 1;
-  };
-  const auto lease = [](std::uint64_t device, std::uint64_t channel) {
-    return RawProtobuf().message(
-        3, RawProtobuf().varint(1, 1).message(5, RawProtobuf().varint(1, device).varint(2, channel)));
-  };
-  EXPECT_FALSE(refused(raw_force([](RawProtobuf& f) { f.varint(6, 15).varint(7, 7); })));
-  EXPECT_TRUE(refused(raw_force([](RawProtobuf& f) { f.varint(6, 16); })));
-  EXPECT_TRUE(refused(raw_force([](RawProtobuf& f) { f.varint(7, 8); })));
-  EXPECT_FALSE(refused(lease(15, 7)));
-  EXPECT_TRUE(refused(lease(16, 7)));
-  EXPECT_TRUE(refused(lease(15, 8)));
-  EXPECT_TRUE(refused(RawProtobuf().message(1, RawProtobuf().varint(11, 2).varint(12, 16))));
-  EXPECT_TRUE(refused(RawProtobuf().message(1, RawProtobuf().varint(11, 2).varint(13, 8))));
 }
 
 TEST(Codec, TheSixtyFifthFrameDoesNotFit) {
@@ -367,31 +267,11 @@ TEST(Codec, AHelloWithAnythingInItsPaddingIsRefused) {
   EXPECT_FALSE(decode_hello(bytes).has_value());
 }
 
-TEST(Codec, AHelloThatMakesNoSenseIsRefused) {
-  const auto accepted = [](auto spoil) {
-    Hello hello = examples::hello();
-    spoil(hello);
-    return read_hello(write_body(hello)).has_value();
-  };
-  EXPECT_TRUE(accepted([](Hello&) {}));
-  EXPECT_FALSE(accepted([](Hello& h) { h.version_min = 0; }));
-  EXPECT_FALSE(accepted([](Hello& h) { h.version_min = 2; }));
-  EXPECT_FALSE(accepted([](Hello& h) { h.role = Role{0}; }));
-  EXPECT_FALSE(accepted([](Hello& h) { h.role = Role{3}; }));
-}
-
-TEST(Codec, AWelcomeThatMakesNoSenseIsRefused) {
-  const auto accepted = [](auto spoil) {
-    Welcome welcome = examples::welcome();
-    spoil(welcome);
-    return read_answer(write_body(welcome)).has_value();
-  };
-  EXPECT_TRUE(accepted([](Welcome&) {}));
-  EXPECT_FALSE(accepted([](Welcome& w) { w.version = 0; }));
-  EXPECT_FALSE(accepted([](Welcome& w) { w.max_force = kNan; }));
-  EXPECT_FALSE(accepted([](Welcome& w) { w.position_resolution = -1; }));
-  EXPECT_FALSE(accepted([](Welcome& w) { w.loop_hz = 0; }));
-  EXPECT_FALSE(accepted([](Welcome& w) { w.timeout = Duration{}; }));
+TEST(Codec, AHelloWhoseOldestVersionIsNewerThanItsNewestIsRefused) {
+  Hello hello = examples::hello();
+  EXPECT_TRUE(read_hello(write_body(hello)).has_value());
+  hello.version_min = 2;
+  EXPECT_FALSE(read_hello(write_body(hello)).has_value());
 }
 
 }  // namespace

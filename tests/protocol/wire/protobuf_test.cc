@@ -15,7 +15,6 @@
 #include <cmath>
 #include <functional>
 #include <iostream>
-#include <limits>
 #include <string>
 #include <variant>
 #include <vector>
@@ -59,15 +58,6 @@ std::optional<Bytes> by_protobuf(const Bytes& body) {
 
 Bytes told_of(const DeviceState& state) { return examples::data(0, {}, state); }
 
-std::string hex(const Bytes& bytes) {
-  std::string out;
-  for (const std::byte byte : bytes) {
-    constexpr const char* kDigits = "0123456789abcdef";
-    out += {kDigits[std::to_integer<unsigned>(byte) >> 4U], kDigits[std::to_integer<unsigned>(byte) & 15U], ' '};
-  }
-  return out;
-}
-
 /// Reads the same bytes in three ways: directly, through AnyOrder, and after libprotobuf has rewritten them.
 class Readers {
  public:
@@ -77,7 +67,10 @@ class Readers {
     const std::string usual = told(reader_.read(body));
     const std::string any = told(any_order_.read_in_any_order(body));
     if (usual == expected && any == expected) return ::testing::AssertionSuccess();
-    return ::testing::AssertionFailure() << "of " << hex(body) << "\n" << expected << "\n" << usual << "\n" << any;
+    return ::testing::AssertionFailure() << "of " << examples::hex(body, " ") << "\n"
+                                         << expected << "\n"
+                                         << usual << "\n"
+                                         << any;
   }
 
  private:
@@ -122,7 +115,7 @@ TEST(Protobuf, ReadsOfScrambledFieldsTheValuesOfProtobuf) {
     ++fitting;
     ASSERT_TRUE(readers.agree(scrambled)) << "datagram " << i;
     if (parsed.frames_size() != 1) continue;
-    ASSERT_EQ(told(reader.read(scrambled)), told(plain.read(body))) << hex(scrambled);
+    ASSERT_EQ(told(reader.read(scrambled)), told(plain.read(body))) << examples::hex(scrambled, " ");
   }
   EXPECT_GT(fitting, kDatagrams / 10);
 }
@@ -318,16 +311,14 @@ TEST(Protobuf, AStateWithAPartThatColumnsCannotSayStaysWhole) {
 }
 
 /// If a state is invalid, all states of its frame are dropped. Nothing else is dropped.
-TEST(Protobuf, AColumnOfAnotherLengthOrAValueOutOfBoundsDropsTheFrame) {
+TEST(Protobuf, AColumnOfAnotherLengthDropsTheFrame) {
   const auto columns = [](const std::function<void(v1::DeviceStates&)>& change) {
     const Bytes datagram = examples::data_in_columns(1, examples::states_in_columns());
     v1::Datagram parsed;
     EXPECT_TRUE(parsed.ParseFromArray(body(datagram).data(), static_cast<int>(body(datagram).size())));
     change(*parsed.mutable_frames(0)->mutable_states());
     parsed.add_frames()->mutable_state()->set_mode(v1::MODE_IDLE);
-    const std::string bytes = parsed.SerializeAsString();
-    const auto* const begin = reinterpret_cast<const std::byte*>(bytes.data());
-    return Bytes(begin, begin + bytes.size());
+    return bytes_of(parsed.SerializeAsString());
   };
   const std::vector<std::pair<std::string, std::function<void(v1::DeviceStates&)>>> bad = {
       {"no device", [](v1::DeviceStates& s) { s.set_devices(0); }},
@@ -344,10 +335,6 @@ TEST(Protobuf, AColumnOfAnotherLengthOrAValueOutOfBoundsDropsTheFrame) {
       {"an age less", [](v1::DeviceStates& s) { s.mutable_force_age_ns()->RemoveLast(); }},
       {"a channel more", [](v1::DeviceStates& s) { s.add_channel(0); }},
       {"buttons of one", [](v1::DeviceStates& s) { s.mutable_buttons()->RemoveLast(); }},
-      {"NaN", [](v1::DeviceStates& s) { s.set_velocity_mps(4, std::numeric_limits<float>::quiet_NaN()); }},
-      {"a mode that is none", [](v1::DeviceStates& s) { s.set_mode(1, static_cast<v1::Mode>(7)); }},
-      {"channel 8", [](v1::DeviceStates& s) { s.set_channel(1, 8); }},
-      {"an age of more than 2^60", [](v1::DeviceStates& s) { s.set_force_age_ns(0, (1ULL << 60U) + 1); }},
   };
   Readers readers;
   DataReader reader;
@@ -364,47 +351,13 @@ TEST(Protobuf, AColumnOfAnotherLengthOrAValueOutOfBoundsDropsTheFrame) {
   EXPECT_EQ(reader.read(good)->frames.size(), 3U);
 }
 
-TEST(Protobuf, ADatagramHasAtMostAsManyFramesAsProtobufTakes) {
-  RawProtobuf datagram;
-  Readers readers;
-  DataReader reader;
-  for (int frames = 1; frames <= limits::kMaxFrames + 1; ++frames) {
-    datagram.message(3, RawProtobuf().message(1, RawProtobuf().varint(11, 2)));
-    EXPECT_EQ(reader.read(datagram.bytes()) != nullptr, frames <= limits::kMaxFrames) << frames;
-    if (frames > limits::kMaxFrames) continue;
-    EXPECT_TRUE(readers.agree(datagram.bytes())) << frames;
-  }
-}
-
 TEST(Protobuf, NoFrameTakesMoreThanItSays) {
-  const double number = 1.0 / 3;
-  const Vec3 vector(number, number, number);
-  const Mat3 matrix = Mat3::Constant(number);
   const std::uint64_t most = ~std::uint64_t{0};
-  DeviceState state{.tick = most, .sampled = PeerTime(Duration(-1)), .position = vector, .velocity = vector};
-  state.force_applied = vector;
-  state.energy = state.permitted_force = number;
-  state.reasons = state.buttons = state.device = state.channel = static_cast<std::uint32_t>(most);
-  state.force_sequence = most;
+  DeviceState state = drawn::fullest_state();
   state.force_age = Duration(-1);
   state.mode = static_cast<Mode>(255);
-  state.force_wanted = state.torque_applied = state.hand_force = vector;
-  state.turning = Turning{{number, number, number, number}, vector};
-  state.grip = Grip{number, number};
-  state.grip_applied = number;
-  ForceCommand command{.sequence = most, .based_on_tick = most, .force = vector};
-  command.model = LocalModel{.at = vector, .stiffness = matrix, .valid_radius = number};
-  command.valid_for = limits::kMaxValidFor;
-  command.device = command.channel = static_cast<std::uint32_t>(most);
-  command.topology_changed = true;
-  command.error = command.grip_force = number;
-  command.torque = RemoteTorque{vector, RotationModel{{number, number, number, number}, matrix}};
-  state.joints = Joints{.count = Joints::kMost};
-  state.stiffness_wanted = matrix;
-  state.joints->angle.fill(number);
-  state.joints->velocity.fill(number);
-  command.way = static_cast<std::uint32_t>(most);
-  command.model->contact = Contact{.normal = vector, .gap = number, .table = ForceTable{number, number, 16}};
+  ForceCommand command = drawn::fullest_force();
+  state.device = state.channel = command.device = command.channel = command.way = static_cast<std::uint32_t>(most);
   const auto size = [](const auto& frame) {
     return examples::data(0, {}, frame).size() - examples::data(0, {}).size();
   };

@@ -25,18 +25,9 @@ namespace tendon::vectors {
 namespace {
 
 using examples::Bytes;
+using examples::hex;
 
 // ---- JSON ----
-
-std::string hex(std::span<const std::byte> bytes) {
-  constexpr std::string_view kDigits = "0123456789abcdef";
-  std::string out;
-  for (const std::byte b : bytes) {
-    out += kDigits[std::to_integer<unsigned>(b) >> 4U];
-    out += kDigits[std::to_integer<unsigned>(b) & 15U];
-  }
-  return out;
-}
 
 std::string quoted(std::string_view text) {
   std::string out = "\"";

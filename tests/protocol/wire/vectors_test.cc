@@ -4,19 +4,24 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <set>
+#include <variant>
 
 #include "protocol/handshake.h"
 #include "protocol/reliable/replay_window.h"
 #include "protocol/secrets/client_key.h"
 #include "protocol/secrets/noise.h"
+#include "protocol/secrets/seal.h"
 #include "protocol/session.h"
 #include "tests/protocol/examples.h"
+#include "tests/protocol/wire/raw_protobuf.h"
 
 // Checks that protocol/vectors/, with which other languages test their code, is correct and matches our code.
 
@@ -79,46 +84,41 @@ TEST(Vectors, HmacGivesTheAnswersOfRfc4231) {
   }
 }
 
-TEST(Vectors, ChaCha20Poly1305GivesTheAnswersOfRfc8439) {
+/// Returns the packet number of a nonce, or nothing if the nonce is not one of Noise: four zeros, then the number. Such
+/// vectors are for libraries that accept any nonce.
+std::optional<std::uint64_t> number_in(const Bytes& nonce, Suite suite) {
+  if (std::any_of(nonce.begin(), nonce.begin() + 4, [](std::byte b) { return b != std::byte{}; })) return {};
+  std::uint64_t number = 0;
+  for (std::size_t i = 0; i < 8; ++i) {
+    number = number << 8U | std::to_integer<std::uint64_t>(nonce.at(suite == Suite::kAesGcm ? 4 + i : 11 - i));
+  }
+  return number;
+}
+
+void expect_the_answers_of_its_authors(Suite suite, const std::string& cipher) {
   const Json file = read("primitives.json");
-  for (const Json& v : file.at("chacha20_poly1305")) {
-    const Bytes nonce = bytes(v, "nonce");
+  for (const Json& v : file.at(cipher)) {
+    const auto number = number_in(bytes(v, "nonce"), suite);
+    if (!number) continue;
     const Bytes plain = bytes(v, "text");
     const Bytes sealed = bytes(v, "sealed");
-    std::uint64_t number = 0;
-    for (std::size_t i = 8; i-- > 0;) number = number << 8U | std::to_integer<std::uint64_t>(nonce[4 + i]);
-    const bool as_in_noise =
-        std::all_of(nonce.begin(), nonce.begin() + 4, [](std::byte b) { return b == std::byte{}; });
-    if (!as_in_noise) continue;  // vector for libraries that accept any nonce
+    const SealingKey cipher_key(suite, key(v, "key"));
     Bytes out(sealed.size());
-    crypto::seal(key(v, "key"), number, bytes(v, "associated_data"), plain, out);
+    cipher_key.seal(*number, bytes(v, "associated_data"), plain, out);
     EXPECT_EQ(out, sealed) << text(v, "source");
     Bytes opened(plain.size());
-    EXPECT_TRUE(crypto::open(key(v, "key"), number, bytes(v, "associated_data"), sealed, opened));
+    EXPECT_TRUE(cipher_key.open(*number, bytes(v, "associated_data"), sealed, opened));
     EXPECT_EQ(opened, plain);
   }
 }
 
+TEST(Vectors, ChaCha20Poly1305GivesTheAnswersOfRfc8439) {
+  expect_the_answers_of_its_authors(Suite::kNoise, "chacha20_poly1305");
+}
+
 TEST(Vectors, Aes256GcmGivesTheAnswersOfItsAuthors) {
   if (!crypto::has_aes()) GTEST_SKIP() << "this processor has no AES";
-  const Json file = read("primitives.json");
-  for (const Json& v : file.at("aes256_gcm")) {
-    const Bytes nonce = bytes(v, "nonce");
-    std::uint64_t number = 0;
-    for (std::size_t i = 4; i < 12; ++i) number = number << 8U | std::to_integer<std::uint64_t>(nonce.at(i));
-    const bool as_in_noise =
-        std::all_of(nonce.begin(), nonce.begin() + 4, [](std::byte b) { return b == std::byte{}; });
-    if (!as_in_noise) continue;  // vector for libraries that accept any nonce
-    const Bytes plain = bytes(v, "text");
-    const Bytes sealed = bytes(v, "sealed");
-    const crypto::AesGcm aes(key(v, "key"));
-    Bytes out(sealed.size());
-    aes.seal(number, bytes(v, "associated_data"), plain, out);
-    EXPECT_EQ(out, sealed) << text(v, "source");
-    Bytes opened(plain.size());
-    EXPECT_TRUE(aes.open(number, bytes(v, "associated_data"), sealed, opened));
-    EXPECT_EQ(opened, plain);
-  }
+  expect_the_answers_of_its_authors(Suite::kAesGcm, "aes256_gcm");
 }
 
 TEST(Vectors, OurNoiseIsThatOfCacophony) {
@@ -187,6 +187,56 @@ TEST(Vectors, BoundsOfTheProtoFileAreThoseOfTheCodec) {
     EXPECT_EQ(is_taken(vector), vector.at("accepted").get<bool>()) << vector.at("field") << ' ' << vector.at("value");
   }
   EXPECT_GT(file.at("bounds").size(), 300U);
+}
+
+TEST(Vectors, AFrameOutOfBoundsIsLeftOutAndCountedAndTheNextIsRead) {
+  const RawProtobuf idle = RawProtobuf().message(3, RawProtobuf().message(1, RawProtobuf().varint(11, 2)));
+  const Json file = read("bounds.json");
+  for (const Json& vector : file.at("bounds")) {
+    if (vector.at("message") != "Datagram") continue;
+    const std::string field = text(vector, "field");
+    SCOPED_TRACE(field + ' ' + text(vector, "value"));
+    const bool accepted = vector.at("accepted").get<bool>();
+    Bytes body = bytes(vector, "body");
+    DataReader reader;
+    if (field == "Datagram.tx_time_ns" || field == "Datagram.frames") {
+      EXPECT_EQ(reader.read(body) != nullptr, accepted);
+      continue;
+    }
+    body.insert(body.end(), idle.bytes().begin(), idle.bytes().end());
+    const DataContent* const content = reader.read(body);
+    ASSERT_NE(content, nullptr);
+    EXPECT_EQ(content->invalid, accepted ? 0U : 1U);
+    ASSERT_FALSE(content->frames.empty());
+    EXPECT_EQ(std::get<DeviceState>(content->frames.back()).mode, Mode::kIdle);
+  }
+}
+
+TEST(Vectors, AFrameAtItsBoundsIsWrittenAgainAsItWasRead) {
+  const Json file = read("bounds.json");
+  for (const Json& vector : file.at("bounds")) {
+    const std::string field = text(vector, "field");
+    if (vector.at("message") != "Datagram" || field.starts_with("DeviceStates") || !vector.at("accepted").get<bool>()) {
+      continue;
+    }
+    SCOPED_TRACE(field + ' ' + text(vector, "value"));
+    const Bytes body = bytes(vector, "body");
+    DataReader reader;
+    const DataContent* const content = reader.read(body);
+    ASSERT_NE(content, nullptr);
+    std::optional<OutgoingEcho> echo;
+    if (const auto& e = content->echo) {
+      echo = {PeerTime(e->sent.time_since_epoch()), LocalTime(e->received.time_since_epoch()), e->packet_number,
+              e->received_mask};
+    }
+    std::array<std::byte, kMaxDatagram> buffer{};
+    DataWriter writer;
+    writer.begin(buffer, {}, LocalTime(content->sent.time_since_epoch()), echo);
+    for (const Frame& frame : content->frames) {
+      std::visit([&](const auto& value) { writer.add(value); }, frame);
+    }
+    EXPECT_EQ(Bytes(buffer.begin() + kHeaderSize, buffer.begin() + static_cast<std::ptrdiff_t>(writer.size())), body);
+  }
 }
 
 /// The session must answer these requests and accept these answers.
