@@ -9,16 +9,13 @@
 #include <string_view>
 #include <vector>
 
+#include "tests/support/refusal.h"
+
 namespace tendon::dns_sd::discovery_test {
 namespace {
 
 std::string refusal(const std::string& text) {
-  try {
-    parse_instance(text);
-  } catch (const std::invalid_argument& error) {
-    return error.what();
-  }
-  return "";
+  return thrown_by([&] { parse_instance(text); });
 }
 
 TEST(Discovery, ANameEndsAtTheFirstDotThatIsNotEscaped) {

@@ -3,7 +3,9 @@
 
 #include <gtest/gtest.h>
 
-#include <stdexcept>
+#include <string>
+
+#include "tests/support/refusal.h"
 
 namespace tendon::link_test {
 namespace {
@@ -25,37 +27,17 @@ TEST(Address, AnIpv4AddressIsMappedIntoIpv6) {
 TEST(Address, LocalhostIsTheIpv4Loopback) { EXPECT_EQ(parse_address("localhost:80"), parse_address("127.0.0.1:80")); }
 
 TEST(Address, RefusesEverythingElseWithOneSentence) {
-  using namespace std::string_view_literals;
-  for (const std::string_view text : {""sv,
-                                      ":"sv,
-                                      "127.0.0.1"sv,
-                                      "127.0.0.1:"sv,
-                                      ":47100"sv,
-                                      "127.0.0.1:65536"sv,
-                                      "127.0.0.1:-1"sv,
-                                      "127.0.0.1:+1"sv,
-                                      "127.0.0.1:80 "sv,
-                                      " 127.0.0.1:80"sv,
-                                      "127.0.0.1:0x50"sv,
-                                      "127.1:80"sv,
-                                      "256.0.0.1:80"sv,
-                                      "::1:80"sv,
-                                      "[::1]"sv,
-                                      "[]:80"sv,
-                                      "[127.0.0.1]:80"sv,
-                                      "[::1:80"sv,
-                                      "[fe80::1%lo]:80"sv,
-                                      "example.org:80"sv,
-                                      "127.0.0.1\0x:80"sv}) {
-    try {
-      parse_address(text);
-      ADD_FAILURE() << "accepted " << text;
-    } catch (const std::invalid_argument& error) {
-      const std::string expected =
-          "expected HOST:PORT like 127.0.0.1:47100 or [::1]:47100, got \"" + std::string(text) + "\"";
-      EXPECT_STREQ(error.what(), expected.c_str());
-    }
+  const auto refuses = [](const std::string& text) {
+    EXPECT_EQ(thrown_by([&] { parse_address(text); }),
+              ("expected HOST:PORT like 127.0.0.1:47100 or [::1]:47100, got \"" + text + "\"").c_str());
+  };
+  for (const std::string host :
+       {"", " 127.0.0.1", "127.1", "256.0.0.1", "::1", "[]", "[127.0.0.1]", "[::1", "[fe80::1%lo]", "example.org"}) {
+    refuses(host + ":80");
   }
+  for (const std::string port : {"", ":", ":65536", ":-1", ":+1", ":80 ", ":0x50"}) refuses("127.0.0.1" + port);
+  for (const std::string text : {"", ":", "[::1]"}) refuses(text);
+  refuses(std::string("127.0.0.1\0x:80", 14));
 }
 
 TEST(Address, KnowsWhatStaysOnThisMachine) {

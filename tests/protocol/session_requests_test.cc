@@ -21,10 +21,9 @@ TEST_F(TwoEnds, ARequestIsDeliveredOnceHoweverOftenItComes) {
   const auto second = pull(a_, now_);
   deliver(z_, now_, first);
   deliver(z_, now_, second);
-  const auto at_z = events(z_);
-  ASSERT_EQ(at_z.size(), 1U);
-  EXPECT_EQ(std::get<Session::RequestArrived>(at_z[0]).id, *id);
-  EXPECT_EQ(std::get<SetStateRate>(std::get<Session::RequestArrived>(at_z[0]).request).hz, 250U);
+  const auto arrived = only<Session::RequestArrived>(z_);
+  EXPECT_EQ(arrived.id, *id);
+  EXPECT_EQ(std::get<SetStateRate>(arrived.request).hz, 250U);
 }
 
 TEST_F(TwoEnds, AnAnswerThatWasLostIsGivenAgainWhenTheRequestComesAgain) {
@@ -41,9 +40,7 @@ TEST_F(TwoEnds, AnAnswerThatWasLostIsGivenAgainWhenTheRequestComesAgain) {
   EXPECT_TRUE(events(z_).empty());
   EXPECT_LE(z_.next_tick(), now_);
   deliver(a_, now_, pull(z_, now_));
-  const auto at_a = events(a_);
-  ASSERT_EQ(at_a.size(), 1U);
-  const auto& answered = std::get<Session::RequestAnswered>(at_a[0]);
+  const auto answered = only<Session::RequestAnswered>(a_);
   EXPECT_EQ(answered.id, *id);
   EXPECT_EQ(answered.code, Code::kDenied);
   EXPECT_EQ(answered.detail, "only from the controller");
@@ -160,9 +157,7 @@ TEST_F(TwoEnds, ARequestOutOfBoundsIsAnsweredAndTheNextIsDelivered) {
   const auto disarm = a_.request(Disarm{.device = 1});
   deliver(z_, now_, pull(a_, now_));
   EXPECT_EQ(z_.stats().invalid, 1U);
-  const auto at_z = events(z_);
-  ASSERT_EQ(at_z.size(), 1U);
-  const auto& asked = std::get<Session::RequestArrived>(at_z[0]);
+  const auto asked = only<Session::RequestArrived>(z_);
   EXPECT_EQ(asked.id, *disarm);
   EXPECT_TRUE(std::holds_alternative<Disarm>(asked.request));
   z_.answer(asked.id, Code::kOk, "");

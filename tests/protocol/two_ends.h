@@ -42,6 +42,14 @@ inline std::vector<Session::Event> events(Session& session) {
   return out;
 }
 
+/// Returns the only event, which must be an `Event`.
+template <class Event>
+Event only(Session& session) {
+  const std::vector<Session::Event> all = events(session);
+  EXPECT_EQ(all.size(), 1U);
+  return std::get<Event>(all.at(0));
+}
+
 inline void deliver(Session& to, LocalTime now, const std::vector<Bytes>& datagrams) {
   for (const Bytes& datagram : datagrams) to.receive(now, datagram);
 }

@@ -11,28 +11,6 @@
 namespace tendon::replay_window_test {
 namespace {
 
-TEST(ReplayWindow, LetsEachNumberInOnce) {
-  ReplayWindow window;
-  EXPECT_FALSE(window.contains(0));
-  window.insert(0);
-  EXPECT_TRUE(window.contains(0));
-  EXPECT_FALSE(window.contains(1));
-}
-
-TEST(ReplayWindow, TakesWhatIsTooOldForSeen) {
-  ReplayWindow window;
-  window.insert(5000);
-  EXPECT_TRUE(window.contains(5000 - ReplayWindow::kRemembered));
-  EXPECT_FALSE(window.contains(5000 - ReplayWindow::kRemembered + 1));
-}
-
-TEST(ReplayWindow, CountsTheNumbersThatNeverCame) {
-  ReplayWindow window;
-  EXPECT_EQ(window.missing(), 0U);
-  for (const std::uint64_t n : {0U, 1U, 4U, 2U}) window.insert(n);
-  EXPECT_EQ(window.missing(), 1U);  // 3
-}
-
 TEST(ReplayWindow, TellsThe32NumbersBeforeOne) {
   ReplayWindow window;
   for (const std::uint64_t n : {10U, 67U, 97U, 98U, 100U}) window.insert(n);
@@ -40,14 +18,6 @@ TEST(ReplayWindow, TellsThe32NumbersBeforeOne) {
   EXPECT_EQ(window.mask_before(99), 1U | (1U << 1U) | (1U << 31U));
   window.insert(128);
   EXPECT_EQ(window.mask_before(128), 1U << 27U | 1U << 29U | 1U << 30U);  // across a word boundary
-}
-
-TEST(ReplayWindow, TellsNothingOfWhatItNoLongerRemembers) {
-  ReplayWindow window;
-  for (std::uint64_t n = 0; n <= 3008; ++n) window.insert(n);
-  EXPECT_EQ(window.mask_before(3008 - 1960),
-            (1U << 23U) - 1);  // only 23 of the 1983 numbers below the highest one are left
-  EXPECT_EQ(window.mask_before(3008 - ReplayWindow::kRemembered + 1), 0U);
 }
 
 TEST(ReplayWindow, SurvivesTheLargestNumber) {

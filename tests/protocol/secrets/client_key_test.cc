@@ -5,6 +5,8 @@
 
 #include <stdexcept>
 
+#include "tests/support/refusal.h"
+
 namespace tendon::client_key_test {
 namespace {
 
@@ -13,12 +15,7 @@ ClientKey some_key(std::uint64_t seed) {
 }
 
 std::string refusal(const std::string& text, unsigned mode = 0600) {
-  try {
-    read_key_file(text, mode, "wall");
-  } catch (const std::invalid_argument& refused) {
-    return refused.what();
-  }
-  return "";
+  return thrown_by([&] { read_key_file(text, mode, "wall"); });
 }
 
 TEST(ClientKey, ComesOutOfItsFileAsItWentIn) {

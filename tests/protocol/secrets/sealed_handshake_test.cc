@@ -10,6 +10,7 @@
 #include "protocol/session.h"
 #include "tests/protocol/examples.h"
 #include "tests/support/property_cases.h"
+#include "tests/support/refusal.h"
 
 // Tests the handshake in suite 1: which clients are admitted, which of them do not get an answer, and what this costs.
 
@@ -403,13 +404,8 @@ TEST(SealedSuites, AreRefusedWhereTheyCannotBeSpoken) {
 TEST_F(SealedHandshake, TwoClientsWithOneKeyAreAMistakeThatIsToldAtOnce) {
   Doorman::Config config = door_config();
   config.keys.push_back({.name = "copy", .role = Role::kController, .key = key_.key});
-  try {
-    Doorman door(config);
-    FAIL();
-  } catch (const std::invalid_argument& refused) {
-    EXPECT_STREQ(refused.what(),
-                 "the clients \"wall\" and \"copy\" have the same key: expected a different key for each client");
-  }
+  EXPECT_EQ(thrown_by([&] { Doorman door(config); }),
+            "the clients \"wall\" and \"copy\" have the same key: expected a different key for each client");
 }
 
 }  // namespace
