@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <chrono>
+#include <functional>
 #include <map>
 #include <optional>
 #include <span>
@@ -13,13 +14,20 @@
 namespace tendon::run_test {
 namespace {
 
+Vec3 nothing(const DeviceState& /*hand*/) { return Vec3::Zero(); }
+
+/// Returns the text that `serve` writes to standard error. The exit code must be 1.
+std::string said_by(const std::function<int()>& serve) {
+  testing::internal::CaptureStderr();
+  EXPECT_EQ(serve(), 1);
+  return testing::internal::GetCapturedStderr();
+}
+
 TEST(Run, EndsWithOneAndNamesTheHostThatIsNotThere) {
   Options options;
   options.client.name = "wall";
   options.server = "haptics.invalid:47100";
-  testing::internal::CaptureStderr();
-  EXPECT_EQ(run(options, [](const DeviceState&) { return Vec3(0, 0, 0); }), 1);
-  const std::string said = testing::internal::GetCapturedStderr();
+  const std::string said = said_by([&] { return run(options, nothing); });
   EXPECT_TRUE(said.starts_with("wall: cannot find haptics.invalid: ")) << said;
 }
 
@@ -30,9 +38,7 @@ TEST(Run, TriesEachAddressOfANameInItsTurn) {
   options.client.retry_min = options.client.retry_max = std::chrono::milliseconds(1);
   options.duration = std::chrono::milliseconds(500);
   options.server = "LOCALHOST:9";
-  testing::internal::CaptureStderr();
-  EXPECT_EQ(run(options, [](const DeviceState&) { return Vec3(0, 0, 0); }), 1);
-  const std::string said = testing::internal::GetCapturedStderr();
+  const std::string said = said_by([&] { return run(options, nothing); });
   for (const Address& address : options.server.look_up().addresses) {
     EXPECT_NE(said.find("no answer from LOCALHOST:9 (" + to_string(address) + ")"), std::string::npos) << said;
   }
@@ -44,10 +50,7 @@ TEST(Run, WithSeveralDevicesSaysOfWhichOneItSpeaks) {
   options.client.patience = std::chrono::milliseconds(50);
   options.duration = std::chrono::milliseconds(200);
   options.server = "127.0.0.1:9";
-  const Physics nothing = [](const DeviceState&) { return Vec3(0, 0, 0); };
-  testing::internal::CaptureStderr();
-  EXPECT_EQ(run(options, {{"left", nothing}, {"right", nothing}}), 1);
-  const std::string said = testing::internal::GetCapturedStderr();
+  const std::string said = said_by([&] { return run(options, {{"left", nothing}, {"right", nothing}}); });
   for (const std::string device : {"left", "right"}) {
     EXPECT_NE(said.find("rod at " + device + ": no answer from 127.0.0.1:9"), std::string::npos) << said;
     EXPECT_NE(said.find("rod at " + device + ": was never connected"), std::string::npos) << said;
@@ -55,17 +58,13 @@ TEST(Run, WithSeveralDevicesSaysOfWhichOneItSpeaks) {
 }
 
 TEST(Run, WithSeveralDevicesTakesNoOtherNameOfOne) {
-  const Physics nothing = [](const DeviceState&) { return Vec3(0, 0, 0); };
   Options options;
   options.client.name = "rod";
-  testing::internal::CaptureStderr();
-  EXPECT_EQ(run(options, std::map<std::string, Physics>{}), 1);
-  EXPECT_EQ(run(options, {{"", nothing}, {"right", nothing}}), 1);
-  options.client.device = "middle";
-  EXPECT_EQ(run(options, {{"left", nothing}, {"right", nothing}}), 1);
-  const std::string said = testing::internal::GetCapturedStderr();
   const std::string refusal = "rod: this program selects its devices itself: expected no --device\n";
-  EXPECT_EQ(said, refusal + refusal + refusal);
+  EXPECT_EQ(said_by([&] { return run(options, std::map<std::string, Physics>{}); }), refusal);
+  EXPECT_EQ(said_by([&] { return run(options, {{"", nothing}, {"right", nothing}}); }), refusal);
+  options.client.device = "middle";
+  EXPECT_EQ(said_by([&] { return run(options, {{"left", nothing}, {"right", nothing}}); }), refusal);
 }
 
 TEST(Run, WithHandsTogetherEachHasItsDeviceAndItsServer) {

@@ -25,14 +25,8 @@ TEST(ServerName, OfASocketsFileIsItsPath) {
 
 TEST(ServerName, OfASocketsFileHasAPathThatASocketCanHave) {
   for (const std::string& path : {std::string(), std::string(108, 'x')}) {
-    try {
-      const ServerName name("unix:" + path);
-      FAIL() << path;
-    } catch (const std::invalid_argument& wrong) {
-      EXPECT_EQ(
-          wrong.what(),
-          "expected unix:PATH with a path of 1 to 107 bytes, like unix:/run/tendon.sock, got \"unix:" + path + '"');
-    }
+    EXPECT_EQ(thrown_by([&] { ServerName("unix:" + path); }),
+              "expected unix:PATH with a path of 1 to 107 bytes, like unix:/run/tendon.sock, got \"unix:" + path + '"');
   }
 }
 
@@ -43,10 +37,6 @@ TEST(ServerName, AnAddressIsItsOwn) {
     EXPECT_EQ(to_string(name.look_up().addresses.front()), text);
     EXPECT_EQ(name.at(name.look_up().addresses.front()), text);
   }
-}
-
-TEST(ServerName, LocalhostIsThisMachine) {
-  EXPECT_EQ(to_string(ServerName("localhost:47100").look_up().addresses.front()), "127.0.0.1:47100");
 }
 
 TEST(ServerName, TheSystemLooksAHostNameUp) {

@@ -65,6 +65,19 @@ class Z {
 
 constexpr std::array<std::byte, 8> kWords{};
 
+/// Sends a datagram, so that the server can reply.
+void greet(UdpTransport& a, Z& z) {
+  a.send(z.address(), kWords);
+  EXPECT_EQ(z.receive(), 8);
+}
+
+/// Returns the size of the next datagram.
+std::size_t received(UdpTransport& a) {
+  std::array<std::byte, kMaxDatagram> buffer{};
+  Address from;
+  return a.receive(from, buffer);
+}
+
 /// Includes the descriptor that reads the folder.
 std::ptrdiff_t open_files() {
   return std::distance(std::filesystem::directory_iterator("/proc/self/fd"), std::filesystem::directory_iterator());
@@ -84,8 +97,7 @@ TEST(UdpTransport, HasASocketAndNoOtherFile) {
 TEST(UdpTransport, TalksWithItsServer) {
   Z z;
   UdpTransport a(z.address());
-  a.send(z.address(), kWords);
-  EXPECT_EQ(z.receive(), 8);
+  greet(a, z);
   z.reply(20);
   a.wait(std::chrono::seconds(10));
   std::array<std::byte, kMaxDatagram> buffer{};
@@ -105,24 +117,18 @@ TEST(UdpTransport, WhatItHasReceivedWasHereByNowAndNotBeforeTheTurn) {
 TEST(UdpTransport, TellsTheFullSizeOfADatagramItHadToCut) {
   Z z;
   UdpTransport a(z.address());
-  a.send(z.address(), kWords);
-  z.receive();
+  greet(a, z);
   z.reply(5000);
-  std::array<std::byte, kMaxDatagram> buffer{};
-  Address from;
-  EXPECT_EQ(a.receive(from, buffer), 5000U);
+  EXPECT_EQ(received(a), 5000U);
 }
 
 TEST(UdpTransport, SkipsEmptyDatagrams) {
   Z z;
   UdpTransport a(z.address());
-  a.send(z.address(), kWords);
-  z.receive();
+  greet(a, z);
   z.reply(0);
   z.reply(7);
-  std::array<std::byte, kMaxDatagram> buffer{};
-  Address from;
-  EXPECT_EQ(a.receive(from, buffer), 7U);
+  EXPECT_EQ(received(a), 7U);
 }
 
 TEST(UdpTransport, AServerThatIsNotThereIsSilenceNotAnError) {
@@ -130,43 +136,34 @@ TEST(UdpTransport, AServerThatIsNotThereIsSilenceNotAnError) {
   const Address address = z.address();
   z.close();
   UdpTransport a(address);
-  std::array<std::byte, kMaxDatagram> buffer{};
-  Address from;
   for (int i = 0; i < 3; ++i) {
     a.send(address, kWords);
-    EXPECT_EQ(a.receive(from, buffer), 0U);
+    EXPECT_EQ(received(a), 0U);
   }
 }
 
 TEST(UdpTransport, StaysWithItsAddressAndPortWhileTheNameHasIt) {
   Z z;
   UdpTransport a(z.address());
-  a.send(z.address(), kWords);
-  z.receive();
+  greet(a, z);
   const auto port = z.guest().sin_port;
   a.look_up_again(false);
   a.look_up_again(true);
   EXPECT_EQ(a.server(), z.address());
-  a.send(z.address(), kWords);
-  EXPECT_EQ(z.receive(), 8);
+  greet(a, z);
   EXPECT_EQ(z.guest().sin_port, port);
 }
 
 TEST(UdpTransport, WaitsForAnyOfSeveral) {
   Z near, far;
   UdpTransport to_near(near.address()), to_far(far.address());
-  for (UdpTransport* const transport : {&to_near, &to_far}) {
-    const std::array<std::byte, 1> hello{};
-    transport->send(transport->server(), hello);
-  }
-  far.receive();
+  greet(to_near, near);
+  greet(to_far, far);
   far.reply(3);
   const std::array<UdpTransport*, 2> both{&to_near, &to_far};
   UdpTransport::wait_for_any(both, std::chrono::hours(1));  // returns at once, or the test hangs
-  Address from;
-  std::array<std::byte, kMaxDatagram> buffer{};
-  EXPECT_EQ(to_near.receive(from, buffer), 0U);
-  EXPECT_EQ(to_far.receive(from, buffer), 3U);
+  EXPECT_EQ(received(to_near), 0U);
+  EXPECT_EQ(received(to_far), 3U);
   UdpTransport::wait_for_any(both, Duration::zero());
 }
 
@@ -174,16 +171,12 @@ TEST(UdpTransport, HearsNobodyButItsServer) {
   Z z;
   Z stranger;
   UdpTransport a(z.address());
-  a.send(z.address(), kWords);
-  z.receive();
+  greet(a, z);
   UdpTransport b(stranger.address());
-  b.send(stranger.address(), kWords);
-  stranger.receive();
+  greet(b, stranger);
   const_cast<sockaddr_in&>(stranger.guest()) = z.guest();
   stranger.reply(20);
-  std::array<std::byte, kMaxDatagram> buffer{};
-  Address from;
-  EXPECT_EQ(a.receive(from, buffer), 0U);
+  EXPECT_EQ(received(a), 0U);
 }
 
 }  // namespace

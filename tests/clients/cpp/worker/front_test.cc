@@ -54,6 +54,12 @@ class Played {
     front.answered(now, force(newtons));
     turn();
   }
+  /// Sends a state and answers it after `time`.
+  void ask(std::uint64_t tick, Duration time, double newtons = 1) {
+    see(tick);
+    after(time);
+    answer(newtons);
+  }
   void die() {
     front.ended(now, "it was terminated by signal 9");
     turn();
@@ -103,17 +109,11 @@ TEST(Front, TheDeadlineIsThreeTimesTheMedian) {
   Played played({.dead = seconds(9)});
   played.open();
   for (std::uint64_t tick = 1; tick <= 63; ++tick) {  // 40 ms each: the deadline becomes 120 ms
-    played.see(tick);
-    played.after(milliseconds(40));
-    played.answer();
+    played.ask(tick, milliseconds(40));
   }
-  played.see(100);
-  played.after(milliseconds(119));
-  played.answer();
+  played.ask(100, milliseconds(119));
   EXPECT_EQ(played.front.stats().late, 0U);
-  played.see(101);
-  played.after(milliseconds(121));
-  played.answer();
+  played.ask(101, milliseconds(121));
   EXPECT_EQ(played.front.stats().late, 1U);
   EXPECT_EQ(played.front.stats().median, milliseconds(40));
 }
@@ -125,14 +125,10 @@ TEST(Front, QuickAnswersWithoutAForceDoNotMakeSlowOnesLate) {
   std::uint64_t tick = 0;
   for (int tap = 0; tap < 5; ++tap) {
     for (int free = 0; free < 100; ++free) {
-      played.see(++tick);
-      played.after(milliseconds(1));
-      played.answer(0);
+      played.ask(++tick, milliseconds(1), 0);
     }
     for (int touch = 0; touch < 4; ++touch) {
-      played.see(++tick);
-      played.after(milliseconds(100));
-      played.answer();
+      played.ask(++tick, milliseconds(100));
     }
   }
   EXPECT_EQ(played.front.stats().late, 1U) << "the first of all, before anything is known of a touch";
@@ -144,15 +140,11 @@ TEST(Front, AnAnswerOfASlowBodyHoldsUntilTheNextIsLate) {
   Played played;
   played.open();
   for (std::uint64_t tick = 1; tick < 4; ++tick) {
-    played.see(tick);
-    played.after(milliseconds(100));
-    played.answer();
+    played.ask(tick, milliseconds(100));
   }
   played.see(4);
   played.answer(0);
-  played.see(5);
-  played.after(milliseconds(100));
-  played.answer();
+  played.ask(5, milliseconds(100));
   EXPECT_EQ(played.sent.back().touch.valid_for, milliseconds(300));
   EXPECT_EQ(played.sent[played.sent.size() - 2].touch.valid_for, milliseconds(300)) << "the one without a force";
 }
@@ -161,9 +153,7 @@ TEST(Front, AnAnswerOfAQuickBodyHoldsAsLongAsTheClientSays) {
   Played played;
   played.open();
   for (std::uint64_t tick = 1; tick < 9; ++tick) {
-    played.see(tick);
-    played.after(milliseconds(16));
-    played.answer();
+    played.ask(tick, milliseconds(16));
     EXPECT_EQ(played.sent.back().touch.valid_for, std::nullopt);
   }
 }
@@ -181,9 +171,7 @@ TEST(Front, ASlowFirstTouchIsWaitedForAndTenTimesTheMedianAfterIt) {
   EXPECT_EQ(played.front.next_turn(), played.now + Duration(1));
   played.answer();
   for (std::uint64_t tick = 3; tick < 9; ++tick) {
-    played.see(tick);
-    played.after(milliseconds(200));
-    played.answer();
+    played.ask(tick, milliseconds(200));
   }
   played.see(9);
   played.news();
@@ -262,9 +250,7 @@ TEST(Front, AWorkerThatLastedSetsTheWaitBack) {
   }
   played.open();
   for (std::uint64_t tick = 1; tick < 60; ++tick) {  // 5.9 s, longer than the next deadline of 4 s
-    played.see(tick);
-    played.after(milliseconds(40));
-    played.answer();
+    played.ask(tick, milliseconds(40));
     played.after(milliseconds(60));
   }
   played.die();
