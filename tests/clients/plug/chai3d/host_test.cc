@@ -102,17 +102,6 @@ TEST(Chai3dHost, ATorqueGoesToADeviceThatHasMotorsForIt) {
   }
 }
 
-TEST(Chai3dHost, AProgramThatStandsStillForASecondIsNotFeltForASecond) {
-  Theatre theatre("demo_parts.toml");
-  theatre.asks = true;
-  theatre.asked.force = {0, 0, 0.5};
-  theatre.run(500);
-  EXPECT_NEAR(theatre.world.step.applied.y(), 0.5, 1e-6);
-  theatre.asks = false;  // as after SIGSTOP: the last force stays in the shared memory
-  theatre.run(300);
-  EXPECT_EQ(theatre.world.step.applied.y(), 0);
-}
-
 TEST(Chai3dHost, AForceThatIsReadLateIsOldAndNotSent) {
   Theatre theatre("demo_parts.toml");
   theatre.run(200);

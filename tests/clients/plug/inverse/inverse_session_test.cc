@@ -251,32 +251,12 @@ TEST(InverseSession, ATorqueForADeviceThatCannotTurnIsRefusedInASentence) {
   EXPECT_EQ(refused(reply)[0], "right: the device has no motors for rotation");
 }
 
-TEST(InverseSession, ASilenceOf150MsFadesTheForceAndOneOf400MsEndsIt) {
-  Bridge bridge("demo_parts.toml");
-  const auto client = bridge.client();
-  bridge.run(500, *client, bridge.force(Vec3(0, 0, 0.5)));
-  const auto applied = [&] { return bridge.world.step.applied.y(); };
-  EXPECT_NEAR(applied(), 0.5, 1e-6);
-  const std::uint64_t sent = bridge.plug->forces();
-  bridge.world.run(100);
-  EXPECT_NEAR(applied(), 0.5, 1e-6) << "a client at 10 Hz is not let go between two messages";
-  bridge.world.run(50);
-  EXPECT_LT(applied(), 0.45) << "150 ms";
-  EXPECT_GT(applied(), 0.05) << "it fades, and is not cut";
-  EXPECT_EQ(bridge.plug->forces(), sent) << "an old force is not sent as if it were new";
-  double before = applied();
-  bridge.world.run(250, [&] {
-    EXPECT_LE(applied(), before);
-    EXPECT_LT(before - applied(), 0.05);
-    before = applied();
-  });
-  EXPECT_EQ(applied(), 0) << "400 ms";
-}
-
-TEST(InverseSession, MessagesWithoutAForceDoNotKeepTheOldOneAlive) {
+TEST(InverseSession, AForceIsValidFor100MsAndMessagesWithoutOneDoNotKeepItAlive) {
   Bridge bridge("demo_parts.toml");
   const auto client = bridge.client();
   bridge.run(300, *client, bridge.force(Vec3(0, 0, 0.5)));
+  bridge.world.run(100);
+  EXPECT_NEAR(bridge.world.step.applied.y(), 0.5, 1e-6) << "a client at 10 Hz is not let go between two messages";
   bridge.run(400, *client, kProbe);
   EXPECT_EQ(bridge.world.step.applied.y(), 0);
   bridge.run(300, *client, bridge.force(Vec3(0, 0, 0.5)));
@@ -297,15 +277,8 @@ TEST(InverseSession, ASecondClientThatAsksForAForceIsToldAndTheFirstKeepsIt) {
   EXPECT_NE(refused(told)[0].get<std::string>().find("another client controls the force"), std::string::npos);
   EXPECT_EQ(ours(told).at("tick"), bridge.plug->state()->tick) << "it is answered all the same";
   EXPECT_GT(bridge.world.step.applied.y(), 0);
-  // The first client stops sending, so the device is free after a second.
-  bridge.world.run(1100);
-  EXPECT_EQ(refused(bridge.say(*second, bridge.force(Vec3(0, 0, -0.5)))), json::array());
-  bridge.run(500, *second, bridge.force(Vec3(0, 0, -0.5)));
-  EXPECT_LT(bridge.world.step.applied.y(), 0);
   second.reset();
-  EXPECT_EQ(bridge.plug->owner(), 0U) << "it left";
-  bridge.world.run(400);
-  EXPECT_EQ(bridge.world.step.applied.y(), 0) << "by the ladder";
+  EXPECT_EQ(bridge.plug->owner(), 1U) << "only the owner lets go";
 }
 
 TEST(InverseSession, AForceOfZeroClaimsNothingAndCountsFromTheOwner) {
@@ -325,35 +298,16 @@ TEST(InverseSession, AForceOfZeroClaimsNothingAndCountsFromTheOwner) {
   EXPECT_EQ(bridge.world.step.wanted.y(), 0);
 }
 
-TEST(InverseSession, TheServerDiesAndComesBackAndTheClientGoesOn) {
-  Bridge bridge("demo_parts.toml");
-  const auto client = bridge.client();
-  const std::string force = bridge.force(Vec3(0, 0, 0.5));
-  bridge.run(300, *client, force);
-  bridge.world.kill_server();
-  json reply = bridge.run(15000, *client, force);
-  EXPECT_FALSE(reply.at("inverse3").at(0).contains("state")) << "no old position is shown as the present one";
-  EXPECT_FALSE(reply.at("wireless_verse_grip").at(0).contains("state"));
-  EXPECT_EQ(reply.at("inverse3").at(0).at("device_id"), bridge.devices[0].id);
-  EXPECT_EQ(ours(reply).at("connected"), false);
-  bridge.world.open_server();
-  reply = bridge.run(5000, *client, force);
-  EXPECT_EQ(ours(reply).at("connected"), true);
-  EXPECT_NEAR(bridge.world.step.applied.y(), 0.5, 1e-6);
-}
-
-TEST(InverseSession, AStallOf200MsFadesTheForceAndIsSeenAsTheAgeOfTheState) {
+TEST(InverseSession, AStallIsSeenAsTheAgeOfTheState) {
   Bridge bridge("demo_parts.toml");
   const auto client = bridge.client();
   const std::string force = bridge.force(Vec3(0, 0, 0.5));
   bridge.run(500, *client, force);
   bridge.world.connected = false;
   json reply = bridge.run(200, *client, force);
-  EXPECT_LT(bridge.world.step.applied.y(), 0.3);
   EXPECT_NEAR(ours(reply).at("state_age_ms").get<double>(), 200, 3);
   bridge.world.connected = true;
   reply = bridge.run(300, *client, force);
-  EXPECT_NEAR(bridge.world.step.applied.y(), 0.5, 1e-6);
   EXPECT_LT(ours(reply).at("state_age_ms").get<double>(), 2);
 }
 

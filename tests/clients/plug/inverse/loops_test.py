@@ -21,7 +21,7 @@ import websockets
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parents[1] / "python"))
 
-from processes import PROGRAMS, Process, Server, scene  # noqa: E402
+from processes import PROGRAMS, Process, Server  # noqa: E402
 
 
 class Bridge(Process):
@@ -47,7 +47,6 @@ class ArmAndGrip:
         self._connected = False
         self.position: tuple[float, ...] = (0.0, 0.0, 0.0)
         self.quaternion: tuple[float, ...] = (0.0, 0.0, 0.0, 1.0)
-        self.buttons = {"a": False, "b": False, "c": False}
         self.force = {"x": 0.0, "y": 0.0, "z": 0.0}
         self.applied = 0.0
         self.received = 0
@@ -83,7 +82,6 @@ class ArmAndGrip:
                         self.position = tuple(place.get(axis, 0.0) for axis in "xyz")
                         self.applied = arm["state"]["current_cursor_force"]["z"]
                     if "state" in grip:
-                        self.buttons = {name: held.get("buttons", {}).get(name, False) for name in "abc"}
                         turned = held.get("orientation", {})
                         if turned:
                             self.quaternion = tuple(turned.get(axis, 0.0) for axis in "xyzw")
@@ -116,24 +114,6 @@ def test_a_device_class_that_wants_arm_and_grip_is_served_by_a_falcon(tmp_path):
             device.force = {"x": 0.0, "y": 0.0, "z": 0.0}
             until("the hand feels nothing", lambda: device.applied == 0)
             assert device.received > 20
-        finally:
-            device.close()
-
-
-def test_orientation_and_buttons_reach_it(tmp_path):
-    with Server(tmp_path, scenes={"right": scene("handle")}) as server, Bridge(tmp_path, server.address) as bridge:
-        device = ArmAndGrip(bridge.uri)
-        try:
-            until("the handle turns", lambda: abs(device.quaternion[3]) < 0.99)
-            assert sum(q * q for q in device.quaternion) == pytest.approx(1, abs=1e-6)
-        finally:
-            device.close()
-    # The button is pressed from 1 s on, so that readers that connect earlier can see it.
-    text = scene("handle").replace("from_ms = 1000\nfor_ms = 300", "from_ms = 1000\nfor_ms = 60000")
-    with Server(tmp_path, scenes={"right": text}) as server, Bridge(tmp_path, server.address) as bridge:
-        device = ArmAndGrip(bridge.uri)
-        try:
-            until("the button is held", lambda: device.buttons == {"a": True, "b": False, "c": False})
         finally:
             device.close()
 
@@ -181,22 +161,6 @@ def test_a_program_that_is_killed_or_frozen_with_force_on_is_let_go(tmp_path, nu
             print(f"{signal.Signals(number).name}: {steps} steps of 1 ms")
             assert steps <= 350 + 500
             program._process.send_signal(signal.SIGKILL)
-
-
-def test_the_second_program_that_asks_for_a_force_is_told(tmp_path):
-    async def second(uri: str) -> list[str]:
-        async with websockets.connect(uri) as socket:
-            device = json.loads(await socket.recv())["inverse3"][0]["device_id"]
-            force = {"set_cursor_force": {"vector": {"x": 0, "y": 0, "z": -0.5}}}
-            await socket.send(json.dumps({"inverse3": [{"device_id": device, "commands": force}]}))
-            return json.loads(await socket.recv())["tendon"]["refused"]
-
-    with Server(tmp_path) as server, Bridge(tmp_path, server.address) as bridge:
-        with Process(tmp_path, ["/usr/bin/python3", HERE / "old_program.py", bridge.uri, "0.5", "200"]) as program:
-            bridge.wait_for_line("client 1 controls the force")
-            told = asyncio.run(second(bridge.uri))
-            assert told == ["device: another client controls the force, so this one was ignored"]
-            assert program._process.poll() is None
 
 
 def test_a_server_that_dies_and_comes_back_is_found_again(tmp_path):

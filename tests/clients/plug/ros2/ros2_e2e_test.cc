@@ -306,25 +306,11 @@ TEST(Ros2, AWrenchIsFeltAndItsEndLeavesTheHandToTheLadder) {
   EXPECT_LT(number(let_go, "let_go_us"), 800'000) << "300 ms, and what a machine may stand still";
 }
 
-TEST(Ros2, AForceInTheOperatorsFrameIsInTheOperatorsAxes) {
-  Room room;
-  Peer peer(room.folder, room.domain, {"--read", "wrench", "--wrench", "-0.3,0,0", "--frame", "device_operator"});
-  peer.until_pushed(0.3);
-}
-
 TEST(Ros2, NegateIsNamedInTheFirstSentence) {
   Room room({"--negate"});
   EXPECT_EQ(room.plug.err().substr(0, 22), "tendon-plug: --negate:") << room.plug.err();
   Peer peer(room.folder, room.domain, {"--read", "wrench", "--wrench", "0,0.3,0"});
   peer.until_pushed(-0.3);
-}
-
-TEST(Ros2, AForeignFrameIsRefusedAndDiagnosticsSayIt) {
-  Room room;
-  Peer peer(room.folder, room.domain, {"--read", "wrench,diagnostics", "--wrench", "0,0.3,0", "--frame", "tool0"});
-  room.plug.wait_for_line("the frame_id \"tool0\" is unknown: expected no frame_id, device_base or device_operator");
-  const std::string line = peer.until([](const std::string& all) { return number(all, "diagnostics_level") == 1; });
-  EXPECT_EQ(number(line, "wrench_y"), 0);
 }
 
 TEST(Ros2, ASecondPublisherIsDroppedAndTold) {

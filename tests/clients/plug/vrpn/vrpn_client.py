@@ -64,16 +64,9 @@ def numbers_in(type_name: str, payload: bytes):
     layouts = {
         "vrpn_Tracker Pos_Quat": ">2i7d",
         "vrpn_Tracker Velocity": ">2i8d",
-        "vrpn_Tracker Workspace": ">6d",
-        "vrpn_Tracker To_Room": ">7d",
-        "vrpn_Tracker Unit_To_Sensor": ">2i7d",
         "vrpn_Button Change": ">2i",
         "vrpn_ForceDevice Force": ">3d",
-        "vrpn_ForceDevice Force_Error": ">i",
     }
-    if type_name == "vrpn_Button States":
-        (n,) = struct.unpack_from(">i", payload)
-        return struct.unpack(f">{n}i", payload[4:])
     if type_name == "vrpn_Analog Channel":
         (count,) = struct.unpack_from(">d", payload)
         return struct.unpack(f">{int(count)}d", payload[8:])
@@ -88,16 +81,7 @@ def host_and_port(address: str) -> tuple[str, int]:
 class Client:
     """A VRPN client. With `by_hello` the server connects to the client."""
 
-    TYPES = (
-        "vrpn_ForceDevice Force_Field",
-        "vrpn_ForceDevice Plane",
-        "vrpn_ForceDevice Plane2",
-        "vrpn_Tracker set_update_rate",
-        "vrpn_Tracker Request_Tracker_Workspace",
-        "vrpn_Tracker Request_Tracker_To_Room",
-        "vrpn_Tracker Request_Unit_To_Sensor",
-        "vrpn_Base ping_message",
-    )
+    TYPES = ("vrpn_ForceDevice Force_Field", "vrpn_ForceDevice Plane")
 
     def __init__(
         self,
@@ -105,10 +89,7 @@ class Client:
         name: str = "Phantom0",
         by_hello: bool = True,
         udp: bool | None = None,
-        cookie: bytes = COOKIE,
         seed: int = 1,
-        describe: bool = True,
-        hello_host: str = "127.0.0.1",
     ) -> None:
         self.server = host_and_port(address)
         self.name = name
@@ -121,9 +102,9 @@ class Client:
         self.inbox: list[Message] = []
         self.by_datagram = 0
         self.closed = False
-        self.tcp = self._be_called(hello_host) if by_hello else socket.create_connection(self.server, timeout=10)
+        self.tcp = self._be_called() if by_hello else socket.create_connection(self.server, timeout=10)
         self.tcp.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        self.tcp.sendall(cookie)
+        self.tcp.sendall(COOKIE)
         self.their_cookie = self._exactly(24)
         self.tcp.setblocking(False)
         self.udp: socket.socket | None = None
@@ -132,23 +113,20 @@ class Client:
             self.udp.bind((self.tcp.getsockname()[0], 0))
             self.udp.setblocking(False)
             self.send(self.udp.getsockname()[1], UDP, b"192.0.2.1\0")  # the server ignores the text
-        if describe:
-            self.describe(name)
-            for one in self.TYPES:
-                self.describe_type(one)
+        self.describe(name)
+        for one in self.TYPES:
+            self.describe_type(one)
 
-    def _be_called(self, hello_host: str) -> socket.socket:
+    def _be_called(self) -> socket.socket:
         listener = socket.create_server(("127.0.0.1", 0))
         listener.settimeout(0.2)
         lob = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         for _ in range(50):
-            lob.sendto(f"{hello_host} {listener.getsockname()[1]}\0".encode(), self.server)
+            lob.sendto(f"127.0.0.1 {listener.getsockname()[1]}\0".encode(), self.server)
             try:
                 return listener.accept()[0]
             except TimeoutError:
                 continue
-            finally:
-                pass
         raise TimeoutError("nobody called back")
 
     def _exactly(self, size: int) -> bytes:

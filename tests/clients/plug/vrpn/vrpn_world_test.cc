@@ -85,25 +85,42 @@ const std::vector<std::string> kStill = {"limiter.kind=\"none\"", "device.hand.m
 
 Buffer constant(const Vec3& force) { return Program::draw(ForceField{.force = force, .radius = 1}); }
 
+struct Stage {
+  explicit Stage(const std::string& scene = "demo_parts.toml", const std::vector<std::string>& settings = {},
+                 int delay_ms = 0)
+      : world(scene, settings, delay_ms) {}
+
+  void run(int milliseconds) {
+    world.run(milliseconds, [&] { old.turn(); });
+  }
+  void push(int milliseconds, const Vec3& force) {
+    world.run(milliseconds, [&] {
+      old.says(constant(force));
+      old.turn();
+    });
+  }
+
+  World world;
+  Plug& plug = world.add_plug();
+  Station station{.name = "Phantom0"};
+  Old old{world, plug, station, 1};
+};
+
 TEST(VrpnWorld, AForceAlongEachAxisPushesThatWayAndTheHandsMotionIsSeenThere) {
   // The device's x axis points to the user, y right, z up.
   for (const std::string axes : {"", "right=y up=z user=x", "right=-y up=z user=-x"}) {
     for (int axis = 0; axis < 3; ++axis) {
-      World world("left.toml", kStill);
+      Stage stage("left.toml", kStill);
+      World& world = stage.world;
+      Old& old = stage.old;
       if (!axes.empty()) {
         world.handle.operator_from_device = quaternion_of(operator_from_device(axes));
         world.open_server();
       }
-      Plug& plug = world.add_plug();
-      Station station{.name = "Phantom0"};
-      Old old(world, plug, station, 1);
-      world.run(100, [&] { old.turn(); });
+      stage.run(100);
       const Vec3 there = 0.8 * Vec3::Unit(axis);
       const Vec3 before(old.pose.value().number(8), old.pose->number(16), old.pose->number(24));
-      world.run(1000, [&] {
-        old.says(constant(there));
-        old.turn();
-      });
+      stage.push(1000, there);
       const Mat3 turn = axes.empty() ? Mat3(Mat3::Identity()) : operator_from_device(axes);
       EXPECT_TRUE(world.step.applied.isApprox(turn.transpose() * there, 1e-6))
           << axes << ": " << world.step.applied.transpose();
@@ -116,193 +133,121 @@ TEST(VrpnWorld, AForceAlongEachAxisPushesThatWayAndTheHandsMotionIsSeenThere) {
 }
 
 TEST(VrpnWorld, AChangeOfAFieldIsInTheNextDatagram) {
-  World world("demo_parts.toml");
-  Plug& plug = world.add_plug();
-  Station station{.name = "Phantom0"};
-  Old old(world, plug, station, 1);
-  world.run(200, [&] {
-    old.says(constant(Vec3(0, 1e-3, 0)));
-    old.turn();
-  });
+  Stage stage;
+  stage.push(200, Vec3(0, 1e-3, 0));
   double asked = 1e-3;
   for (int i = 0; i < 100; ++i) {
-    world.run(1, [&] {
-      EXPECT_NEAR(world.step.wanted.y(), asked, 1e-9) << "the step after what was said";
+    stage.world.run(1, [&] {
+      EXPECT_NEAR(stage.world.step.wanted.y(), asked, 1e-9) << "the step after what was said";
       asked += 1e-3;
-      old.says(constant(Vec3(0, static_cast<float>(asked), 0)));
-      old.turn();
+      stage.old.says(constant(Vec3(0, static_cast<float>(asked), 0)));
+      stage.old.turn();
     });
     asked = static_cast<double>(static_cast<float>(asked));
   }
 }
 
 TEST(VrpnWorld, AProgramThatSendsWithoutAPauseMakesNoFloodOfForces) {
-  World world("demo_parts.toml");
-  Plug& plug = world.add_plug();
-  Station station{.name = "Phantom0"};
-  Old old(world, plug, station, 1);
-  world.run(200, [&] { old.turn(); });
+  Stage stage;
+  stage.run(200);
   std::uint64_t before = 0;
   double asked = 0;
   for (int i = 0; i < 400; ++i) {
-    if (i == 300) before = plug.forces();
-    world.run(1, [&] {
+    if (i == 300) before = stage.plug.forces();
+    stage.world.run(1, [&] {
       if (i > 300) {
-        EXPECT_NEAR(world.step.wanted.y(), asked, 1.1e-3) << "the newest of them with the next state";
+        EXPECT_NEAR(stage.world.step.wanted.y(), asked, 1.1e-3) << "the newest of them with the next state";
       }
       for (int k = 0; k < 60; ++k) {
         asked = static_cast<double>(static_cast<float>(1e-3 * i + 1e-5 * k));
-        old.says(constant(Vec3(0, asked, 0)));
-        old.turn();
-        for (int turns = 0; turns < 4; ++turns) plug.turn(world.now);
+        stage.old.says(constant(Vec3(0, asked, 0)));
+        stage.old.turn();
+        for (int turns = 0; turns < 4; ++turns) stage.plug.turn(stage.world.now);
       }
     });
   }
-  EXPECT_LE(plug.forces() - before, 250U) << "one for each state, and one more";
+  EXPECT_LE(stage.plug.forces() - before, 250U) << "one for each state, and one more";
 }
 
 TEST(VrpnWorld, EveryStateIsOnePoseAndNoForceIsAskedForByOneThatWatches) {
-  World world("demo_parts.toml");
-  Plug& plug = world.add_plug();
-  Station station{.name = "Phantom0"};
-  Old old(world, plug, station, 1);
-  world.run(100, [&] { old.turn(); });
-  const std::uint64_t before = old.peer.counts().reports;
-  world.run(1000, [&] { old.turn(); });
-  EXPECT_EQ(old.peer.counts().reports - before, 1000U);
-  EXPECT_EQ(plug.owner(), 0U);
-  EXPECT_FALSE(plug.pushes());
+  Stage stage;
+  stage.run(100);
+  const std::uint64_t before = stage.old.peer.counts().reports;
+  stage.run(1000);
+  EXPECT_EQ(stage.old.peer.counts().reports - before, 1000U);
+  EXPECT_EQ(stage.plug.owner(), 0U);
+  EXPECT_FALSE(stage.plug.pushes());
 }
 
-/// The largest change of the force between two steps, and the time at which the force is zero, ms; −1: never.
-struct Fade {
-  double largest_step = 0;
-  int zero_after = -1;
-};
-Fade fade(World& world, int milliseconds, const std::function<void()>& each = nullptr) {
-  Fade result;
-  double last = world.step.applied.y();
-  for (int i = 1; i <= milliseconds; ++i) {
-    world.run(1, each);
-    const double force = world.step.applied.y();
-    result.largest_step = std::max(result.largest_step, std::abs(force - last));
-    if (force == 0 && result.zero_after < 0) result.zero_after = i;
-    if (force != 0) result.zero_after = -1;
-    last = force;
+TEST(VrpnWorld, AFrozenProgramIsNotFeltAfterItsStaleTimeAndTheLadder) {
+  Stage stage("left.toml", kStill);
+  stage.push(400, Vec3(0, 1, 0));
+  ASSERT_NEAR(stage.world.step.applied.y(), 1, 1e-6);
+  int zero_after = 0;  // ms
+  for (double last = 1; last != 0 && zero_after < 700; ++zero_after) {
+    stage.run(1);
+    EXPECT_LT(std::abs(stage.world.step.applied.y() - last), 0.05) << "no jump";
+    last = stage.world.step.applied.y();
   }
-  return result;
+  EXPECT_GT(zero_after, 100) << "ten gaps, at least 100 ms";
+  EXPECT_LE(zero_after, 100 + 300);
+  EXPECT_TRUE(stage.old.said("is silent and has not stopped its force"));
+  stage.push(300, Vec3(0, 1, 0));
+  EXPECT_TRUE(stage.old.said("sends effects again"));
+  EXPECT_NEAR(stage.world.step.applied.y(), 1, 1e-6);
 }
 
-class VrpnOnAStillHand : public testing::Test {
- protected:
-  void push(int milliseconds) {
-    world_.run(milliseconds, [&] {
-      old_.says(constant(Vec3(0, 1, 0)));
-      old_.turn();
-    });
-  }
-  World world_{"left.toml", kStill};
-  Plug& plug_ = world_.add_plug();
-  Station station_{.name = "Phantom0"};
-  Old old_{world_, plug_, station_, 1};
-};
-
-TEST_F(VrpnOnAStillHand, AProgramThatIsKilledIsFeltNoMoreWithin300Ms) {
-  push(400);
-  ASSERT_NEAR(world_.step.applied.y(), 1, 1e-6);
-  old_.leaves();
-  const Fade result = fade(world_, 500);
-  EXPECT_GT(result.zero_after, 50) << "by the ladder";
-  EXPECT_LE(result.zero_after, 300);
-  EXPECT_LT(result.largest_step, 0.05) << "no jump";
+TEST(VrpnWorld, AFieldThatIsSentOnceStaysAndItIsSaid) {
+  Stage stage("left.toml", kStill);
+  stage.run(100);
+  stage.old.says(constant(Vec3(0, 1, 0)));
+  stage.run(5000);
+  EXPECT_NEAR(stage.world.step.applied.y(), 1, 1e-6);
+  EXPECT_TRUE(stage.old.said("stays until it disconnects"));
+  EXPECT_EQ(stage.plug.owner(), 1U);
 }
 
-TEST_F(VrpnOnAStillHand, AFrozenProgramIsNotFeltAfterItsStaleTimeAndTheLadder) {
-  push(400);
-  const Fade result = fade(world_, 700, [&] { old_.turn(); });
-  EXPECT_GT(result.zero_after, 100) << "ten gaps, at least 100 ms";
-  EXPECT_LE(result.zero_after, 100 + 300);
-  EXPECT_LT(result.largest_step, 0.05);
-  EXPECT_TRUE(old_.said("is silent and has not stopped its force"));
-  push(300);
-  EXPECT_TRUE(old_.said("sends effects again"));
-  EXPECT_NEAR(world_.step.applied.y(), 1, 1e-6);
+TEST(VrpnWorld, AFieldThatEndsIsZeroAndLetsTheDeviceGo) {
+  Stage stage("left.toml", kStill);
+  stage.push(400, Vec3(0, 1, 0));
+  stage.old.says(constant(Vec3::Zero()));
+  stage.run(100);
+  EXPECT_NEAR(stage.world.step.wanted.y(), 0, 1e-12);
+  EXPECT_EQ(stage.plug.owner(), 1U);
+  stage.run(1000);
+  EXPECT_EQ(stage.plug.owner(), 0U);
+  EXPECT_FALSE(stage.plug.pushes());
 }
 
-TEST_F(VrpnOnAStillHand, AFieldThatIsSentOnceStaysAndItIsSaid) {
-  world_.run(100, [&] { old_.turn(); });
-  old_.says(constant(Vec3(0, 1, 0)));
-  world_.run(5000, [&] { old_.turn(); });
-  EXPECT_NEAR(world_.step.applied.y(), 1, 1e-6);
-  EXPECT_TRUE(old_.said("stays until it disconnects"));
-  EXPECT_EQ(plug_.owner(), 1U);
-}
-
-TEST_F(VrpnOnAStillHand, AFieldThatEndsIsZeroAndLetsTheDeviceGo) {
-  push(400);
-  old_.says(constant(Vec3::Zero()));
-  world_.run(100, [&] { old_.turn(); });
-  EXPECT_NEAR(world_.step.wanted.y(), 0, 1e-12);
-  EXPECT_EQ(plug_.owner(), 1U);
-  world_.run(1000, [&] { old_.turn(); });
-  EXPECT_EQ(plug_.owner(), 0U);
-  EXPECT_FALSE(plug_.pushes());
-}
-
-TEST_F(VrpnOnAStillHand, ASecondProgramIsToldAndTakesOverWhenTheFirstLeaves) {
-  push(400);
-  Old other(world_, plug_, station_, 2);
+TEST(VrpnWorld, ASecondProgramIsToldAndTakesOverWhenTheFirstLeaves) {
+  Stage stage("left.toml", kStill);
+  stage.push(400, Vec3(0, 1, 0));
+  Old other(stage.world, stage.plug, stage.station, 2);
   other.says(constant(Vec3(0, -1, 0)));
-  world_.run(1000, [&] {
-    old_.says(constant(Vec3(0, 1, 0)));
-    old_.turn();
+  stage.world.run(1000, [&] {
+    stage.old.says(constant(Vec3(0, 1, 0)));
+    stage.old.turn();
     other.turn();
   });
-  EXPECT_NEAR(world_.step.applied.y(), 1, 1e-6);
+  EXPECT_NEAR(stage.world.step.applied.y(), 1, 1e-6);
   ASSERT_EQ(other.texts.size(), 1U);
   EXPECT_NE(other.texts[0].find("not rendered: another program"), std::string::npos) << other.texts[0];
   EXPECT_TRUE(other.pose) << "it looks on";
-  old_.leaves();
-  world_.run(1000, [&] { other.turn(); });
-  EXPECT_NEAR(world_.step.applied.y(), -1, 1e-6);
+  stage.old.leaves();
+  stage.world.run(1000, [&] { other.turn(); });
+  EXPECT_NEAR(stage.world.step.applied.y(), -1, 1e-6);
   ASSERT_EQ(other.texts.size(), 2U);
   EXPECT_NE(other.texts[1].find("is rendered now"), std::string::npos);
-}
-
-TEST_F(VrpnOnAStillHand, AStallOfTheLinkOf200MsEndsByItself) {
-  push(400);
-  world_.connected = false;
-  const Fade stalled = fade(world_, 200, [&] {
-    old_.says(constant(Vec3(0, 1, 0)));
-    old_.turn();
-  });
-  EXPECT_LT(stalled.largest_step, 0.05);
-  EXPECT_LT(world_.step.applied.y(), 0.5) << "it fades meanwhile";
-  world_.connected = true;
-  push(300);
-  EXPECT_NEAR(world_.step.applied.y(), 1, 1e-6);
-}
-
-TEST_F(VrpnOnAStillHand, AServerThatDiesAndComesBackIsFoundAndFeltAgain) {
-  push(400);
-  const std::uint64_t before = old_.peer.counts().reports;
-  world_.kill_server();
-  push(4000);
-  EXPECT_LT(old_.peer.counts().reports, before + 100);
-  world_.open_server();
-  push(4000);
-  EXPECT_NEAR(world_.step.applied.y(), 1, 1e-6);
-  EXPECT_GT(old_.peer.counts().reports, before + 1000);
 }
 
 /// Energy that the device gives out with 20 ms of delay in each direction, J. The program answers each pose with the
 /// force of a wall.
 double given_out(bool limited, bool as_plane) {
   // Two scenes with the same simulated hand. The parts of the first scene's limiter cannot be used without a limiter.
-  World world = limited ? World("demo_parts.toml", {}, 20) : World("left.toml", {"limiter.kind=\"none\""}, 20);
-  Plug& plug = world.add_plug();
-  Station station{.name = "Phantom0"};
-  Old old(world, plug, station, 1);
+  Stage stage(limited ? "demo_parts.toml" : "left.toml",
+              limited ? std::vector<std::string>{} : std::vector<std::string>{"limiter.kind=\"none\""}, 20);
+  World& world = stage.world;
+  Old& old = stage.old;
   if (as_plane) old.says(Program::draw(Plane{.normal = -Vec3::UnitX(), .spring = 1}));
   double pressed = 0;
   world.run(8000, [&] {
