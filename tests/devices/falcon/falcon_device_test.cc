@@ -4,13 +4,13 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <limits>
 #include <memory>
 #include <string>
 
 #include "tests/devices/driver_bench.h"
+#include "tests/devices/falcon/fake_falcon.h"
 #include "tests/devices/falcon/fake_firmware.h"
-#include "tests/devices/falcon/memory_pipe.h"
+#include "tests/devices/model_pipe.h"
 
 namespace tendon::falcon_device_test {
 namespace {
@@ -21,7 +21,8 @@ using namespace std::chrono_literals;
 
 struct Bench : DriverBench<Bench> {
   explicit Bench(const FakeFalcon::Options& options = {}, std::vector<std::uint8_t> firmware = fake_firmware(4096))
-      : falcon(options), device({.firmware = std::move(firmware)}, std::make_unique<MemoryPipe>(falcon, now)) {}
+      : falcon(options),
+        device({.firmware = std::move(firmware)}, std::make_unique<ModelPipe<FakeFalcon>>(falcon, now)) {}
 
   void step(const Vec3& force = Vec3::Zero()) {
     now += 1ms;
@@ -192,16 +193,6 @@ TEST(FalconDevice, WhatIsReturnedIsWhatTheMotorsGive) {
     ASSERT_LE(bench.written.norm(), wanted.norm() + 0.005);  // each torque is rounded separately
     ASSERT_GT(bench.written.normalized().dot(wanted.normalized()), 0.99);
   }
-}
-
-TEST(FalconDevice, AForceThatIsNoNumberIsNone) {
-  Bench bench({.has_firmware = true, .is_homed = true});
-  ASSERT_TRUE(bench.reaches(State::kHomed, 200ms));
-  bench.run(10ms, kForce);
-  ASSERT_TRUE(bench.falcon.pushes());
-  bench.run(5ms, Vec3(std::numeric_limits<double>::quiet_NaN(), 0, 0));
-  EXPECT_FALSE(bench.falcon.pushes());
-  EXPECT_EQ(bench.written, Vec3::Zero());
 }
 
 TEST(FalconDevice, OneReplyThatSaysHomedIsNotEnough) {

@@ -8,8 +8,9 @@
 #include <string>
 #include <utility>
 
+#include "tests/devices/falcon/fake_falcon.h"
 #include "tests/devices/falcon/fake_firmware.h"
-#include "tests/devices/falcon/memory_pipe.h"
+#include "tests/devices/model_pipe.h"
 #include "tests/support/refusal.h"
 
 namespace tendon::falcon::firmware_test {
@@ -72,7 +73,7 @@ struct Load {
 
   LocalTime now{};
   FakeFalcon falcon;
-  MemoryPipe pipe{falcon, now};
+  ModelPipe<FakeFalcon> pipe{falcon, now};
   std::vector<std::uint8_t> image;
   FirmwareLoader loader{image};
 };

@@ -28,11 +28,12 @@ TEST(DeadMan, WhoHoldsTheButtonHasForcesAndWhoLetsGoHasNoneAtOnce) {
     rig.puppet.buttons = 4;
     rig.step();
     ASSERT_EQ(rig.state(), SafetyState::kArmed);
-    EXPECT_EQ(rig.step(kPush), kPush);
+    EXPECT_EQ(rig.step_all(kAll), kAll);
     rig.puppet.buttons = 0;
-    EXPECT_EQ(rig.step(kPush), Vec3::Zero());
+    EXPECT_EQ(rig.step_all(kAll), kNothing);
+    EXPECT_EQ(rig.puppet.told_all, kNothing);
     EXPECT_EQ(rig.state(), SafetyState::kHomed);
-    EXPECT_EQ(rig.steps(100, kPush), Vec3::Zero());
+    EXPECT_EQ(rig.steps_all(100, kAll), kNothing);
   }
   EXPECT_EQ(rig.safe.status().faults, 0U);
 }

@@ -15,23 +15,25 @@ namespace {
 using namespace std::chrono_literals;
 using By = SafeDevice::Arming::By;
 
-TEST(SafeDevice, GivesNoForceUntilItIsArmedByRequest) {
+TEST(SafeDevice, GivesNothingUntilItIsArmedByRequest) {
   Rig rig;
-  EXPECT_EQ(rig.steps(3000, kPush), Vec3::Zero());
-  EXPECT_EQ(rig.puppet.told, Vec3::Zero());
+  EXPECT_EQ(rig.steps_all(3000, kAll), kNothing);
+  EXPECT_EQ(rig.puppet.told_all, kNothing);
   EXPECT_EQ(rig.state(), SafetyState::kHomed);
   rig.arm();
   EXPECT_EQ(rig.step(kPush), kPush);
 }
 
-TEST(SafeDevice, WithNothingListedGivesEveryForceToTheLastBitOnceArmed) {
+TEST(SafeDevice, WithNothingListedGivesEveryEffortToTheLastBitOnceArmed) {
   Rig rig;
   rig.arm();
   Dice dice(1);
   for (int i = 0; i < 1000; ++i) {
-    const Vec3 asked = dice.direction() * dice.decades(-3, 2);
-    ASSERT_EQ(rig.step(asked), asked);
-    ASSERT_EQ(rig.puppet.told, asked);
+    const Effort asked{.force = dice.direction() * dice.decades(-3, 2),
+                       .torque = dice.direction() * dice.decades(-4, 1),
+                       .grip = dice.within(-5, 5)};
+    ASSERT_EQ(rig.step_all(asked), asked);
+    ASSERT_EQ(rig.puppet.told_all, asked);
   }
 }
 
@@ -133,14 +135,17 @@ TEST(SafeDevice, ArmedAtTheStartIsArmedByItselfOnceAndNeverAgain) {
   EXPECT_EQ(rig.safe.times_armed(), 2U);
 }
 
-TEST(SafeDevice, AForceThatIsNoNumberIsZeroAndAFaultThatStays) {
-  for (const double bad : {kNaN, std::numeric_limits<double>::infinity()}) {
+TEST(SafeDevice, WhatIsNoNumberIsNothingAndAFaultThatStays) {
+  for (const Effort& bad : {Effort{.force = {1, kNaN, 0}}, Effort{.force = {1, INFINITY, 0}},
+                            Effort{.force = kPush, .torque = {0, kNaN, 0}},
+                            Effort{.force = kPush, .torque = {0, 0, INFINITY}}, Effort{.force = kPush, .grip = kNaN}}) {
+    SCOPED_TRACE(testing::Message() << bad.force.transpose() << "; " << bad.torque.transpose() << "; " << bad.grip);
     Rig rig;
     rig.arm();
     rig.step(kPush);
-    EXPECT_EQ(rig.step({1, bad, 0}), Vec3::Zero());
+    EXPECT_EQ(rig.step_all(bad), kNothing);
     EXPECT_EQ(rig.fault(), SafetyFault::kForceNotFinite);
-    EXPECT_EQ(rig.steps(5000, kPush), Vec3::Zero());
+    EXPECT_EQ(rig.steps_all(5000, kAll), kNothing);
     rig.arm();
     EXPECT_EQ(rig.step(kPush), kPush);
     EXPECT_EQ(rig.fault(), SafetyFault::kForceNotFinite) << "it is still said what was last";
@@ -148,9 +153,7 @@ TEST(SafeDevice, AForceThatIsNoNumberIsZeroAndAFaultThatStays) {
 }
 
 TEST(SafeDevice, AHandleThatFliesIsLetGoForGoodAlsoWhenItRestsAgain) {
-  SafeDevice::Config config;
-  config.speed_trip = SpeedTrip::Config{.max = 1};
-  Rig rig(config);
+  Rig rig({.speed_trip = SpeedTrip::Config{.max = 1}});
   rig.arm();
   for (int i = 0; i < 50; ++i) {
     rig.puppet.position.y() += 0.9e-3;
@@ -167,33 +170,30 @@ TEST(SafeDevice, AHandleThatFliesIsLetGoForGoodAlsoWhenItRestsAgain) {
   EXPECT_EQ(rig.state(), SafetyState::kFault);
 }
 
-TEST(SafeDevice, AfterEachArmingForcesAreRampedIn) {
-  SafeDevice::Config config;
-  config.ramp_in = RampIn::Config{.time = 100ms};
-  Rig rig(config);
+TEST(SafeDevice, AfterEachArmingAllIsRampedIn) {
+  Rig rig({.ramp_in = RampIn::Config{.time = 100ms}});
   for (int time = 0; time < 2; ++time) {
     rig.arm();
     for (int ms = 1; ms <= 120; ++ms) {
-      const double share = std::min(1.0, ms / 100.0);
-      ASSERT_NEAR((rig.step(kPush) - share * kPush).norm(), 0, 1e-12) << ms;
+      SCOPED_TRACE(ms);
+      expect_near(rig.step_all(kAll), std::min(1.0, ms / 100.0) * kAll);
     }
     rig.step(Vec3::Constant(kNaN));
   }
 }
 
 TEST(SafeDevice, ASilentDeviceFallsToZeroWithinTheWatchdogsRamp) {
-  SafeDevice::Config config;
-  config.link_watchdog = Watchdog::Config{.timeout = 20ms, .ramp = 10ms};
-  Rig rig(config);
+  Rig rig({.link_watchdog = Watchdog::Config{.timeout = 20ms, .ramp = 10ms}});
   rig.arm();
-  rig.step(kPush);
+  rig.step_all(kAll);
   rig.puppet.answers = false;
-  EXPECT_EQ(rig.steps(20, kPush), kPush);
+  EXPECT_EQ(rig.steps_all(20, kAll), kAll);
   for (int ms = 0; ms < 10; ++ms) {
-    ASSERT_NEAR((rig.step(kPush) - kPush * (1 - ms / 10.0)).norm(), 0, 1e-12);
+    SCOPED_TRACE(ms);
+    expect_near(rig.step_all(kAll), (1 - ms / 10.0) * kAll);
     ASSERT_EQ(rig.state(), SafetyState::kArmed);
   }
-  EXPECT_EQ(rig.step(kPush), Vec3::Zero());
+  EXPECT_EQ(rig.step_all(kAll), kNothing);
   EXPECT_EQ(rig.state(), SafetyState::kFault);
   EXPECT_EQ(rig.fault(), SafetyFault::kDeviceSilent);
   rig.puppet.answers = true;
@@ -202,9 +202,7 @@ TEST(SafeDevice, ASilentDeviceFallsToZeroWithinTheWatchdogsRamp) {
 }
 
 TEST(SafeDevice, ADeviceThatRepeatsItsLastWordIsSilentToo) {
-  SafeDevice::Config config;
-  config.link_watchdog = Watchdog::Config{.timeout = 20ms, .ramp = 0ms};
-  Rig rig(config);
+  Rig rig({.link_watchdog = Watchdog::Config{.timeout = 20ms, .ramp = 0ms}});
   rig.arm();
   for (int ms = 1; ms <= 20; ++ms) {
     rig.puppet.age += 1ms;
@@ -215,9 +213,7 @@ TEST(SafeDevice, ADeviceThatRepeatsItsLastWordIsSilentToo) {
 }
 
 TEST(SafeDevice, AWorldThatStoodStillIsNotGoneOnWith) {
-  SafeDevice::Config config;
-  config.command_watchdog = Watchdog::Config{.timeout = 30ms, .ramp = 10ms};
-  Rig rig(config);
+  Rig rig({.command_watchdog = Watchdog::Config{.timeout = 30ms, .ramp = 10ms}});
   rig.arm();
   rig.step(kPush);
   rig.now += 29ms;
@@ -231,9 +227,7 @@ TEST(SafeDevice, AWorldThatStoodStillIsNotGoneOnWith) {
 
 TEST(SafeDevice, AForceThatTheGuardianHasEndedNeedsArmingAgain) {
   const std::atomic<bool> stands{true};
-  SafeDevice::Config config;
-  config.guardian = &stands;
-  Rig rig(config);
+  Rig rig({.guardian = &stands});
   rig.arm();
   rig.step(kPush);
   rig.now += 18ms;
@@ -250,9 +244,7 @@ TEST(SafeDevice, AForceThatTheGuardianHasEndedNeedsArmingAgain) {
 
 TEST(SafeDevice, GivesNoForceAndIsNotArmedWithoutItsGuardian) {
   std::atomic<bool> stands{true};
-  SafeDevice::Config config;
-  config.guardian = &stands;
-  Rig rig(config);
+  Rig rig({.guardian = &stands});
   rig.arm();
   EXPECT_EQ(rig.step(kPush), kPush);
   stands = false;
@@ -296,9 +288,7 @@ TEST(SafeDevice, AnUnpluggedDeviceNeedsHomingAndArmingAgain) {
 }
 
 TEST(SafeDevice, APositionThatJumpsIsNotSeenAndThoseAfterItAre) {
-  SafeDevice::Config config;
-  config.step_bound = StepBound::Config{.max_speed = 10};
-  Rig rig(config);
+  Rig rig({.step_bound = StepBound::Config{.max_speed = 10}});
   rig.arm();
   rig.puppet.position.x() = 0.2;  // 65536 counts of a wrapped encoder
   EXPECT_EQ(rig.step(kPush), Vec3::Zero());
@@ -310,13 +300,17 @@ TEST(SafeDevice, APositionThatJumpsIsNotSeenAndThoseAfterItAre) {
   EXPECT_EQ(rig.step(kPush), kPush) << "the jump is no speed";
 }
 
-TEST(SafeDevice, APositionThatIsNoNumberIsNotSeen) {
-  Rig rig;
-  rig.arm();
-  rig.puppet.position.z() = kNaN;
-  EXPECT_EQ(rig.step(kPush), Vec3::Zero());
-  EXPECT_FALSE(rig.seen);
-  EXPECT_EQ(rig.fault(), SafetyFault::kPositionNotFinite);
+TEST(SafeDevice, APositionOrAnOpeningThatIsNoNumberIsNotSeenAndAFault) {
+  for (const bool opening : {false, true}) {
+    SCOPED_TRACE(opening ? "opening" : "position");
+    Rig rig;
+    rig.puppet.opening = 0.2;
+    rig.arm();
+    (opening ? *rig.puppet.opening : rig.puppet.position.z()) = kNaN;
+    EXPECT_EQ(rig.step_all(kAll), kNothing);
+    EXPECT_FALSE(rig.seen);
+    EXPECT_EQ(rig.fault(), SafetyFault::kPositionNotFinite);
+  }
 }
 
 TEST(SafeDevice, SaysTheForceLimitAsItsOwn) {
@@ -355,6 +349,12 @@ TEST(SafeDevice, RefusesImpossibleValuesNamingTheField) {
                       {"link_watchdog.timeout", [](auto& c) { c.link_watchdog.emplace(); }},
                       {"command_watchdog.timeout", [](auto& c) { c.command_watchdog.emplace(); }},
                       {"speed_trip.max", [](auto& c) { c.speed_trip.emplace(); }},
+                      {"arming.rest_torque", [](auto& c) { c.arming.rest_torque = 0; }},
+                      {"torque_limit.max", [](auto& c) { c.torque_limit.emplace(); }},
+                      {"torque_growth_limit.rate", [](auto& c) { c.torque_growth_limit.emplace(); }},
+                      {"turn_trip.max", [](auto& c) { c.turn_trip.emplace(); }},
+                      {"grip_limit.max", [](auto& c) { c.grip_limit.emplace(); }},
+                      {"grip_growth_limit.rate", [](auto& c) { c.grip_growth_limit.emplace(); }},
                   });
 }
 

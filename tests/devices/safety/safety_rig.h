@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <cstdint>
 #include <limits>
 #include <optional>
@@ -82,5 +83,15 @@ struct Rig {
 };
 
 inline const Vec3 kPush(3, 0, -4);
+inline const Effort kAll{.force = kPush, .torque = {0, 0.1, 0}, .grip = -2};
+inline const Effort kNothing{};
+
+inline Effort operator*(double share, const Effort& effort) {
+  return {.force = share * effort.force, .torque = share * effort.torque, .grip = share * effort.grip};
+}
+
+inline void expect_near(const Effort& a, const Effort& b) {
+  EXPECT_NEAR((a.force - b.force).norm() + (a.torque - b.torque).norm() + std::abs(a.grip - b.grip), 0, 1e-12);
+}
 
 }  // namespace tendon

@@ -309,29 +309,23 @@ TEST(Saturation, LeavesASmallerForceAsItIsToTheLastBit) {
   EXPECT_EQ(bench.device().apply(Vec3::Zero()), Vec3::Zero());
 }
 
-TEST(SimulatedDevice, IsNeverMovedByAForceThatIsNotANumber) {
+TEST(SimulatedDevice, DropsTheForceItHeldWhenTheNextIsNotANumber) {
   for (const bool saturates : {false, true}) {
     for (const double bad : {kNan, kInf, -kInf}) {
       for (Eigen::Index axis = 0; axis < 3; ++axis) {
         auto config = bare();
         if (saturates) config.max_force = 8.5;
         Bench bench(config);
+        bench.push({1, 0, 0}, 1ms);
+        const Vec3 before = bench.truth().velocity;
         Vec3 force(1, 1, 1);
         force[axis] = bad;
         EXPECT_EQ(bench.device().apply(force), Vec3::Zero());
         bench.wait(1s);
-        EXPECT_EQ(bench.truth().position, Vec3::Zero());
+        EXPECT_EQ(bench.truth().velocity, before);
       }
     }
   }
-}
-
-TEST(SimulatedDevice, DropsTheForceItHeldWhenTheNextIsNotANumber) {
-  Bench bench(bare());
-  bench.push({1, 0, 0}, 1ms);
-  const Vec3 before = bench.truth().velocity;
-  bench.push({kNan, 0, 0}, 10ms);
-  EXPECT_EQ(bench.truth().velocity, before);
 }
 
 // ---- amplifier -------------------------------------------------------------------------------------------------
@@ -350,27 +344,6 @@ TEST(Amplifier, FollowsAStepAsAFirstOrderLag) {
     ASSERT_NEAR(bench.truth().velocity.x(), 2 / m * (t - tau * (1 - std::exp(-t / tau))), 1e-13);
     ASSERT_NEAR(bench.truth().device_force.x(), 2 * (1 - std::exp(-(t - 25e-6) / tau)), 2e-3);
   }
-}
-
-TEST(Amplifier, HasFallenByThreeDecibelsAtItsBandwidth) {
-  // The commands are a sine at 10 kHz. The amplitude of the velocity is F/(m ω) times the gain in the steady state.
-  const double f = 50;
-  auto config = bare(1);
-  const auto swing = [&] {
-    Bench bench(config);
-    double low = kInf;
-    double high = -kInf;
-    for (int i = 0; i < 10'000; ++i) {
-      bench.push({std::sin(2 * std::numbers::pi * f * 1e-4 * i), 0, 0}, 100us);
-      if (i < 8000) continue;
-      low = std::min(low, bench.truth().velocity.x());
-      high = std::max(high, bench.truth().velocity.x());
-    }
-    return high - low;
-  };
-  const double prompt = swing();
-  config.amplifier_bandwidth = f;
-  EXPECT_NEAR(swing() / prompt, std::numbers::sqrt2 / 2, 1e-3);
 }
 
 // ---- watchdog --------------------------------------------------------------------------------------------------

@@ -3,10 +3,8 @@
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
+#include <optional>
 #include <vector>
-
-#include "tests/support/dice.h"
 
 namespace tendon::spacemouse::report_test {
 namespace {
@@ -63,47 +61,6 @@ TEST(SpaceMouseReport, EveryNumberOf16BitsComesThroughOnEachAxis) {
       ASSERT_EQ(parsed<Motion>(bytes)->translation, expected);
     }
   }
-}
-
-// For arbitrary bytes, an accepted report must have a valid id and length, and its values must match its bytes.
-TEST(SpaceMouseReport, OfBytesThatNobodyPlannedNothingElseIsTaken) {
-  Dice dice(1);
-  std::array<int, 3> taken{};
-  for (int i = 0; i < 400'000; ++i) {
-    Bytes bytes(dice.bits() % 16);
-    for (auto& byte : bytes) byte = static_cast<std::uint8_t>(dice.bits());
-    if (!bytes.empty() && dice.chance(0.8)) bytes[0] = std::array<std::uint8_t, 4>{1, 2, 3, 0x17}[dice.bits() % 4];
-    const auto report = parse(bytes);
-    const std::size_t size = bytes.size();
-    const int id = bytes.empty() ? -1 : bytes[0];
-    const bool motion = (id == 1 && (size == 7 || size == 13)) || (id == 2 && size == 7);
-    const bool buttons = id == 3 && size >= 2;
-    const bool battery = id == 0x17 && size >= 2 && bytes[1] <= 100;
-    ASSERT_EQ(report.has_value(), motion || buttons || battery);
-    if (!report) continue;
-    ++taken[report->index()];
-    if (motion) {
-      Bytes again{bytes[0]};
-      const auto& [translation, rotation] = std::get<Motion>(*report);
-      for (const auto& axes : {translation, rotation}) {
-        if (!axes) continue;
-        for (const int value : *axes) {
-          again.push_back(static_cast<std::uint8_t>(value & 255));
-          again.push_back(static_cast<std::uint8_t>((value >> 8) & 255));
-        }
-      }
-      ASSERT_EQ(again, bytes);
-    } else if (buttons) {
-      std::uint64_t bits = 0;
-      for (std::size_t at = size; at-- > 1;) bits = bits << 8 | bytes[at];
-      if (size <= 9) {
-        ASSERT_EQ(std::get<Buttons>(*report).held, static_cast<std::uint32_t>(bits));
-      }
-    } else {
-      ASSERT_EQ(std::get<Battery>(*report).percent, bytes[1]);
-    }
-  }
-  EXPECT_GT(*std::ranges::min_element(taken), 5000);
 }
 
 }  // namespace

@@ -11,12 +11,9 @@
 #include "devices/safety/safe_device.h"
 #include "devices/usb/pipe.h"
 #include "tests/devices/falcon/fake_firmware.h"
+#include "tests/devices/usb/usb_model.h"
 
 namespace tendon {
-
-inline LocalTime real_now() {
-  return LocalTime(std::chrono::duration_cast<Duration>(std::chrono::steady_clock::now().time_since_epoch()));
-}
 
 template <class Holds>
 bool comes_true(const Holds& holds) {

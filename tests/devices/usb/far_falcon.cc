@@ -29,10 +29,6 @@ constexpr int kPriority = kHapticPriority + 15;
 /// Period of the hand motion.
 constexpr Duration kRound = 1ms;
 
-LocalTime now() {
-  return LocalTime(std::chrono::duration_cast<Duration>(std::chrono::steady_clock::now().time_since_epoch()));
-}
-
 int checked(int result, const char* what) {
   if (result < 0) throw std::system_error(errno, std::generic_category(), what);
   return result;
@@ -114,7 +110,7 @@ FarFalcon::Seen FarFalcon::seen() const {
 void FarFalcon::run() {
   enter_realtime(kPriority);
   while (!stop_) {
-    const LocalTime at = now();
+    const LocalTime at = real_now();
     {
       const std::lock_guard lock(mutex_);
       turn(at);

@@ -231,23 +231,6 @@ TEST(UsbKernel, UnpluggedInMidForceIsAFaultWithoutForceAndReplugWantsArming) {
   record_quantiles("unplugged_to_absent_ms", absent_ms);
 }
 
-TEST(UsbKernel, WithoutItsSupplyTooItWantsFirmwareAndHoming) {
-  FakeFalcon falcon({.has_firmware = true, .is_homed = true, .firmware_bytes = 4096});
-  UsbIpCable cable(falcon);
-  FalconDriver driver(usb::open_pipe(to_falcon()));
-  ASSERT_TRUE(driver.turns_until([&] { return pushes(cable, falcon); }, kForce));
-  cable.unplug();
-  ASSERT_TRUE(driver.reaches(State::kAbsent, kForce));
-  cable.plug();
-  ASSERT_TRUE(driver.reaches(State::kFirmware, kForce));
-  ASSERT_TRUE(driver.turns_until([&] { return driver.device.state() == State::kUnhomed; }, kForce, 30s));
-  for (int step = 0; step < 50; ++step) driver.step(kForce);
-  EXPECT_FALSE(pushes(cable, falcon));
-  EXPECT_NE(driver.device.state(), State::kHomed);
-  cable.with([&] { falcon.pull_through(); });
-  EXPECT_TRUE(driver.turns_until([&] { return pushes(cable, falcon); }, kForce));
-}
-
 /// Arguments that start this program as a driver to be killed.
 constexpr const char* kDrive = "--drive-guarded";
 constexpr const char* kDriveAlone = "--drive-alone";

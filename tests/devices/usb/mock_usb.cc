@@ -32,10 +32,6 @@ namespace {
 constexpr const char* kBus = "/devices/pci0000:00/0000:00:14.0/usb1";
 constexpr std::uint8_t kDirectionIn = 0x80;
 
-LocalTime now() {
-  return LocalTime(std::chrono::duration_cast<Duration>(std::chrono::steady_clock::now().time_since_epoch()));
-}
-
 std::string in_hex(std::span<const std::uint8_t> bytes) {
   std::string text;
   for (const std::uint8_t byte : bytes) {
@@ -172,7 +168,7 @@ struct MockPort::Inside {
   void run() {
     std::unique_lock lock(mutex);
     while (!stop) {
-      const LocalTime at = now();
+      const LocalTime at = real_now();
       while (plugged && !waiting.empty() && model.next_in() <= at) let_in(at);
       // The model may be changed without notification.
       changed.wait_for(lock, std::clamp<Duration>(plugged && !waiting.empty() ? model.next_in() - at : Duration::max(),
@@ -204,10 +200,10 @@ struct MockPort::Inside {
     const std::span<const std::uint8_t> bytes(urb.buffer->data, size);
     if (fields.type == USBDEVFS_URB_TYPE_CONTROL) {
       const auto value = static_cast<std::uint16_t>(bytes[2] | bytes[3] << 8);
-      const bool taken = bytes[0] == 0x40 && model.request(now(), bytes[1], value);
+      const bool taken = bytes[0] == 0x40 && model.request(real_now(), bytes[1], value);
       finish(std::move(urb), taken ? 0 : -EPIPE, 0);
     } else if ((fields.endpoint & kDirectionIn) == 0) {
-      const bool taken = model.write(now(), bytes);
+      const bool taken = model.write(real_now(), bytes);
       finish(std::move(urb), taken ? 0 : -EPIPE, taken ? static_cast<int>(size) : 0);
     } else {
       waiting.push_back(std::move(urb));

@@ -155,22 +155,6 @@ TEST_F(MockUsbTest, PluggedInLateItPushesUnpluggedItIsAFault) {
   }
 }
 
-TEST_F(MockUsbTest, WithoutItsSupplyTooItWantsFirmwareAndHoming) {
-  FalconDriver driver(usb::open_pipe(to_falcon()));
-  port.plug();
-  ASSERT_TRUE(driver.turns_until([&] { return pushes(); }, kForce));
-  port.unplug();
-  ASSERT_TRUE(driver.reaches(State::kAbsent, kForce));
-  port.plug();
-  ASSERT_TRUE(driver.reaches(State::kFirmware, kForce));
-  ASSERT_TRUE(driver.turns_until([&] { return driver.device.state() == State::kUnhomed; }, kForce, 30s));
-  for (int step = 0; step < 50; ++step) driver.step(kForce);
-  EXPECT_FALSE(pushes());
-  EXPECT_NE(driver.device.state(), State::kHomed);
-  port.with([&] { falcon.pull_through(); });
-  EXPECT_TRUE(driver.turns_until([&] { return pushes(); }, kForce));
-}
-
 TEST_F(MockUsbTest, ASpaceMouseIsReadThroughTheRealLibraryAndSurvivesAReplug) {
   usb::PipeConfig config{.transfers = usb::PipeConfig::Transfers::kInterrupt};
   config.ids.assign(SpaceMouseDevice::kIds.begin(), SpaceMouseDevice::kIds.end());

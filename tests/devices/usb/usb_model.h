@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -9,6 +10,11 @@
 #include "core/base/time.h"
 
 namespace tendon {
+
+/// For the adapters whose other side lives in real time.
+inline LocalTime real_now() {
+  return LocalTime(std::chrono::duration_cast<Duration>(std::chrono::steady_clock::now().time_since_epoch()));
+}
 
 /// Full-speed device with one interface, as seen from its cable. The adapters of all tiers use this interface
 /// (tests/devices/README.md). A model reports the state of the bus at the given time without waiting or reading a

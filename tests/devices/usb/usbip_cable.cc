@@ -44,10 +44,6 @@ constexpr std::uint8_t kDescribeDevice = 1;
 constexpr std::uint8_t kDescribeConfiguration = 2;
 constexpr std::uint8_t kDescribeReports = 0x22;
 
-LocalTime now() {
-  return LocalTime(std::chrono::duration_cast<Duration>(std::chrono::steady_clock::now().time_since_epoch()));
-}
-
 struct UsbipHeader {
   std::array<std::uint32_t, 10> numbers{};
   std::array<std::uint8_t, 8> setup{};
@@ -126,8 +122,8 @@ void UsbIpCable::run() {
     Duration most = 5ms;  // the model may have been changed
     {
       const std::lock_guard lock(mutex_);
-      let_in(now());
-      if (!waiting_.empty()) most = std::clamp<Duration>(model_.next_in() - now(), Duration::zero(), most);
+      let_in(real_now());
+      if (!waiting_.empty()) most = std::clamp<Duration>(model_.next_in() - real_now(), Duration::zero(), most);
     }
     const timespec wait{.tv_sec = 0, .tv_nsec = most.count()};
     pollfd heard{.fd = end_, .events = POLLIN, .revents = 0};
@@ -162,7 +158,7 @@ void UsbIpCable::obey(const Order& order, std::span<const std::uint8_t> bytes) {
   } else if (order.in) {
     waiting_.push_back({order.number, order.size});
   } else {
-    const LocalTime at = now();
+    const LocalTime at = real_now();
     const bool taken = model_.write(at, bytes);
     if (taken && watch_) watch_(at);
     answer(order.number, taken ? 0 : -EPIPE, taken ? bytes.size() : 0);
@@ -177,7 +173,7 @@ void UsbIpCable::obey_control(const Order& order) {
     answer(order.number, bytes.empty() ? -EPIPE : 0, given.size(), given);
   };
   if (type == kVendorRequest) {
-    const bool taken = model_.request(now(), request, static_cast<std::uint16_t>(low | high << 8));
+    const bool taken = model_.request(real_now(), request, static_cast<std::uint16_t>(low | high << 8));
     answer(order.number, taken ? 0 : -EPIPE, 0);
   } else if (type == kFromDevice && request == kGetDescriptor && high == kDescribeDevice) {
     give(all.first(kDeviceDescriptor));

@@ -37,7 +37,7 @@ void FakeWoodenHaptics::reset() {
 }
 
 void FakeWoodenHaptics::plug() {
-  plugged_ = host_ = true;
+  plugged_ = true;
   ++times_plugged_;
 }
 
@@ -45,11 +45,6 @@ void FakeWoodenHaptics::unplug() {
   plugged_ = false;
   cancel();
   if (!options_.own_supply) reset();
-}
-
-void FakeWoodenHaptics::lose_host() {
-  host_ = false;
-  cancel();
 }
 
 void FakeWoodenHaptics::cancel() {
@@ -100,12 +95,11 @@ void FakeWoodenHaptics::frame(LocalTime at) {
     current_ma_ = {};
   }
   if (!boots_) boots_ = at + options_.boot;
-  const bool bus = plugged_ && host_;
-  if (bus && in_buffer_) {
+  if (plugged_ && in_buffer_) {
     if (!in_buffer_->empty()) to_host_.emplace_back(at, std::move(*in_buffer_));
     in_buffer_.reset();
   }
-  if (bus && !out_buffer_ && !from_host_.empty()) {
+  if (plugged_ && !out_buffer_ && !from_host_.empty()) {
     out_buffer_ = std::move(from_host_.front());
     from_host_.pop_front();
   }
@@ -163,7 +157,7 @@ void FakeWoodenHaptics::say(LocalTime at) {
     std::vector<std::uint8_t> noise(1 + dice_.bits() % 64);
     for (auto& byte : noise) byte = static_cast<std::uint8_t>(dice_.bits());
     if (noise.size() == kReport) noise.pop_back();  // otherwise it might be a valid report
-    if (plugged_ && host_) to_host_.emplace_back(at + kFrame, noise);
+    if (plugged_) to_host_.emplace_back(at + kFrame, noise);
     if (fault_ == Fault::kBabblesOnly) return;
   }
   if (fault_ == Fault::kGarblesSome && third)

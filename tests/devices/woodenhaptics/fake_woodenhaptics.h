@@ -66,8 +66,6 @@ class FakeWoodenHaptics {
   std::vector<std::uint8_t> take_in(LocalTime now);
   /// The node is closed, which cancels waiting transfers.
   void cancel();
-  /// This is called when the process of the host has died. Nothing is sent or received after this.
-  void lose_host();
 
   void advance(LocalTime now);
 
@@ -109,7 +107,6 @@ class FakeWoodenHaptics {
   Fault fault_ = Fault::kNone;
   bool plugged_ = true;
   int times_plugged_ = 1;
-  bool host_ = true;
 
   std::optional<LocalTime> next_frame_;
   std::deque<std::vector<std::uint8_t>> from_host_;

@@ -204,20 +204,6 @@ TEST(WoodenHapticsDevice, ZeroDoesNotWaitForAnAnswer) {
   EXPECT_FALSE(bench.arm.pushes());
 }
 
-// This tests the firmware model only, without the driver.
-TEST(WoodenHapticsDevice, WhenTheHostIsDeadTheFirmwareLetsGoHalfASecondLater) {
-  Bench bench;
-  ASSERT_TRUE(bench.reaches(State::kHomed, 1s));
-  bench.run(20ms, kForce);
-  ASSERT_TRUE(bench.arm.pushes());
-  bench.arm.lose_host();
-  const LocalTime dead = bench.now;
-  while (bench.arm.pushes() && bench.now - dead < 1s) bench.arm.advance(bench.now += 1ms);
-  EXPECT_GE(bench.now - dead, 497ms) << "nothing else ended it";
-  EXPECT_LE(bench.now - dead, 501ms);
-  EXPECT_FALSE(bench.arm.amplifiers_on());
-}
-
 /// The guardian writes this packet if the server is killed, stops or hangs (devices/safety/guardian.h).
 TEST(WoodenHapticsDevice, ThePacketOfTheGuardianEndsTheForceAtOnce) {
   Bench bench;

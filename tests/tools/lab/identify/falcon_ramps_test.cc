@@ -12,7 +12,8 @@
 
 #include "core/identification/friction_identification.h"
 #include "devices/falcon/falcon_device.h"
-#include "tests/devices/falcon/memory_pipe.h"
+#include "tests/devices/falcon/fake_falcon.h"
+#include "tests/devices/model_pipe.h"
 #include "tests/tools/lab/identify/simulated_ramps.h"
 
 namespace tendon::lab::falcon_ramps_test {
@@ -66,7 +67,7 @@ class FalconOnARail final : public Device {
   double speed_ = 0;  // m/s
   LocalTime now_{};
   FakeFalcon falcon_;
-  FalconDevice device_{{}, std::make_unique<MemoryPipe>(falcon_, now_)};
+  FalconDevice device_{{}, std::make_unique<ModelPipe<FakeFalcon>>(falcon_, now_)};
 };
 
 /// Uses slow ramps: a reply is one period old, which adds rate · period to the apparent Coulomb friction.
