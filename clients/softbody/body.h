@@ -84,7 +84,6 @@ struct ModelInfo {
 
 std::span<const ModelInfo> models() noexcept;
 const ModelInfo& info(ModelKind kind) noexcept;
-std::optional<ModelKind> model_named(std::string_view name) noexcept;
 
 struct NearLaw {
   Law law;

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <algorithm>
 #include <array>
 #include <cstddef>
-#include <optional>
 #include <span>
 #include <string_view>
 
@@ -85,10 +83,5 @@ std::span<const ModelInfo> models() noexcept { return kModels; }
 const ModelInfo& info(ModelKind kind) noexcept { return kModels[static_cast<std::size_t>(kind)]; }
 
 std::span<const NearLaw> near_laws() noexcept { return kNearLaws; }
-
-std::optional<ModelKind> model_named(std::string_view name) noexcept {
-  const auto* const found = std::ranges::find(kModels, name, &ModelInfo::name);
-  return found == kModels.end() ? std::nullopt : std::optional(found->kind);
-}
 
 }  // namespace tendon::softbody

@@ -1,536 +1,493 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "clients/softbody/scene.h"
 
-#include <toml++/toml.h>
-
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
-#include <cmath>
-#include <optional>
-#include <set>
-#include <sstream>
-#include <stdexcept>
+#include <span>
+#include <utility>
+#include <variant>
 #include <vector>
 
 #include "clients/softbody/fem/file_text.h"
-#include "core/base/nearest_word.h"
+#include "server/scene/reader.h"
+#include "server/scene/reference.h"
+#include "server/scene/values.h"
+
+// The keys are declared in the same way as those of a server's scene, see server/scene.
 
 namespace tendon::softbody {
 namespace {
 
-/// The TOML parser is recursive, so the file must be small.
-constexpr std::uintmax_t kMaxSceneBytes = 16'384;
-constexpr double kMaxLength = 1e3;  // m; larger values are in a wrong unit
-constexpr std::int64_t kMaxCells = 200;
-constexpr double kMaxError = 10;  // %; larger errors can be felt
+using namespace scene_file;
+using enum EffectKind;
 
-template <class Infos>
-std::string names(const Infos& infos) {
-  std::string all;
-  for (const auto& each : infos) all.append(all.empty() ? "" : ", ").append(each.name);
-  return all;
-}
+constexpr Number up_to(double most) { return {.least = 0, .most = most, .without_least = true}; }
+constexpr Number kLength = up_to(1e6);  // larger values are in a wrong unit
+constexpr Number kLengthOrZero{.least = 0, .most = 1e6};
+constexpr Vector kPoint{.each = {.least = -1e6, .most = 1e6}};
+constexpr std::size_t kMostTables = 1000;
 
-/// Keys that are never requested are errors (check_unknown()).
-class Table {
- public:
-  Table(const toml::table& table, std::string path, const std::string& file)
-      : table_(table), path_(std::move(path)), file_(file) {}
-
-  [[noreturn]] void fail(const toml::node& node, std::string_view key, const std::string& what) const {
-    std::ostringstream text;
-    text << file_ << ':' << node.source().begin.line << ": " << path_ << key << ": " << what;
-    throw SceneError(text.str());
-  }
-
-  const toml::node* find(std::string_view key) {
-    known_.emplace(key);
-    return table_.get(key);
-  }
-
-  const toml::node& need(std::string_view key, std::string_view expected) {
-    if (const toml::node* node = find(key)) return *node;
-    missing(key, expected);
-  }
-
-  [[noreturn]] void missing(std::string_view key, std::string_view expected) {
-    throw SceneError(file_ + ": " + path_ + std::string(key) + ": expected " + std::string(expected) +
-                     ", found nothing");
-  }
-
-  /// Returns the number divided by `per_si`.
-  double number(std::string_view key, double least, bool or_equal, double most, double per_si,
-                std::optional<double> otherwise = {}) {
-    std::ostringstream expected;
-    expected << "a number " << (or_equal ? "of at least " : "above ") << least << " and at most " << most;
-    const toml::node* node = find(key);
-    if (node == nullptr) {
-      if (otherwise) return *otherwise;
-      missing(key, expected.str());
-    }
-    const std::optional<double> value = node->value<double>();
-    const bool good = value && (or_equal ? *value >= least : *value > least) && *value <= most;
-    if (!good || node->is_boolean()) fail(*node, key, "expected " + expected.str());
-    return *value / per_si;
-  }
-
-  double length(std::string_view key) { return number(key, 0, false, 1e3 * kMaxLength, 1e3); }
-
-  bool flag(std::string_view key) {
-    const toml::node* node = find(key);
-    if (node == nullptr) return false;
-    const auto* value = node->as_boolean();
-    if (value == nullptr) fail(*node, key, "expected true or false");
-    return **value;
-  }
-
-  int count(std::string_view key, std::int64_t most, std::optional<int> otherwise = {}) {
-    const std::string expected = "a whole number from 1 to " + std::to_string(most);
-    const toml::node* node = find(key);
-    if (node == nullptr) {
-      if (otherwise) return *otherwise;
-      missing(key, expected);
-    }
-    const auto* whole = node->as_integer();
-    if (whole == nullptr || **whole < 1 || **whole > most) fail(*node, key, "expected " + expected);
-    return static_cast<int>(**whole);
-  }
-
-  std::string text(std::string_view key, std::string_view expected) {
-    const toml::node& node = need(key, expected);
-    const auto* value = node.as_string();
-    if (value == nullptr) fail(node, key, "expected " + std::string(expected));
-    return **value;
-  }
-
-  template <class Named>
-  auto choice(std::string_view key, const std::string& all, Named named) {
-    const std::string name = text(key, "one of " + all);
-    const auto found = named(name);
-    if (!found) {
-      fail(*table_.get(key), key, "expected one of " + all + ", found \"" + name + '"' + did_you_mean(name, all));
-    }
-    return *found;
-  }
-
-  Vec3 vector(std::string_view key, double most, double per_si, std::optional<Vec3> otherwise = {}) {
-    constexpr std::string_view kExpected = "[x, y, z]";
-    const toml::node* node = find(key);
-    if (node == nullptr) {
-      if (otherwise) return *otherwise;
-      missing(key, kExpected);
-    }
+struct Direction : Vector {
+  Verdict take(const toml::node& node, const Unit& unit, Vec3& to) const {
     Vec3 vector;
-    const auto* array = node->as_array();
-    for (std::size_t i = 0; i < 3; ++i) {
-      const auto value = array != nullptr && array->size() == 3 ? array->get(i)->value<double>() : std::nullopt;
-      if (!value || !(std::abs(*value) <= most)) fail(*node, key, "expected " + std::string(kExpected));
-      vector[static_cast<Eigen::Index>(i)] = *value / per_si;
-    }
-    return vector;
+    if (auto refusal = Vector::take(node, unit, vector)) return refusal;
+    if (!(vector.norm() > 1e-6)) return Refusal{&node, "a direction [x, y, z] other than zero"};
+    to = vector.normalized();
+    return {};
   }
+};
+constexpr Direction kDirection{kPoint};
 
-  Vec3 direction(std::string_view key, const Vec3& otherwise) {
-    const Vec3 vector = this->vector(key, 1e6, 1, otherwise);
-    if (!(vector.norm() > 1e-6)) fail(*table_.get(key), key, "expected a direction, found [0, 0, 0]");
-    return vector.normalized();
+struct Text {
+  std::string_view what;
+
+  std::string expected(const Unit&) const { return std::string(what); }
+  Verdict take(const toml::node& node, const Unit& unit, std::string& to) const {
+    const auto* text = node.as_string();
+    if (text == nullptr || (*text)->empty()) return Refusal{&node, expected(unit)};
+    to = **text;
+    return {};
   }
-
-  Table table(std::string_view key) {
-    const toml::node& node = need(key, "a table");
-    const auto* table = node.as_table();
-    if (table == nullptr) fail(node, key, "expected a table");
-    return {*table, path_ + std::string(key) + ".", file_};
-  }
-
-  std::vector<Table> tables(std::string_view key, const std::string& expected) {
-    const toml::node& node = need(key, expected);
-    const auto* array = node.as_array();
-    if (array == nullptr || array->empty()) fail(node, key, "expected " + expected);
-    std::vector<Table> all;
-    for (const toml::node& each : *array) {
-      const auto* table = each.as_table();
-      if (table == nullptr) fail(each, key, "expected " + expected);
-      all.emplace_back(*table, path_ + std::string(key) + '[' + std::to_string(all.size() + 1) + "].", file_);
-    }
-    return all;
-  }
-
-  [[noreturn]] void fail(const std::string& what) const { fail(table_, "", what); }
-
-  std::vector<double> numbers(std::string_view key, double least, bool or_equal) {
-    std::ostringstream expected;
-    expected << "a list of numbers " << (or_equal ? "of at least " : "above ") << least;
-    const toml::node& node = need(key, expected.str());
-    const auto* array = node.as_array();
-    if (array == nullptr || array->empty()) fail(node, key, "expected " + expected.str());
-    std::vector<double> all;
-    for (const toml::node& each : *array) {
-      const std::optional<double> value = each.value<double>();
-      if (!value || each.is_boolean() || !std::isfinite(*value) || !(or_equal ? *value >= least : *value > least)) {
-        fail(each, key, "expected " + expected.str());
-      }
-      all.push_back(*value);
-    }
-    return all;
-  }
-
-  void check_unknown() const {
-    for (const auto& [key, node] : table_) {
-      if (!known_.contains(key.str())) {
-        const std::string all = join(known_);
-        const std::string meant = did_you_mean(key.str(), all);
-        fail(node, key.str(), "unknown key" + (meant.empty() ? "; expected one of " + all : meant));
-      }
-    }
-  }
-
-  const std::string& file() const { return file_; }
-
- private:
-  static std::string join(const std::set<std::string, std::less<>>& keys) {
-    std::string all;
-    for (const auto& key : keys) all.append(all.empty() ? "" : ", ").append(key);
-    return all;
-  }
-
-  const toml::table& table_;
-  std::string path_;
-  std::string file_;
-  std::set<std::string, std::less<>> known_;
+  static std::string shown(const Unit&, const std::string& value) { return in_quotes(value); }
 };
 
-Material read_material(Table& of, double* density = nullptr) {
-  Table table = of.table("material");
-  Material material;
-  material.young = table.number("young_pa", 0, false, 1e12, 1);
-  material.poisson = table.number("poisson", 0, true, 0.4999, 1);
-  if (density != nullptr) *density = table.number("density_kg_per_m3", 0, false, 1e6, 1);
-  table.check_unknown();
-  return material;
+struct ModelNames : Names<ModelKind> {
+  Verdict take(const toml::node& node, const Unit& unit, ModelKind& to) const {
+    constexpr std::array<std::string_view, 7> kOfTheLab = {"stvk",        "mass-spring", "projective", "modal",
+                                                           "tensor-mass", "tled",        "xpbd"};
+    Verdict refusal = Names::take(node, unit, to);
+    const auto* name = node.as_string();
+    if (refusal && name != nullptr && std::ranges::count(kOfTheLab, std::string_view(**name)) > 0) {
+      refusal->hint = ", which is only a model of the accuracy experiment (tests/tools/lab/models)";
+    }
+    return refusal;
+  }
+};
+
+template <class Info, class T>
+Names<T> all_names(std::span<const Info> infos, T Info::*value) {
+  Names<T> names;
+  for (const Info& each : infos) names.all.emplace_back(each.name, each.*value);
+  return names;
 }
 
-void read_body(Table table, const std::filesystem::path& directory, BodyConfig& body) {
-  const std::string kind = table.choice("shape", "block, cylinder, file", [](std::string_view name) {
-    return name == "block" || name == "cylinder" || name == "file" ? std::optional(std::string(name)) : std::nullopt;
+template <class Info>
+std::string described(std::string text, std::span<const Info> infos) {
+  for (const Info& each : infos) text.append(". ").append(in_quotes(each.name)).append(": ").append(each.what);
+  return text;
+}
+
+struct Draft {
+  std::filesystem::path directory{};
+  std::vector<EffectKind> listed{};
+  Scene scene{};
+
+  bool lists(EffectKind effect) const { return std::ranges::count(listed, effect) > 0; }
+};
+
+/// Paths are relative to the scene.
+template <class Table, class Target>
+void declare_path(Table& keys, std::string_view name, const Draft& draft, Target& target, std::string_view meaning,
+                  const Absent& absent) {
+  std::filesystem::path file;
+  if (keys.key(name, file, Path{}, meaning, absent)) target = draft.directory / file;
+}
+
+template <class Table>
+void declare_units(Table& keys, std::string_view name, double& scale) {
+  double units = 1;
+  keys.key(name, units, up_to(1e9), "Number of the file's units in a metre: 1000 if it is in mm", kRequired);
+  scale = 1 / units;
+}
+
+template <class Table>
+void declare_listed(Table& root, Draft& draft) {
+  root.key("effects", draft.listed, ListOf<Names<EffectKind>>{all_names(effects(), &EffectInfo::kind)},
+           described("Simulated effects. All others are off, and their keys are unknown", effects()), kRequired);
+}
+
+template <class Table>
+void declare_effects(Table& root, Draft& draft) {
+  BodyConfig& body = draft.scene.body;
+  EffectsConfig& config = body.effects;
+  const auto has = [&](auto... of) { return Table::kDocuments || (draft.lists(of) || ...); };
+  config.inertia = draft.lists(kInertia);
+  if (has(kGravity)) {
+    root.key("gravity_m_per_s2", config.gravity.emplace(0.0, 0.0, -9.81), kPoint, "With gravity: in the body's frame");
+  }
+  if (has(kDamping)) {
+    root.key("damping_per_s", config.damping, up_to(1e6), "With damping: viscous drag per mass", kRequired);
+  }
+  if (has(kViscosity)) {
+    root.key("viscosity_ms", config.viscosity, up_to(1e6),
+             "With viscosity: time constant of a Kelvin-Voigt material, in which a strain rate acts like a strain",
+             kRequired);
+  }
+  if (has(kFriction)) {
+    root.key("friction", body.friction, Number{.least = 0, .most = 10},
+             "With friction: Coulomb coefficient of the tool on the surface", kRequired);
+  }
+  if (has(kInertia, kDamping, kViscosity)) {
+    root.key("step_ms", config.step, up_to(1e3), "With inertia, damping or viscosity: time simulated by one step",
+             kRequired);
+  }
+  if (has(kCutting)) {
+    root.tables("cutting", body.cuts, kMostTables, [](Table& keys, PlannedCut& cut) {
+      keys.key("corner_mm", cut.cut.corner, kPoint,
+               "Corner of a parallelogram, in the body's frame at rest. The cuts are made in order and follow the "
+               "faces of elements",
+               kRequired);
+      keys.key("along_mm", cut.cut.along, kPoint, "First side from the corner", kRequired);
+      keys.key("deep_mm", cut.cut.deep, kPoint, "Second side from the corner", kRequired);
+      const bool timed = keys.either("at_s", "above_n");
+      cut.when = timed ? PlannedCut::When::kTime : PlannedCut::When::kForce;
+      if (timed) {
+        keys.key("at_s", cut.value, Number{.least = 0, .most = 1e9}, "Time of the cut after the first answer",
+                 Absent{.text = "required, or above_n"});
+      }
+      if (Table::kDocuments || !timed) {
+        keys.key("above_n", cut.value, up_to(1e6),
+                 "Force along the normal. The cut is made after an answer with a larger force",
+                 Absent{.text = "required, or at_s"});
+      }
+    });
+  }
+  if (has(kStiffening)) {
+    root.table("stiffening", [&body](Table& keys) {
+      StiffnessOverTime& law = body.stiffening.emplace();
+      keys.key("at_s", law.at, ListOf<Number>{kZeroOrMore}, "Times after the first answer", kRequired);
+      keys.key("factor", law.factor, ListOf<Number>{kAboveZero},
+               "Factors of Young's modulus at these times. It is linear in between", kRequired);
+    });
+  }
+  if (has(kPlasticity)) {
+    root.table("plasticity", [&body](Table& keys) {
+      Yield& yield = body.plasticity.emplace();
+      keys.key("yield_pa", yield.stress, kAboveZero, "Yield stress of a bar", kRequired);
+      keys.key("hardening_pa", yield.hardening, kAboveZero,
+               "Hardening modulus H. After yielding, the modulus of a bar is E H/(E + H), and E on unloading",
+               kRequired);
+    });
+  }
+  if (has(kSelfCollision)) {
+    root.table("self-collision", [&body](Table& keys) {
+      keys.key("layer_mm", body.self_collision, kLength,
+               "Penetration of two sides at which their pressure is Young's modulus", kRequired);
+    });
+  }
+}
+
+template <class Table>
+void declare_material(Table& of, Material& material, double* density) {
+  of.table("material", [&](Table& keys) {
+    keys.key("young_pa", material.young, kAboveZero, "Young's modulus", kRequired);
+    keys.key("poisson", material.poisson, Number{.least = 0, .most = 0.4999}, "Poisson's ratio", kRequired);
+    if (density == nullptr) return;
+    keys.key("density_kg_per_m3", *density, up_to(1e6), "With gravity, inertia or damping: density of the whole body",
+             kRequired);
   });
-  body.element = table.choice("element", names(elements()), element_named);
-  if (kind == "block") {
-    BlockShape block{};
-    block.size = table.vector("size_mm", 1e3 * kMaxLength, 1e3);
-    if (!(block.size.array() > 0).all()) table.fail(*table.find("size_mm"), "size_mm", "expected lengths above 0");
-    const toml::node& cells = table.need("cells", "[nx, ny, nz]");
-    for (std::size_t i = 0; i < 3; ++i) {
-      const auto* array = cells.as_array();
-      const auto* count = array != nullptr && array->size() == 3 ? array->get(i)->as_integer() : nullptr;
-      if (count == nullptr || **count < 1 || **count > kMaxCells) {
-        table.fail(cells, "cells", "expected three whole numbers from 1 to " + std::to_string(kMaxCells));
-      }
-      block.cells[i] = static_cast<int>(**count);
+}
+
+enum class ShapeKind : std::uint8_t { kBlock, kCylinder, kFile };
+
+template <class Table>
+void declare_body(Table& root, Draft& draft) {
+  BodyConfig& body = draft.scene.body;
+  root.table("body", [&](Table& keys) {
+    constexpr Count kCells{200, 1};
+    ShapeKind kind{};
+    const Names<ShapeKind> kinds{
+        {{"block", ShapeKind::kBlock}, {"cylinder", ShapeKind::kCylinder}, {"file", ShapeKind::kFile}}};
+    const bool known = keys.key("shape", kind, kinds, "Shape of the body", kRequired);
+    keys.key("element", body.element, all_names(elements(), &ElementInfo::element),
+             described("Type of the elements", elements()), kRequired);
+    if (!known || kind == ShapeKind::kBlock) {
+      auto& block = body.shape.emplace<BlockShape>();
+      keys.key("size_mm", block.size, Vector{kLength}, "For a block: lengths of its edges", kRequired);
+      keys.key("cells", block.cells, ListOf<Count>{kCells, "[nx, ny, nz]"}, "For a block: number of cells on each edge",
+               kRequired);
     }
-    body.shape = block;
-  } else if (kind == "cylinder") {
-    body.shape = CylinderShape{table.length("radius_mm"), table.length("height_mm"),
-                               table.count("cells_across", kMaxCells), table.count("cells_up", kMaxCells)};
-  } else {
-    body.shape = FileShape{directory / table.text("file", "the path of a gmsh file"),
-                           1 / table.number("units_per_m", 0, false, 1e9, 1), table.flag("slits")};
-  }
-  body.clamped_below = table.number("clamped_below_mm", 0, true, 1e3 * kMaxLength, 1e3, 0);
-  const bool has_mass = body.effects.gravity || body.effects.inertia || body.effects.damping;
-  body.material = read_material(table, has_mass ? &body.effects.density : nullptr);
-  table.check_unknown();
-}
-
-std::vector<Region> read_regions(Table& root) {
-  std::vector<Region> regions;
-  for (Table& table : root.tables("region", "one or more tables [[region]]")) {
-    const bool ball = table.find("radius_mm") != nullptr;
-    if (ball == (table.find("size_mm") != nullptr)) table.fail("expected either radius_mm or size_mm");
-    const Vec3 middle = table.vector("middle_mm", 1e3 * kMaxLength, 1e3);
-    Region& region = regions.emplace_back();
-    if (ball) {
-      region.where = Region::Ball{.middle = middle, .radius = table.length("radius_mm")};
-    } else {
-      const Vec3 size = table.vector("size_mm", 1e3 * kMaxLength, 1e3);
-      if (!(size.array() > 0).all()) table.fail(*table.find("size_mm"), "size_mm", "expected lengths above 0");
-      region.where = Region::Box{.middle = middle, .size = size};
+    if (!known || kind == ShapeKind::kCylinder) {
+      auto& cylinder = body.shape.emplace<CylinderShape>();
+      keys.key("radius_mm", cylinder.radius, kLength, "For a cylinder: its radius", kRequired);
+      keys.key("height_mm", cylinder.height, kLength, "For a cylinder: its height", kRequired);
+      keys.key("cells_across", cylinder.across, kCells, "For a cylinder: number of cells across it, an even number",
+               kRequired);
+      keys.key("cells_up", cylinder.up, kCells, "For a cylinder: number of cells along its axis", kRequired);
     }
-    region.material = read_material(table);
-    table.check_unknown();
-  }
-  return regions;
-}
-
-Tool read_tool(Table& table, const std::filesystem::path& directory, double radius) {
-  std::string kind = "patch";
-  if (table.find("tool") != nullptr) {
-    kind = table.choice("tool", "patch, sphere, capsule, box, mesh", [](std::string_view name) {
-      constexpr std::array kKinds = {"patch", "sphere", "capsule", "box", "mesh"};
-      return std::ranges::count(kKinds, name) > 0 ? std::optional(std::string(name)) : std::nullopt;
-    });
-  }
-  if (kind == "sphere") return SphereTool{radius};
-  if (kind == "capsule") {
-    const double length = table.number("tool_length_mm", 0, true, 1e3 * kMaxLength, 1e3);
-    return CapsuleTool{
-        .radius = radius, .half_length = length / 2, .axis = table.direction("tool_axis", Vec3::UnitZ())};
-  }
-  if (kind == "box") {
-    const Vec3 size = table.vector("tool_size_mm", 1e3 * kMaxLength, 1e3);
-    if (!(size.array() > 0).all()) table.fail(*table.find("tool_size_mm"), "tool_size_mm", "expected lengths above 0");
-    return BoxTool{.size = size, .edge = table.number("tool_edge_mm", 0, false, 1e3 * size.minCoeff() / 2, 1e3)};
-  }
-  if (kind == "mesh") {
-    std::filesystem::path file = directory / table.text("tool_file", "the path of a surface: .stl, .obj or .off");
-    const double scale = 1 / table.number("tool_units_per_m", 0, false, 1e9, 1);
-    return MeshTool{.file = std::move(file), .scale = scale, .cell = table.length("tool_cell_mm")};
-  }
-  return PatchTool{radius};
-}
-
-void read_touch(Table table, const std::filesystem::path& directory, Scene& scene) {
-  BodyConfig& body = scene.body;
-  body.towards_tool = table.direction("from", Vec3::UnitZ());
-  body.middle = table.vector("middle_mm", 1e3 * kMaxLength, 1e3, Vec3(Vec3::Zero()));
-  body.patch_radius = table.length("patch_radius_mm");
-  const double tool_radius = table.number("tool_radius_mm", 0, true, 1e3 * kMaxLength, 1e3, 0);
-  if (body.near.learns()) {
-    body.reach = table.number("reach_mm", 0, false, 1e3 * NearConfig::kFarthest * body.patch_radius, 1e3);
-  } else if (table.find("reach_mm") != nullptr) {
-    body.reach = table.length("reach_mm");
-  }
-  body.tool = read_tool(table, directory, tool_radius);
-  body.tool_offset = table.vector("tool_offset_mm", 1e3 * kMaxLength, 1e3, Vec3(Vec3::Zero()));
-  if (is_rigid_on_nonlinear(body)) body.layer = table.number("layer_mm", 0, false, 1e3 * kMaxLength, 1e3, body.layer);
-  if (table.find("side") != nullptr) {
-    body.side = table.choice("side", "unilateral, bilateral", [](std::string_view name) {
-      if (name == "unilateral") return std::optional(PatchContact::Side::kUnilateral);
-      return name == "bilateral" ? std::optional(PatchContact::Side::kBilateral) : std::nullopt;
-    });
-  }
-  const EffectSet simulated = effects_of(body);
-  const bool can_leave_out = info(body.model).law == Law::kLinear || simulated.has(EffectKind::kPlasticity);
-  const bool patch = std::holds_alternative<PatchTool>(body.tool);
-  if (can_leave_out && patch && !body.effects.has_time()) {
-    body.whole_stiffness = table.flag("whole_stiffness");
-  }
-  if (const toml::node* asked = table.find("table_mm")) {
-    scene.table = table.length("table_mm");
-    if (body.model != ModelKind::kCondensed || body.side != PatchContact::Side::kUnilateral || body.friction) {
-      table.fail(
-          *asked, "table_mm",
-          "expected the model condensed, unilateral and without friction, because the others depend on the past");
+    if (!known || kind == ShapeKind::kFile) {
+      auto& file = body.shape.emplace<FileShape>();
+      declare_path(keys, "file", draft, file.file, "For a file: a mesh of gmsh, relative to the scene", kRequired);
+      declare_units(keys, "units_per_m", file.scale);
+      keys.key("slits", file.slits, YesNo{}, "For a file: keep nodes at the same place separate instead of merging");
     }
-  }
-  table.check_unknown();
+    keys.key("clamped_below_mm", body.clamped_below, kLengthOrZero,
+             "Height above the lowest node up to which nodes are fixed. The lowest nodes always are");
+    const bool heavy = Table::kDocuments || body.effects.gravity || body.effects.inertia || body.effects.damping;
+    declare_material(keys, body.material, heavy ? &body.effects.density : nullptr);
+  });
+  root.tables("region", body.regions, kMostTables, [](Table& keys, Region& region) {
+    Vec3 middle = Vec3::Zero();
+    keys.key("middle_mm", middle, kPoint,
+             "Centre of a part of another material, in the body's frame at rest. It has the elements whose centre is "
+             "inside. Where two overlap, the later one is used",
+             kRequired);
+    const bool is_ball = keys.either("radius_mm", "size_mm");
+    if (is_ball) {
+      auto& ball = region.where.emplace<Region::Ball>();
+      ball.middle = middle;
+      keys.key("radius_mm", ball.radius, kLength, "Radius of a ball", Absent{.text = "required, or size_mm"});
+    }
+    if (Table::kDocuments || !is_ball) {
+      auto& box = region.where.emplace<Region::Box>();
+      box.middle = middle;
+      keys.key("size_mm", box.size, Vector{kLength}, "Size of a box", Absent{.text = "required, or radius_mm"});
+    }
+    declare_material(keys, region.material, nullptr);
+  });
 }
 
-std::vector<PlannedCut> read_cuts(Table& root) {
-  std::vector<PlannedCut> cuts;
-  for (Table& table : root.tables("cutting", "one or more tables [[cutting]]")) {
-    PlannedCut& cut = cuts.emplace_back();
-    cut.cut.corner = table.vector("corner_mm", 1e3 * kMaxLength, 1e3);
-    cut.cut.along = table.vector("along_mm", 1e3 * kMaxLength, 1e3);
-    cut.cut.deep = table.vector("deep_mm", 1e3 * kMaxLength, 1e3);
-    const bool timed = table.find("at_s") != nullptr;
-    if (timed == (table.find("above_n") != nullptr)) table.fail("expected either at_s or above_n");
-    cut.when = timed ? PlannedCut::When::kTime : PlannedCut::When::kForce;
-    cut.value = timed ? table.number("at_s", 0, true, 1e9, 1) : table.number("above_n", 0, false, 1e6, 1);
-    table.check_unknown();
-  }
-  return cuts;
-}
-
-StiffnessOverTime read_stiffening(Table table) {
-  StiffnessOverTime law;
-  law.at = table.numbers("at_s", 0, true);
-  law.factor = table.numbers("factor", 0, false);
-  try {
-    check(law);
-  } catch (const std::invalid_argument& error) {
-    table.fail(error.what());
-  }
-  table.check_unknown();
-  return law;
-}
-
-Yield read_plasticity(Table table) {
-  const Yield yield{.stress = table.number("yield_pa", 0, false, 1e12, 1),
-                    .hardening = table.number("hardening_pa", 0, false, 1e12, 1)};
-  table.check_unknown();
-  return yield;
-}
-
-double read_self_collision(Table table) {
-  const double layer = table.number("layer_mm", 0, false, 1e3 * kMaxLength, 1e3);
-  table.check_unknown();
-  return layer;
-}
-
-/// These models are now in tests/tools/lab/models.
-constexpr std::array<std::string_view, 7> kOfTheLab = {"stvk",        "mass-spring", "projective", "modal",
-                                                       "tensor-mass", "tled",        "xpbd"};
-
-ModelKind read_model(Table& model) {
-  const std::string all = names(models());
-  const std::string name = model.text("kind", "one of " + all);
-  if (std::ranges::count(kOfTheLab, name) > 0) {
-    model.fail(*model.find("kind"), "kind",
-               '"' + name + "\" is only a model of the accuracy experiment (tests/tools/lab/models); expected " + all);
-  }
-  return model.choice("kind", all, model_named);
-}
-
-std::optional<Law> law_named(std::string_view name) {
-  const auto found = std::ranges::find(near_laws(), name, &NearLaw::name);
-  return found == near_laws().end() ? std::nullopt : std::optional(found->law);
-}
-
-void check_law(Table& root, Law law, EffectSet listed) {
-  const bool simulates = law == Law::kNeoHookean;
-  if (simulates == listed.has(EffectKind::kMaterialNonlinearity)) return;
-  root.fail(*root.find("effects"), "effects",
-            simulates
-                ? "the law \"neo-hookean\" simulates \"material-nonlinearity\", which is not listed"
-                : "the law does not simulate \"material-nonlinearity\", which is listed: only \"neo-hookean\" does");
-}
-
-std::vector<Scene::Hand> read_hands(Table& root) {
-  std::vector<Scene::Hand> hands;
-  for (Table& table : root.tables("hands", "two or more tables [[hands]]")) {
-    Scene::Hand& hand = hands.emplace_back();
-    hand.device = table.text("device", "the name of a device");
-    if (hand.device.empty()) table.fail(*table.find("device"), "device", "expected the name of a device");
-    if (table.find("server") != nullptr) hand.server = table.text("server", "HOST:PORT");
-    hand.at = table.vector("at_mm", 1e3 * kMaxLength, 1e3);
-    table.check_unknown();
-    for (const Scene::Hand& other : hands) {
-      if (&other != &hand && other.device == hand.device && other.server == hand.server) {
-        table.fail("expected a different device for each hand, found twice \"" + hand.device + '"');
+template <class Table>
+void declare_model(Table& root, Draft& draft) {
+  BodyConfig& body = draft.scene.body;
+  root.table("model", [&](Table& keys) {
+    const ModelNames kinds{all_names(models(), &ModelInfo::kind)};
+    const bool known = keys.key("kind", body.model, kinds, described("Model of the body", models()), kRequired);
+    const auto is = [&](auto... of) { return !known || ((body.model == of) || ...); };
+    if (is(ModelKind::kCondensed)) {
+      declare_path(keys, "table", draft, body.table_file,
+                   "For condensed: file written by `tendon-softbody condense` or `tendon-fem condense`",
+                   Absent{.text = "the table is computed at the start"});
+    }
+    if (is(ModelKind::kNear)) {
+      keys.key("law", body.near.law, all_names(near_laws(), &NearLaw::law),
+               "For near: law of the elements near the tool; the rest is linear. \"neo-hookean\" requires "
+               "material-nonlinearity");
+      keys.key("learn", body.near.learn, YesNo{},
+               "For near: solve presses within reach_mm at the start, and approximate all others by a few shapes. "
+               "Where the error is larger than error_percent, and after a cut, the near field is used");
+      keys.key("tabulate", body.near.tabulate, YesNo{},
+               "For near: compute a table of the energy from the same presses, which is used before the shapes");
+      if (body.near.learns()) body.tolerance = NearConfig::kErrorOfLearned;
+      if (Table::kDocuments || body.near.learns()) {
+        declare_path(keys, "learned_in", draft, body.near.learned_in,
+                     "With learn or tabulate: folder of the results, relative to the scene",
+                     Absent{.text = "nothing is stored"});
       }
     }
-  }
-  if (hands.size() < 2) root.fail(*root.find("hands"), "hands", "expected two or more; omit [[hands]] for one hand");
-  return hands;
+    if (is(ModelKind::kCorotational, ModelKind::kNeoHookean, ModelKind::kNear) || draft.lists(kPlasticity)) {
+      keys.key("max_iterations", body.max_iterations, Count{1000, 1},
+               "For corotational, neo-hookean, near, and linear with plasticity: iterations of one answer");
+      keys.key("error_percent", body.tolerance, up_to(10),
+               "For the same models: accepted error of the force. The estimated error is part of the answer; near "
+               "adds that of the linear far field",
+               Absent{.text = "0.0001; with learn or tabulate 2"});
+    }
+  });
 }
 
-EffectSet read_effects(Table& root, const ModelInfo& model, BodyConfig& body) {
-  const toml::node& node = root.need("effects", "a list of effects");
-  const auto* list = node.as_array();
-  if (list == nullptr) root.fail(node, "effects", "expected a list of effects");
-  EffectSet listed;
-  for (const toml::node& each : *list) {
-    const auto* name = each.as_string();
-    if (name == nullptr) root.fail(each, "effects", "expected names in quotes");
-    const auto found = std::ranges::find(effects(), std::string_view(**name), &EffectInfo::name);
-    if (found == effects().end()) {
-      const std::string all = names(effects());
-      root.fail(each, "effects",
-                "unknown effect \"" + **name + "\"; expected one of " + all + did_you_mean(**name, all));
+enum class ToolKind : std::uint8_t { kPatch, kSphere, kCapsule, kBox, kMesh };
+
+template <class Table>
+void declare_tool(Table& keys, Draft& draft) {
+  Tool& tool = draft.scene.body.tool;
+  ToolKind kind{};
+  const Names<ToolKind> kinds{{{"patch", ToolKind::kPatch},
+                               {"sphere", ToolKind::kSphere},
+                               {"capsule", ToolKind::kCapsule},
+                               {"box", ToolKind::kBox},
+                               {"mesh", ToolKind::kMesh}}};
+  keys.key("tool", kind, kinds,
+           "All tools except the patch are rigid, with a contact that grows with the depth. sphere and capsule are for "
+           "condensed without friction, corotational and neo-hookean; box and mesh for the last two");
+  double radius = 0;
+  keys.key("tool_radius_mm", radius, kLengthOrZero,
+           "Radius of a sphere or a capsule, or distance at which a patch touches");
+  if (kind == ToolKind::kPatch) tool = PatchTool{radius};
+  if (kind == ToolKind::kSphere) tool = SphereTool{radius};
+  if (Table::kDocuments || kind == ToolKind::kCapsule) {
+    CapsuleTool capsule{.radius = radius, .half_length = 0};
+    double length = 0;
+    keys.key("tool_length_mm", length, kLengthOrZero,
+             "For a capsule: distance between the centres of its ends; 0 is a ball", kRequired);
+    keys.key("tool_axis", capsule.axis, kDirection, "For a capsule: direction from end to end, in the handle's frame");
+    capsule.half_length = length / 2;
+    tool = capsule;
+  }
+  if (Table::kDocuments || kind == ToolKind::kBox) {
+    BoxTool box{};
+    const bool sized = keys.key("tool_size_mm", box.size, Vector{kLength},
+                                "For a box: lengths of its edges along the handle's axes", kRequired);
+    keys.key("tool_edge_mm", box.edge, sized ? up_to(1e3 * box.size.minCoeff() / 2) : kLength,
+             "For a box: radius of its edges and corners, at most half of its shortest edge", kRequired);
+    tool = box;
+  }
+  if (Table::kDocuments || kind == ToolKind::kMesh) {
+    MeshTool mesh{};
+    declare_path(keys, "tool_file", draft, mesh.file,
+                 "For a mesh: closed surface (.stl, .obj, .off) around the tool's centre, along the handle's axes",
+                 kRequired);
+    declare_units(keys, "tool_units_per_m", mesh.scale);
+    keys.key("tool_cell_mm", mesh.cell, kLength,
+             "For a mesh: cell size of its distance grid, at most half of its thinnest part", kRequired);
+    tool = mesh;
+  }
+}
+
+template <class Table>
+void declare_touch(Table& root, Draft& draft) {
+  using Side = PatchContact::Side;
+  BodyConfig& body = draft.scene.body;
+  root.table("touch", [&](Table& keys) {
+    keys.key("from", body.towards_tool, kDirection, "Direction to the tool, in the body's frame");
+    keys.key("middle_mm", body.middle, kPoint, "Centre of the touched side. Only its place across `from` is used");
+    const bool sized = keys.key("patch_radius_mm", body.patch_radius, kLength,
+                                "Radius of the patch on which the tool presses", kRequired);
+    const bool bounded = body.near.learns() && sized;
+    keys.key("reach_mm", body.reach, bounded ? up_to(1e3 * NearConfig::kFarthest * body.patch_radius) : kLength,
+             "For condensed: maximum distance of the tool from the centre. For near with learn or tabulate: range "
+             "along each axis, at most 1.5 patch radii",
+             Absent{.required = body.near.learns(), .text = "no limit; required with learn or tabulate"});
+    declare_tool(keys, draft);
+    keys.key("tool_offset_mm", body.tool_offset, kPoint,
+             "From the handle to the tool's centre, in the handle's frame. With an offset, a capsule, a box or a mesh, "
+             "there is a torque on the handle");
+    if (Table::kDocuments || is_rigid_on_nonlinear(body)) {
+      keys.key("layer_mm", body.layer, kLength,
+               "For rigid tools on corotational and neo-hookean: thickness of the contact layer");
     }
-    if (listed.has(found->kind)) root.fail(each, "effects", "\"" + **name + "\" is listed twice");
-    listed.add(found->kind);
-    if (!model.always.has(found->kind) && !model.may.has(found->kind)) {
-      root.fail(each, "effects",
-                "the model \"" + std::string(model.name) + "\" does not simulate \"" + **name + "\", which is listed");
+    keys.key("side", body.side, Names<Side>{{{"unilateral", Side::kUnilateral}, {"bilateral", Side::kBilateral}}},
+             "Bilateral: after the first touch, the tool sticks to the body and can pull");
+    const bool can_leave_out = info(body.model).law == Law::kLinear || body.plasticity;
+    if (Table::kDocuments || (can_leave_out && is_patch(body.tool) && !body.effects.has_time())) {
+      keys.key("whole_stiffness", body.whole_stiffness, YesNo{},
+               "For a patch on linear, condensed or with plasticity, at rest: send the complete stiffness of a flat "
+               "surface, as it is always done for curved surfaces and Newton's method");
+    }
+    keys.key("table_mm", draft.scene.table, kLength,
+             "For condensed, unilateral, without friction: answers contain the force at 16 depths within this "
+             "distance, for slow networks. This costs 16 more answers",
+             Absent{.text = "no table"});
+  });
+}
+
+template <class Table>
+void declare_hands(Table& root, Scene& scene) {
+  root.tables("hands", scene.hands, kMostTables, [](Table& keys, Scene::Hand& hand) {
+    keys.key("device", hand.device, Text{"the name of a device"},
+             "Device of this hand. Two or more hands at the body, for rigid tools on corotational and neo-hookean",
+             kRequired);
+    keys.key("server", hand.server, Text{"HOST:PORT"}, "Server of this device",
+             Absent{.text = "the server of the command line"});
+    keys.key("at_mm", hand.at, kPoint, "As at_mm of [place], in the frame of this device", kRequired);
+  });
+  root.table("place", [&scene](Table& keys) {
+    if (scene.hands.empty()) {
+      keys.key("at_mm", scene.at, kPoint, "Centre of the touched side, in the frame of the device; without [[hands]]");
+    }
+    keys.key("towards_hand", scene.towards_hand, kDirection, "Direction from there to the hand, in the same frame");
+  });
+}
+
+/// The list must contain all effects that the model always simulates, and only effects that it supports.
+void check_effects(const SceneErrors& errors, const Draft& draft) {
+  const BodyConfig& body = draft.scene.body;
+  const ModelInfo& model = info(body.model);
+  const std::string of_model = "the model " + in_quotes(model.name);
+  EffectSet before;
+  for (std::size_t i = 0; i < draft.listed.size(); ++i) {
+    const EffectInfo& effect = info(draft.listed[i]);
+    const std::string name = in_quotes(effect.name);
+    const auto refuse = [&](const std::string& why) {
+      errors.blame("effects", {"effects[" + std::to_string(i) + "]"}, why);
+    };
+    if (before.has(effect.kind)) refuse(name + " is listed twice");
+    if (!model.always.has(effect.kind) && !model.may.has(effect.kind)) {
+      refuse(of_model + " does not simulate " + name + ", which is listed");
     }
     for (const EffectInfo& other : effects()) {
-      if (listed.has(other.kind) && (found->not_with.has(other.kind) || other.not_with.has(found->kind))) {
-        root.fail(each, "effects",
-                  "\"" + **name + "\" cannot be simulated together with \"" + std::string(other.name) + '"');
+      if (before.has(other.kind) && (effect.not_with.has(other.kind) || other.not_with.has(effect.kind))) {
+        refuse(name + " cannot be simulated together with " + in_quotes(other.name));
       }
     }
+    before.add(effect.kind);
   }
   for (const EffectInfo& effect : effects()) {
-    if (model.always.has(effect.kind) && !listed.has(effect.kind)) {
-      root.fail(node, "effects",
-                "the model \"" + std::string(model.name) + "\" simulates \"" + std::string(effect.name) +
-                    "\", which is not listed");
-    }
+    if (!model.always.has(effect.kind) || before.has(effect.kind)) continue;
+    errors.blame("effects", {}, of_model + " simulates " + in_quotes(effect.name) + ", which is not listed");
   }
-  // Keys are only requested if their effect is listed.
-  constexpr double kMost = 1e6;
-  EffectsConfig& config = body.effects;
-  config.inertia = listed.has(EffectKind::kInertia);
-  if (listed.has(EffectKind::kGravity)) {
-    config.gravity = root.vector("gravity_m_per_s2", kMost, 1, Vec3(0, 0, -9.81));
+  const bool strains = body.near.law == Law::kNeoHookean;
+  if (body.model != ModelKind::kNear || strains == before.has(kMaterialNonlinearity)) return;
+  errors.blame("effects", {},
+               strains
+                   ? "the law \"neo-hookean\" simulates \"material-nonlinearity\", which is not listed"
+                   : "the law does not simulate \"material-nonlinearity\", which is listed: only \"neo-hookean\" does");
+}
+
+void check_values(const SceneErrors& errors, const Draft& draft) {
+  const BodyConfig& body = draft.scene.body;
+  if (draft.lists(kCutting) && body.cuts.empty()) {
+    errors.blame("cutting", {}, "missing, expected one or more tables [[cutting]]");
   }
-  if (listed.has(EffectKind::kDamping)) config.damping = root.number("damping_per_s", 0, false, kMost, 1);
-  if (listed.has(EffectKind::kViscosity)) config.viscosity = root.number("viscosity_ms", 0, false, kMost, 1e3);
-  if (listed.has(EffectKind::kFriction)) body.friction = root.number("friction", 0, true, 10, 1);
-  if (listed.has(EffectKind::kCutting)) body.cuts = read_cuts(root);
-  if (listed.has(EffectKind::kStiffening)) body.stiffening = read_stiffening(root.table("stiffening"));
-  if (listed.has(EffectKind::kPlasticity)) body.plasticity = read_plasticity(root.table("plasticity"));
-  if (listed.has(EffectKind::kSelfCollision)) body.self_collision = read_self_collision(root.table("self-collision"));
-  if (config.has_time()) config.step = root.number("step_ms", 0, false, 1e3, 1e3);
-  return listed;
+  if (body.stiffening) errors.build("stiffening", [&] { check(*body.stiffening); });
+  const bool remembers =
+      body.model != ModelKind::kCondensed || body.side != PatchContact::Side::kUnilateral || body.friction;
+  if (draft.scene.table > 0 && remembers) {
+    errors.blame(
+        "touch.table_mm", {},
+        "expected the model condensed, unilateral and without friction, because the others depend on the past");
+  }
+  const std::vector<Scene::Hand>& hands = draft.scene.hands;
+  if (hands.size() == 1) errors.blame("hands", {}, "expected two or more; omit [[hands]] for one hand");
+  for (std::size_t i = 0; i < hands.size(); ++i) {
+    const auto same = [&](const Scene::Hand& other) {
+      return other.device == hands[i].device && other.server == hands[i].server;
+    };
+    if (std::ranges::count_if(hands, same) == 1) continue;
+    errors.blame("hands[" + std::to_string(i) + "]", {},
+                 "expected a different device for each hand, found twice " + in_quotes(hands[i].device));
+  }
 }
 
 }  // namespace
 
 Scene parse_scene(std::string_view text, const std::string& name, const std::filesystem::path& directory) {
-  toml::table parsed;
-  try {
-    parsed = toml::parse(text, name);
-  } catch (const toml::parse_error& error) {
-    std::ostringstream what;
-    what << name << ':' << error.source().begin.line << ": " << error.description();
-    throw SceneError(what.str());
-  }
-  Table root(parsed, "", name);
-  Scene scene;
-  Table model = root.table("model");
-  scene.body.model = read_model(model);
-  const ModelInfo& chosen = info(scene.body.model);
-  const EffectSet listed = read_effects(root, chosen, scene.body);
-  switch (chosen.kind) {
-    case ModelKind::kNear:
-      if (model.find("law") != nullptr) scene.body.near.law = model.choice("law", names(near_laws()), law_named);
-      check_law(root, scene.body.near.law, listed);
-      scene.body.max_iterations = model.count("max_iterations", 1000, scene.body.max_iterations);
-      scene.body.near.learn = model.flag("learn");
-      scene.body.near.tabulate = model.flag("tabulate");
-      if (scene.body.near.learns()) {
-        scene.body.tolerance = NearConfig::kErrorOfLearned;
-        if (model.find("learned_in") != nullptr) {
-          scene.body.near.learned_in = directory / model.text("learned_in", "a folder for the learned data");
-        }
-      }
-      scene.body.tolerance = model.number("error_percent", 0, false, kMaxError, 100, scene.body.tolerance);
-      break;
-    case ModelKind::kLinear:
-      if (!scene.body.plasticity) break;
-      [[fallthrough]];
-    case ModelKind::kCorotational:
-    case ModelKind::kNeoHookean:
-      scene.body.max_iterations = model.count("max_iterations", 1000, scene.body.max_iterations);
-      scene.body.tolerance = model.number("error_percent", 0, false, kMaxError, 100, scene.body.tolerance);
-      break;
-    case ModelKind::kCondensed:
-      if (model.find("table") != nullptr) {
-        scene.body.table_file = directory / model.text("table", "the path of a table from tendon-softbody condense");
-      }
-      break;
-  }
-  model.check_unknown();
-  read_body(root.table("body"), directory, scene.body);
-  if (root.find("region") != nullptr) scene.body.regions = read_regions(root);
-  read_touch(root.table("touch"), directory, scene);
-  if (root.find("hands") != nullptr) {
-    scene.hands = read_hands(root);
+  const toml::table file = parse_toml(text, name);
+  const SceneErrors errors(file, name);
+  SceneProblems problems;
+  Reader root(problems, &file, "", {});
+  Draft draft{.directory = directory};
+  declare_listed(root, draft);
+  declare_model(root, draft);
+  problems.throw_first(name);
+  check_effects(errors, draft);  // before any key is called unknown because its effect is not listed
+  declare_effects(root, draft);
+  declare_body(root, draft);
+  declare_touch(root, draft);
+  declare_hands(root, draft.scene);
+  root.refuse_unknown();
+  problems.throw_first(name);
+  check_values(errors, draft);
+  Scene& scene = draft.scene;
+  if (!scene.hands.empty()) {
     scene.body.hands = scene.hands.size();
     scene.at = scene.hands.front().at;
   }
-  if (root.find("place") != nullptr) {
-    Table place = root.table("place");
-    if (scene.hands.empty()) scene.at = place.vector("at_mm", 1e3 * kMaxLength, 1e3, Vec3(Vec3::Zero()));
-    scene.towards_hand = place.direction("towards_hand", Vec3::UnitZ());
-    place.check_unknown();
-  }
-  root.check_unknown();
-  return scene;
+  return std::move(scene);
+}
+
+std::string scene_reference() {
+  std::string text;
+  Reference root(text);
+  Draft draft;
+  declare_listed(root, draft);
+  declare_effects(root, draft);
+  declare_model(root, draft);
+  declare_body(root, draft);
+  declare_touch(root, draft);
+  declare_hands(root, draft.scene);
+  return text;
 }
 
 Scene read_scene(const std::filesystem::path& file) {

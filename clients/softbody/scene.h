@@ -3,12 +3,12 @@
 
 #include <filesystem>
 #include <iosfwd>
-#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "clients/softbody/body.h"
+#include "server/scene/scene_error.h"
 
 namespace tendon::softbody {
 
@@ -29,12 +29,6 @@ struct Scene {
 
 /// Returns the rotation from the body frame to the device frame.
 Mat3 to_device(const Scene& scene);
-
-/// An error in a scene: "FILE:LINE: KEY: expected …, found …".
-class SceneError : public std::runtime_error {
- public:
-  using std::runtime_error::runtime_error;
-};
 
 /// Reads a scene file (TOML). The effects in the file must include all effects that the model always simulates, and
 /// only effects that it supports. Throws SceneError, or std::runtime_error if the file cannot be read.

@@ -158,7 +158,7 @@ int main(int argc, char** argv) {
   if (first == "condense") {
     try {
       return condense(argc - 1, argv + 1);
-    } catch (const softbody::SceneError& error) {
+    } catch (const SceneError& error) {
       std::cerr << "tendon-softbody: " << error.what() << '\n';
       return 2;
     } catch (const std::exception& error) {
@@ -213,7 +213,7 @@ int main(int argc, char** argv) {
       std::cerr << "tendon-softbody: " << words;
     }
     return exit_code;
-  } catch (const softbody::SceneError& error) {
+  } catch (const SceneError& error) {
     std::cerr << "tendon-softbody: " << error.what() << '\n';
     return 2;
   } catch (const std::exception& error) {

@@ -191,7 +191,7 @@ int main(int argc, char** argv) {
     // `serve` has the command line of all clients.
     if (argc > 1 && std::string_view(argv[1]) == "serve") return serve(argc - 1, argv + 1);
     return run_command(argc, argv);
-  } catch (const softbody::SceneError& error) {
+  } catch (const SceneError& error) {
     std::cerr << "tendon-fem: " << error.what() << '\n';
     return 2;
   } catch (const std::exception& error) {

@@ -22,6 +22,10 @@ using testing::kGood;
 using testing::listing;
 using testing::with;
 
+const std::string kEffectNames =
+    R"("contact", "geometric-nonlinearity", "material-nonlinearity", "gravity", "inertia", "damping", "viscosity", )"
+    R"("friction", "cutting", "stiffening", "plasticity", "self-collision")";
+
 std::string refusal(const std::string& text) {
   return thrown_by<SceneError>([&] { parse_scene(text, "s.toml", "."); });
 }
@@ -57,10 +61,8 @@ TEST(SoftbodyScene, ThoseThatAreShippedMakeBodiesThatNobodyHasToBeWarnedOf) {
 
 TEST(SoftbodyScene, AnUnknownEffectIsAnErrorWithItsLine) {
   EXPECT_EQ(refusal(with("[\"contact\"]", "[\n  \"contact\",\n  \"gravitation\"]")),
-            "s.toml:3: effects: unknown effect \"gravitation\"; expected one of contact, geometric-nonlinearity, "
-            "material-nonlinearity, gravity, inertia, damping, viscosity, friction, cutting, stiffening, plasticity, "
-            "self-collision");
-  EXPECT_TRUE(refusal(with("[\"contact\"]", "[\"contcat\"]")).ends_with("self-collision; did you mean contact?"));
+            "s.toml:3: effects: expected one of " + kEffectNames + ", found \"gravitation\"");
+  EXPECT_TRUE(refusal(with("[\"contact\"]", "[\"contcat\"]")).ends_with("found \"contcat\"; did you mean contact?"));
 }
 
 TEST(SoftbodyScene, WhatIsListedIsWhatTheModelSimulatesNoMoreAndNoFewer) {
@@ -71,7 +73,7 @@ TEST(SoftbodyScene, WhatIsListedIsWhatTheModelSimulatesNoMoreAndNoFewer) {
   EXPECT_EQ(refusal(with("\"condensed\"", "\"neo-hookean\"")),
             "s.toml:1: effects: the model \"neo-hookean\" simulates \"geometric-nonlinearity\", which is not listed");
   EXPECT_EQ(refusal(with("effects = [\"contact\"]\n", "")),
-            "s.toml: effects: expected a list of effects, found nothing");
+            "s.toml: effects: missing, expected […], each one of " + kEffectNames);
 }
 
 TEST(SoftbodyScene, AnEffectsKeysAreKnownOnlyWhereItIsListed) {
@@ -89,14 +91,14 @@ TEST(SoftbodyScene, AnEffectsKeysAreKnownOnlyWhereItIsListed) {
   EXPECT_EQ(body.effects.density, 900);
   EXPECT_EQ(body.friction, 0.5);
   EXPECT_EQ(refusal(with("[body]", "friction = 0.5\n[body]")),
-            "s.toml:2: friction: unknown key; expected one of body, effects, hands, model, place, region, touch");
+            "s.toml:2: friction: unknown key; expected one of effects, model, body, region, touch, hands, place");
   EXPECT_EQ(refusal(with("[\"contact\"]", "[\"contact\", \"friction\"]")),
-            "s.toml: friction: expected a number of at least 0 and at most 10, found nothing");
+            "s.toml: friction: missing, expected a number from 0 to 10");
   EXPECT_EQ(refusal(with("[\"contact\"]", "[\"contact\",\n\"inertia\"]")),
             "s.toml:2: effects: the model \"condensed\" does not simulate \"inertia\", which is listed");
   text.replace(text.find("density_kg_per_m3 = 900, "), 25, "");
   EXPECT_EQ(refusal(text),
-            "s.toml: body.material.density_kg_per_m3: expected a number above 0 and at most 1e+06, found nothing");
+            "s.toml:12: body.material.density_kg_per_m3: missing, expected a number above 0 and up to 1000000 kg/m³");
 }
 
 TEST(SoftbodyScene, CutsAndAModulusOverTimeArrive) {
@@ -127,25 +129,26 @@ TEST(SoftbodyScene, WhatIsWrongWithACutIsNamed) {
   EXPECT_EQ(refusal(listing("linear", "[\"contact\", \"gravity\",\n\"stiffening\"]", "")),
             "s.toml:2: effects: \"stiffening\" cannot be simulated together with \"gravity\"");
   EXPECT_EQ(refusal(listing("linear", effects, "")),
-            "s.toml: cutting: expected one or more tables [[cutting]], found nothing");
+            "s.toml: cutting: missing, expected one or more tables [[cutting]]");
   EXPECT_EQ(refusal(listing("linear", "[\"contact\"]", cut + "at_s = 1\n")),
-            "s.toml:15: cutting: unknown key; expected one of body, effects, hands, model, place, region, touch");
-  EXPECT_EQ(refusal(listing("linear", effects, cut)), "s.toml:16: cutting[1].: expected either at_s or above_n");
+            "s.toml:15: cutting: unknown key; expected one of effects, model, body, region, touch, hands, place");
+  EXPECT_EQ(refusal(listing("linear", effects, cut)), "s.toml:16: cutting[0]: expected either at_s or above_n");
   EXPECT_EQ(refusal(listing("linear", effects, cut + "at_s = 1\nabove_n = 1\n")),
-            "s.toml:16: cutting[1].: expected either at_s or above_n");
+            "s.toml:16: cutting[0]: expected either at_s or above_n");
   EXPECT_EQ(refusal(listing("linear", effects, cut + "at_s = 1\n" + cut + "at_s = 1\nwidth_mm = 3\n")),
-            "s.toml:26: cutting[2].width_mm: unknown key; expected one of above_n, along_mm, at_s, corner_mm, deep_mm");
+            "s.toml:26: cutting[1].width_mm: unknown key; expected one of corner_mm, along_mm, deep_mm, at_s, above_n");
 }
 
 TEST(SoftbodyScene, WhatIsWrongWithAModulusOverTimeIsNamed) {
   const std::string effects = "[\"contact\", \"stiffening\"]";
   EXPECT_EQ(refusal(listing("condensed", effects, "[stiffening]\nat_s = [0, 1]\nfactor = [1, 0]\n")),
-            "s.toml:17: stiffening.factor: expected a list of numbers above 0");
+            "s.toml:17: stiffening.factor: expected a number above 0, found 0");
   EXPECT_EQ(refusal(listing("condensed", effects, "[stiffening]\nat_s = [1, 0]\nfactor = [1, 2]\n")),
-            "s.toml:15: stiffening.: stiffening.at: expected ascending times, one or more");
+            "s.toml:15: stiffening: stiffening.at: expected ascending times, one or more");
   EXPECT_EQ(refusal(listing("condensed", effects, "[stiffening]\nat_s = [0]\nfactor = [1]\nyoung = 3\n")),
             "s.toml:18: stiffening.young: unknown key; expected one of at_s, factor");
-  EXPECT_EQ(refusal(listing("condensed", effects, "")), "s.toml: stiffening: expected a table, found nothing");
+  EXPECT_EQ(refusal(listing("condensed", effects, "")),
+            "s.toml: stiffening.at_s: missing, expected […], each a number of 0 s or more");
 }
 
 TEST(SoftbodyScene, HowWrongAnAnswerMayBeArrivesAndIsForNewtonsMethodAlone) {
@@ -156,7 +159,8 @@ TEST(SoftbodyScene, HowWrongAnAnswerMayBeArrivesAndIsForNewtonsMethodAlone) {
   EXPECT_NEAR(parse_scene(asking("0.5"), "s.toml", ".").body.tolerance, 5e-3, 1e-15);
   EXPECT_NEAR(parse_scene(listing("corotational", effects, ""), "s.toml", ".").body.tolerance, 1e-6, 1e-18);
   for (const char* bad : {"0", "-1", "11", "true", "\"half\""}) {
-    EXPECT_EQ(refusal(asking(bad)), "s.toml:10: model.error_percent: expected a number above 0 and at most 10") << bad;
+    EXPECT_EQ(refusal(asking(bad)),
+              "s.toml:10: model.error_percent: expected a number above 0 and up to 10 %, found " + std::string(bad));
   }
   EXPECT_EQ(refusal(listing("condensed\"\nerror_percent = 1 #", "[\"contact\"]", "")),
             "s.toml:10: model.error_percent: unknown key; expected one of kind, table");
@@ -175,14 +179,14 @@ TEST(SoftbodyScene, ALawOfTheElementsNearTheToolArrivesAndFitsTheEffects) {
   EXPECT_EQ(parse_scene(near("law = \"stvk\"", rotations), "s.toml", ".").body.near.law, Law::kStVenantKirchhoff);
   EXPECT_EQ(parse_scene(near("", rotations), "s.toml", ".").body.near.law, Law::kCorotational);
   EXPECT_EQ(refusal(near("law = \"linear\"", rotations)),
-            "s.toml:10: model.law: expected one of corotational, stvk, neo-hookean, found \"linear\"");
+            "s.toml:10: model.law: expected one of \"corotational\", \"stvk\", \"neo-hookean\", found \"linear\"");
   EXPECT_EQ(refusal(near("law = \"neo-hookean\"", rotations)),
             "s.toml:1: effects: the law \"neo-hookean\" simulates \"material-nonlinearity\", which is not listed");
   EXPECT_EQ(refusal(near("law = \"stvk\"", strains)),
             "s.toml:1: effects: the law does not simulate \"material-nonlinearity\", which is listed: only "
             "\"neo-hookean\" does");
   EXPECT_EQ(refusal(listing("corotational\"\nlaw = \"stvk\" #", rotations, "")),
-            "s.toml:10: model.law: unknown key; expected one of error_percent, kind, max_iterations");
+            "s.toml:10: model.law: unknown key; expected one of kind, max_iterations, error_percent");
 }
 
 TEST(SoftbodyScene, WhatABodyIsToLearnArrivesAndWantsItsReach) {
@@ -202,13 +206,13 @@ TEST(SoftbodyScene, WhatABodyIsToLearnArrivesAndWantsItsReach) {
   EXPECT_FALSE(nothing.near.learns());
   EXPECT_EQ(nothing.tolerance, BodyConfig().tolerance);
   EXPECT_EQ(refusal(near("learn = true", "")),
-            "s.toml: touch.reach_mm: expected a number above 0 and at most 30, found nothing");
+            "s.toml:11: touch.reach_mm: missing, expected a number above 0 and up to 30 mm");
   EXPECT_EQ(refusal(near("tabulate = true", "reach_mm = 31")),
-            "s.toml:13: touch.reach_mm: expected a number above 0 and at most 30");
+            "s.toml:13: touch.reach_mm: expected a number above 0 and up to 30 mm, found 31");
   EXPECT_EQ(refusal(near("learned_in = \"kept\"", "reach_mm = 10")),
-            "s.toml:10: model.learned_in: unknown key; expected one of error_percent, kind, law, learn, "
-            "max_iterations, tabulate");
-  EXPECT_EQ(refusal(near("learn = 1", "reach_mm = 10")), "s.toml:10: model.learn: expected true or false");
+            "s.toml:10: model.learned_in: unknown key; expected one of kind, law, learn, tabulate, "
+            "max_iterations, error_percent");
+  EXPECT_EQ(refusal(near("learn = 1", "reach_mm = 10")), "s.toml:10: model.learn: expected true or false, found 1");
   EXPECT_EQ(refusal(listing("condensed\"\nlearn = true #", "[\"contact\"]", "")),
             "s.toml:10: model.learn: unknown key; expected one of kind, table");
 }
@@ -220,19 +224,19 @@ TEST(SoftbodyScene, AYieldArrivesAndWhatIsWrongWithItIsNamed) {
   ASSERT_TRUE(scene.body.plasticity);
   EXPECT_EQ(scene.body.plasticity->stress, 500);
   EXPECT_EQ(scene.body.plasticity->hardening, 2000);
-  EXPECT_NE(scene_reference().find("\n    plasticity: "), std::string::npos);
+  EXPECT_NE(scene_reference().find("\n  yield_pa\n"), std::string::npos);
   EXPECT_EQ(
       parse_scene(listing("linear\"\nmax_iterations = 7 #", "[\"contact\", \"plasticity\"]", table), "s.toml", ".")
           .body.max_iterations,
       7);
   EXPECT_EQ(refusal(listing("corotational", effects, "[plasticity]\nyield_pa = 0\nhardening_pa = 1\n")),
-            "s.toml:17: plasticity.yield_pa: expected a number above 0 and at most 1e+12");
+            "s.toml:17: plasticity.yield_pa: expected a number above 0 Pa, found 0");
   EXPECT_EQ(refusal(listing("corotational", effects, "[plasticity]\nyield_pa = 1\n")),
-            "s.toml: plasticity.hardening_pa: expected a number above 0 and at most 1e+12, found nothing");
+            "s.toml:16: plasticity.hardening_pa: missing, expected a number above 0 Pa");
   EXPECT_EQ(refusal(listing("corotational", effects, table + "creep = 1\n")),
-            "s.toml:19: plasticity.creep: unknown key; expected one of hardening_pa, yield_pa");
+            "s.toml:19: plasticity.creep: unknown key; expected one of yield_pa, hardening_pa");
   EXPECT_EQ(refusal(listing("linear", "[\"contact\"]", table)),
-            "s.toml:15: plasticity: unknown key; expected one of body, effects, hands, model, place, region, touch");
+            "s.toml:15: plasticity: unknown table; expected one of effects, model, body, region, touch, hands, place");
   for (const std::string model : {"condensed", "neo-hookean", "near"}) {
     EXPECT_EQ(refusal(listing(model, "[\"contact\",\n\"plasticity\"]", table)),
               "s.toml:2: effects: the model \"" + model + "\" does not simulate \"plasticity\", which is listed");
@@ -250,7 +254,7 @@ TEST(SoftbodyScene, ALayerBetweenTheSidesArrivesAndWhatIsWrongWithItIsNamed) {
   ASSERT_TRUE(scene.body.self_collision);
   EXPECT_NEAR(*scene.body.self_collision, 2e-4, 1e-18);
   EXPECT_EQ(refusal(listing("corotational", effects, "[self-collision]\nlayer_mm = 0\n")),
-            "s.toml:17: self-collision.layer_mm: expected a number above 0 and at most 1e+06");
+            "s.toml:17: self-collision.layer_mm: expected a number above 0 and up to 1000000 mm, found 0");
   EXPECT_EQ(refusal(listing("linear", "[\"contact\",\n\"self-collision\"]", "")),
             "s.toml:2: effects: the model \"linear\" does not simulate \"self-collision\", which is listed");
 }
@@ -260,7 +264,7 @@ TEST(SoftbodyScene, TheWholeStiffnessIsAskedForWhereAModelLeavesItOut) {
   EXPECT_FALSE(parse_scene(kGood, "s.toml", ".").body.whole_stiffness);
   EXPECT_TRUE(parse_scene(with("patch_radius_mm = 20", asked), "s.toml", ".").body.whole_stiffness);
   EXPECT_EQ(refusal(with("patch_radius_mm = 20", "patch_radius_mm = 20\nwhole_stiffness = 1")),
-            "s.toml:12: touch.whole_stiffness: expected true or false");
+            "s.toml:12: touch.whole_stiffness: expected true or false, found 1");
   std::string newton = listing("corotational", "[\"contact\", \"geometric-nonlinearity\"]", "");
   newton.replace(newton.find("patch_radius_mm = 20"), 20, asked);
   EXPECT_NE(refusal(newton).find("touch.whole_stiffness: unknown key"), std::string::npos);
@@ -268,38 +272,38 @@ TEST(SoftbodyScene, TheWholeStiffnessIsAskedForWhereAModelLeavesItOut) {
 
 TEST(SoftbodyScene, MistakesAreNamedWithLineKeyAndWhatWasExpected) {
   EXPECT_EQ(refusal(with("cells = [4, 4, 2]", "cells = [4, 4]")),
-            "s.toml:5: body.cells: expected three whole numbers from 1 to 200");
-  EXPECT_EQ(refusal(with("hex8-sri", "hex9")),
-            "s.toml:6: body.element: expected one of tet4, hex8, hex8-sri, hex20, hex27, hex27-sri, found \"hex9\"; "
-            "did you mean hex8?");
+            "s.toml:5: body.cells: expected [nx, ny, nz], each a whole number from 1 to 200, found an array of 2");
+  EXPECT_EQ(
+      refusal(with("hex8-sri", "hex9")),
+      "s.toml:6: body.element: expected one of \"tet4\", \"hex8\", \"hex8-sri\", \"hex20\", \"hex27\", \"hex27-sri\", "
+      "found \"hex9\"; did you mean hex8?");
   EXPECT_EQ(refusal(with("poisson = 0.45", "poisson = 0.5")),
-            "s.toml:7: body.material.poisson: expected a number of at least 0 and at most 0.4999");
+            "s.toml:7: body.material.poisson: expected a number from 0 to 0.4999, found 0.5");
   EXPECT_EQ(refusal(with("young_pa = 10000", "young_pa = nan")),
-            "s.toml:7: body.material.young_pa: expected a number above 0 and at most 1e+12");
+            "s.toml:7: body.material.young_pa: expected a number above 0 Pa, found nan");
   EXPECT_EQ(refusal(with("patch_radius_mm = 20", "patch_radius_m = 20")),
-            "s.toml: touch.patch_radius_mm: expected a number above 0 and at most 1e+06, found nothing");
+            "s.toml:11: touch.patch_radius_m: unknown key; patch_radius is given in mm: patch_radius_mm");
   EXPECT_EQ(refusal(with("patch_radius_mm = 20", "patch_radius_mm = 20\nfriction = 1")),
-            "s.toml:12: touch.friction: unknown key; expected one of from, middle_mm, patch_radius_mm, reach_mm, side, "
-            "table_mm, tool, tool_offset_mm, tool_radius_mm, whole_stiffness");
+            "s.toml:12: touch.friction: unknown key; expected one of from, middle_mm, patch_radius_mm, reach_mm, tool, "
+            "tool_radius_mm, tool_offset_mm, side, whole_stiffness, table_mm");
   EXPECT_EQ(refusal(with("patch_radius_mm = 20", "patch_radius_mm = 20\nside = \"bilateral\"\ntable_mm = 5")),
             "s.toml:13: touch.table_mm: expected the model condensed, unilateral and without friction, because the "
             "others depend on the past");
   EXPECT_EQ(refusal(with("[-1, 0, 0]", "[0, 0, 0]")),
-            "s.toml:14: place.towards_hand: expected a direction, found [0, 0, 0]");
-  EXPECT_EQ(refusal("x = "), "s.toml:1: Error while parsing key-value pair: encountered end-of-file");
+            "s.toml:14: place.towards_hand: expected a direction [x, y, z] other than zero, found an array of 3");
+  EXPECT_EQ(refusal("x = "), "s.toml:1: not TOML: Error while parsing key-value pair: encountered end-of-file");
   EXPECT_THROW(read_scene("/nowhere/s.toml"), std::runtime_error);
 }
 
 TEST(SoftbodyScene, AModelThatTheLabHasTakenIsAnErrorThatSaysWhereItIs) {
+  const std::string expected =
+      R"(s.toml:9: model.kind: expected one of "linear", "condensed", "corotational", "neo-hookean", "near")";
   for (const std::string model : {"stvk", "mass-spring", "projective", "modal", "tensor-mass", "tled", "xpbd"}) {
     EXPECT_EQ(refusal(listing(model, "[\"contact\"]", "")),
-              "s.toml:9: model.kind: \"" + model +
-                  "\" is only a model of the accuracy experiment (tests/tools/lab/models); expected linear, condensed, "
-                  "corotational, neo-hookean, near");
+              expected + ", found \"" + model +
+                  "\", which is only a model of the accuracy experiment (tests/tools/lab/models)");
   }
-  EXPECT_EQ(
-      refusal(listing("modul", "[\"contact\"]", "")),
-      "s.toml:9: model.kind: expected one of linear, condensed, corotational, neo-hookean, near, found \"modul\"");
+  EXPECT_EQ(refusal(listing("modul", "[\"contact\"]", "")), expected + ", found \"modul\"");
 }
 
 TEST(SoftbodyScene, SlitsAreAKeyOfAMeshFile) {
@@ -313,7 +317,20 @@ TEST(SoftbodyScene, SlitsAreAKeyOfAMeshFile) {
   EXPECT_EQ(scene("").file, "/scenes/b.msh");
   EXPECT_NE(refusal(with("shape = \"block\"", "shape = \"block\"\nslits = true")).find("body.slits: unknown key"),
             std::string::npos);
-  EXPECT_NE(scene_reference().find("\nslits = false "), std::string::npos);
+  EXPECT_NE(scene_reference().find("\n  slits\n"), std::string::npos);
+}
+
+TEST(SoftbodyScene, TheReferenceListsTheKeysWithUnitMeaningAndDefault) {
+  const std::string text = scene_reference();
+  EXPECT_NE(text.find("\n  patch_radius_mm\n"
+                      "      Radius of the patch on which the tool presses.\n"
+                      "      A number above 0 and up to 1000000 mm. Required.\n"),
+            std::string::npos)
+      << text;
+  for (const std::string key : {"effects", "step_ms", "yield_pa", "cells_up", "table", "learned_in", "tool_cell_mm",
+                                "layer_mm", "whole_stiffness", "at_mm", "towards_hand"}) {
+    EXPECT_NE(text.find("  " + key + "\n"), std::string::npos) << key;
+  }
 }
 
 TEST(SoftbodyScene, APipeOrAFolderIsNoSceneAndNoMesh) {

@@ -164,9 +164,9 @@ TEST(SoftbodyScene, RegionsArriveAndWhatIsWrongWithThemIsNamed) {
     return thrown_by<std::exception>([&] { Body(parse_scene(text, "s.toml", ".").body); });
   };
   EXPECT_EQ(refusal(testing::kGood + "[[region]]\nmiddle_mm = [0, 0, 30]\n" + material),
-            "s.toml:15: region[1].: expected either radius_mm or size_mm");
+            "s.toml:15: region[0]: expected either radius_mm or size_mm");
   EXPECT_EQ(refusal(testing::kGood + ball + "[[region]]\nmiddle_mm = [0, 0, 30]\nradius_mm = 12\n"),
-            "s.toml: region[2].material: expected a table, found nothing");
+            "s.toml:19: region[1].material.young_pa: missing, expected a number above 0 Pa");
   EXPECT_EQ(refusal(testing::kGood + "[[region]]\nmiddle_mm = [0, 0, 90]\nradius_mm = 12\n" + material),
             "region 1 has no elements: it is outside the body, smaller than an element, or covered by a later region");
 }
