@@ -74,7 +74,7 @@ Names<T> all_names(std::span<const Info> infos, T Info::*value) {
 
 template <class Info>
 std::string described(std::string text, std::span<const Info> infos) {
-  for (const Info& each : infos) text.append(". ").append(in_quotes(each.name)).append(": ").append(each.what);
+  for (const Info& each : infos) text.append("\n          ").append(each.name).append(": ").append(each.what);
   return text;
 }
 
@@ -104,7 +104,7 @@ void declare_units(Table& keys, std::string_view name, double& scale) {
 template <class Table>
 void declare_listed(Table& root, Draft& draft) {
   root.key("effects", draft.listed, ListOf<Names<EffectKind>>{all_names(effects(), &EffectInfo::kind)},
-           described("Simulated effects. All others are off, and their keys are unknown", effects()), kRequired);
+           described("Simulated effects. All others are off, and their keys are unknown:", effects()), kRequired);
 }
 
 template <class Table>
@@ -114,7 +114,8 @@ void declare_effects(Table& root, Draft& draft) {
   const auto has = [&](auto... of) { return Table::kDocuments || (draft.lists(of) || ...); };
   config.inertia = draft.lists(kInertia);
   if (has(kGravity)) {
-    root.key("gravity_m_per_s2", config.gravity.emplace(0.0, 0.0, -9.81), kPoint, "With gravity: in the body's frame");
+    root.key("gravity_m_per_s2", config.gravity.emplace(0.0, 0.0, -9.81), kPoint,
+             "With gravity: its acceleration, in the body's frame");
   }
   if (has(kDamping)) {
     root.key("damping_per_s", config.damping, up_to(1e6), "With damping: viscous drag per mass", kRequired);
@@ -201,7 +202,7 @@ void declare_body(Table& root, Draft& draft) {
         {{"block", ShapeKind::kBlock}, {"cylinder", ShapeKind::kCylinder}, {"file", ShapeKind::kFile}}};
     const bool known = keys.key("shape", kind, kinds, "Shape of the body", kRequired);
     keys.key("element", body.element, all_names(elements(), &ElementInfo::element),
-             described("Type of the elements", elements()), kRequired);
+             described("Type of the elements:", elements()), kRequired);
     if (!known || kind == ShapeKind::kBlock) {
       auto& block = body.shape.emplace<BlockShape>();
       keys.key("size_mm", block.size, Vector{kLength}, "For a block: lengths of its edges", kRequired);
@@ -253,7 +254,7 @@ void declare_model(Table& root, Draft& draft) {
   BodyConfig& body = draft.scene.body;
   root.table("model", [&](Table& keys) {
     const ModelNames kinds{all_names(models(), &ModelInfo::kind)};
-    const bool known = keys.key("kind", body.model, kinds, described("Model of the body", models()), kRequired);
+    const bool known = keys.key("kind", body.model, kinds, described("Model of the body:", models()), kRequired);
     const auto is = [&](auto... of) { return !known || ((body.model == of) || ...); };
     if (is(ModelKind::kCondensed)) {
       declare_path(keys, "table", draft, body.table_file,
