@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <functional>
 #include <limits>
 #include <map>
 #include <vector>
@@ -28,6 +29,8 @@ struct Network {
   /// Messages sent in [cut_from, cut_until) are lost.
   int cut_from = std::numeric_limits<int>::max();
   int cut_until = 0;
+  /// The periods in which the copies of a message arrive that is sent in period `now`. It replaces all other fields.
+  std::function<std::vector<int>(int now)> arrivals{};
 };
 
 /// One direction of a bad network. The time is the number of the period, which is the same at both ends.
@@ -37,6 +40,10 @@ class OneWay {
   explicit OneWay(const Network& network) : network_(network), dice_(network.seed) {}
 
   void send(int now, const Message& message) {
+    if (network_.arrivals) {
+      for (const int at : network_.arrivals(now)) under_way_.emplace(at, Parcel{sent_++, message});
+      return;
+    }
     const bool lost = dice_.chance(network_.loss);
     const int extra = static_cast<int>(dice_.within(0, network_.jitter + 1));
     if (lost || (now >= network_.cut_from && now < network_.cut_until)) return;

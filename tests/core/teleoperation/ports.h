@@ -32,6 +32,7 @@ struct PortSetup {
   std::function<Vec3(double)> path{};    ///< t, s → m: prescribed motion, forces have no effect
   double encoder_step = 0;               ///< m; 0: exact
   std::optional<Preset> preset{};        ///< of the limiter, with the velocity estimator; empty: AOL+ without parts
+  bool estimates = false;                ///< estimates the velocity as tendond does, also without a preset
   bool measures_contact = false;
   double motor = std::numeric_limits<double>::infinity();  ///< N, saturation
   bool limited = true;  ///< if false, the demand of the coupling is applied without a limiter
@@ -70,8 +71,8 @@ class Port {
     with.shared_account = true;
     if (setup.preset) {
       with.parts = preset_parts(*setup.preset, {setup.friction, with.longest_hold, setup.encoder_step}).parts;
-      estimator_.emplace(setup.encoder_step);
     }
+    if (setup.preset || setup.estimates) estimator_.emplace(setup.encoder_step);
     limiter.emplace(with);
     applied.setZero();
     speed_.setZero();

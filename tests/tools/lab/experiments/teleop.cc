@@ -8,9 +8,9 @@
 #include <stdexcept>
 #include <string>
 
-#include "tests/core/teleoperation/pressing.h"
 #include "tests/support/dice.h"
 #include "tests/support/json_line.h"
+#include "tests/tools/lab/experiments/pressing_by.h"
 #include "tests/tools/lab/pictures/gnuplot.h"
 #include "tests/tools/lab/pictures/panels.h"
 
@@ -23,26 +23,6 @@ constexpr int kRoundTrips[] = {0, 10, 20, 50, 100, 200, 400, 600};
 constexpr CouplingMethod kMethods[] = {
     CouplingMethod::kPositionPosition, CouplingMethod::kPositionForce, CouplingMethod::kWaves,
     CouplingMethod::kSurface,          CouplingMethod::kPassivity,     CouplingMethod::kSetPosition};
-
-Pressing by(CouplingMethod method) {
-  Pressing with{.method = method};
-  switch (method) {
-    case CouplingMethod::kPositionPosition:
-    case CouplingMethod::kPassivity:
-    case CouplingMethod::kSetPosition:
-    case CouplingMethod::kRate:
-      break;
-    case CouplingMethod::kWaves:
-      with.impedance = 10;
-      with.purse = false;
-      break;
-    case CouplingMethod::kPositionForce:
-    case CouplingMethod::kSurface:
-      with.stiffness = 1000;
-      break;
-  }
-  return with;
-}
 
 const char* colour_of(CouplingMethod method) {
   switch (method) {
@@ -79,7 +59,7 @@ struct Trial {
 };
 
 Trial trial(CouplingMethod method, int round_trip_ms, std::uint64_t seed) {
-  Pressing with = by(method);
+  Pressing with = pressing_by(method);
   with.one_way = round_trip_ms / 2;
   with.seed = seed;
   with.hand = Dice(seed).within(150, 600);
