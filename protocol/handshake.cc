@@ -139,7 +139,7 @@ std::size_t ClientHandshake::next_datagram(LocalTime now, std::span<std::byte, k
 
 namespace {
 
-Seed ephemerals_of(const Doorman::Config& config) {
+Seed ephemerals_of(const ServerHandshake::Config& config) {
   const Bytes32 first = crypto::hmac_sha256(config.secret, {text("tendon-ephemerals")});
   if (config.number == 0) return Seed(first);
   return Seed(crypto::hmac_sha256(first, {little_endian(std::uint64_t{config.number})}));
@@ -147,7 +147,7 @@ Seed ephemerals_of(const Doorman::Config& config) {
 
 }  // namespace
 
-Doorman::Stats& Doorman::Stats::operator+=(const Stats& more) noexcept {
+ServerHandshake::Stats& ServerHandshake::Stats::operator+=(const Stats& more) noexcept {
   retries += more.retries;
   malformed += more.malformed;
   plain += more.plain;
@@ -157,7 +157,7 @@ Doorman::Stats& Doorman::Stats::operator+=(const Stats& more) noexcept {
   return *this;
 }
 
-Doorman::Doorman(const Config& config)
+ServerHandshake::ServerHandshake(const Config& config)
     : version_min_(config.version_min),
       version_max_(config.version_max),
       suites_(config.suites),
@@ -165,9 +165,10 @@ Doorman::Doorman(const Config& config)
       cookie_secret_(crypto::hmac_sha256(config.secret, {text("tendon-cookies")})),
       ephemerals_(ephemerals_of(config)),
       limit_(first_of<16>(crypto::hmac_sha256(config.secret, {text("tendon-hello-limit")}))) {
-  if (config.key_lifetime <= Duration::zero()) throw std::invalid_argument("doorman: key_lifetime must be positive");
+  if (config.key_lifetime <= Duration::zero())
+    throw std::invalid_argument("server handshake: key_lifetime must be positive");
   if (config.version_min < 1 || config.version_min > config.version_max) {
-    throw std::invalid_argument("doorman: version_min must be at least 1 and at most version_max");
+    throw std::invalid_argument("server handshake: version_min must be at least 1 and at most version_max");
   }
   expect_speakable(suites_);
   for (const ClientKey& key : config.keys) {
@@ -179,15 +180,16 @@ Doorman::Doorman(const Config& config)
   }
 }
 
-Cookie Doorman::cookie(std::int64_t key_number, const Address& from, const ClientRandom& random) const noexcept {
+Cookie ServerHandshake::cookie(std::int64_t key_number, const Address& from,
+                               const ClientRandom& random) const noexcept {
   const Key key(crypto::hmac_sha256(
       cookie_secret_.bytes(), {text("tendon-cookie-key"), little_endian(static_cast<std::uint64_t>(key_number))}));
   return first_of<sizeof(Cookie)>(crypto::hmac_sha256(
       key.bytes(), {text("tendon-cookie"), std::as_bytes(std::span(from.ip)), little_endian(from.port), random}));
 }
 
-Doorman::Reply Doorman::receive(LocalTime now, const Address& from, std::span<const std::byte> datagram,
-                                std::span<std::byte, kMaxDatagram> answer) {
+ServerHandshake::Reply ServerHandshake::receive(LocalTime now, const Address& from, std::span<const std::byte> datagram,
+                                                std::span<std::byte, kMaxDatagram> answer) {
   const auto hello = decode_hello(datagram);
   if (!hello) {
     ++stats_.malformed;
@@ -215,7 +217,7 @@ Doorman::Reply Doorman::receive(LocalTime now, const Address& from, std::span<co
   return reply;
 }
 
-bool Doorman::read(const HelloDatagram& datagram, Guest& guest) {
+bool ServerHandshake::read(const HelloDatagram& datagram, Guest& guest) {
   std::span<const std::byte> body = datagram.body;
   if (datagram.suite == Suite::kNoise) {
     KeyId id;
@@ -249,7 +251,7 @@ bool Doorman::read(const HelloDatagram& datagram, Guest& guest) {
   return true;
 }
 
-std::optional<Suite> Doorman::suite_for(const Guest& guest) const noexcept {
+std::optional<Suite> ServerHandshake::suite_for(const Guest& guest) const noexcept {
   if (!guest.noise) return Suite::kPlain;
   for (const NamedSuite& one : kSealedSuites) {
     const bool theirs = one.suite == Suite::kNoise || names_aes(guest.hello.features);
@@ -258,8 +260,8 @@ std::optional<Suite> Doorman::suite_for(const Guest& guest) const noexcept {
   return std::nullopt;
 }
 
-Doorman::Answered Doorman::answer(const Guest& guest, std::uint32_t connection_id, const Answer& body,
-                                  std::span<std::byte, kMaxDatagram> buffer) {
+ServerHandshake::Answered ServerHandshake::answer(const Guest& guest, std::uint32_t connection_id, const Answer& body,
+                                                  std::span<std::byte, kMaxDatagram> buffer) {
   std::vector<std::byte> bytes = write_body(body);
   AnswerDatagram datagram{.suite = guest.noise ? Suite::kNoise : Suite::kPlain,
                           .connection_id = connection_id,
@@ -280,16 +282,16 @@ Doorman::Answered Doorman::answer(const Guest& guest, std::uint32_t connection_i
   return answered;
 }
 
-Doorman::Answered Doorman::welcome(const Guest& guest, std::uint32_t connection_id, const Welcome& welcome,
-                                   std::span<std::byte, kMaxDatagram> buffer) {
+ServerHandshake::Answered ServerHandshake::welcome(const Guest& guest, std::uint32_t connection_id,
+                                                   const Welcome& welcome, std::span<std::byte, kMaxDatagram> buffer) {
   Welcome whole = welcome;
   // first, so that it is never truncated
   if (guest.suite == Suite::kAesGcm) whole.features.emplace(whole.features.begin(), kFeatureAesGcm);
   return answer(guest, connection_id, whole, buffer);
 }
 
-Doorman::Answered Doorman::refuse(const Guest& guest, const Refused& refused,
-                                  std::span<std::byte, kMaxDatagram> buffer) {
+ServerHandshake::Answered ServerHandshake::refuse(const Guest& guest, const Refused& refused,
+                                                  std::span<std::byte, kMaxDatagram> buffer) {
   return answer(guest, 0, refused, buffer);
 }
 

@@ -89,7 +89,7 @@ class ClientHandshake {
 ///
 /// Cookies of the keys n and n − 1 are valid, so a cookie can be used for one to two key lifetimes and keys are not
 /// stored. The rate limit and the client's key are checked only if the cookie is valid. All failures are silent.
-class Doorman {
+class ServerHandshake {
  public:
   struct Config {
     /// Random bytes drawn at startup, from which all cookie keys and ephemeral keys are derived. Must be erased after
@@ -139,10 +139,10 @@ class Doorman {
   /// Throws std::invalid_argument if `key_lifetime` is not positive, the version range is empty, two clients have the
   /// same key, or this processor does not support one of the suites. Throws std::runtime_error if libsodium cannot be
   /// initialized.
-  explicit Doorman(const Config& config);
+  explicit ServerHandshake(const Config& config);
   // A Guest points into `keys_`.
-  Doorman(const Doorman&) = delete;
-  Doorman& operator=(const Doorman&) = delete;
+  ServerHandshake(const ServerHandshake&) = delete;
+  ServerHandshake& operator=(const ServerHandshake&) = delete;
 
   /// Handles a Hello. Writes a Retry into `answer` or returns a guest.
   Reply receive(LocalTime now, const Address& from, std::span<const std::byte> datagram,

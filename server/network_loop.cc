@@ -45,7 +45,8 @@ NetworkLoop::NetworkLoop(const Config& config, Link& link, LocalTime now)
       sieve_(config.recorded),
       devices_(served_devices(config.devices, config.shard)),
       first_device_(config.shard.first_device(config.devices.size())),
-      doorman_({.secret = config.secret, .keys = config.keys, .suites = config.suites, .number = config.shard.number}),
+      handshake_(
+          {.secret = config.secret, .keys = config.keys, .suites = config.suites, .number = config.shard.number}),
       admission_(
           {.keys = config.keys.size(), .needs_no_key = config.needs_no_key, .max_observers = config.max_observers}),
       next_connection_id_(config.first_connection_id / config.shard.of * config.shard.of + config.shard.number) {
@@ -143,9 +144,9 @@ void NetworkLoop::receive(LocalTime now, const Address& from, std::span<const st
 
 void NetworkLoop::greet(LocalTime now, const Address& from, std::span<const std::byte> datagram) {
   std::array<std::byte, kMaxDatagram> answer;
-  const std::uint64_t unknown_keys = doorman_.stats().unknown_key;
-  const Doorman::Reply reply = doorman_.receive(now, from, datagram, answer);
-  if (doorman_.stats().unknown_key > unknown_keys) note_unknown_key(notices_, from);
+  const std::uint64_t unknown_keys = handshake_.stats().unknown_key;
+  const ServerHandshake::Reply reply = handshake_.receive(now, from, datagram, answer);
+  if (handshake_.stats().unknown_key > unknown_keys) note_unknown_key(notices_, from);
   const DatagramSieve::Sender sender = reply.guest ? sender_of(*reply.guest, from) : kStranger;
   tap(now, DatagramRecord::Direction::kIn, sender, from, datagram, datagram.size());
   if (reply.guest) return admit(now, from, *reply.guest, datagram);
@@ -154,19 +155,19 @@ void NetworkLoop::greet(LocalTime now, const Address& from, std::span<const std:
 
 void NetworkLoop::receive_foreign(LocalTime now, const Address& from, std::span<const std::byte> hello) {
   std::array<std::byte, kMaxDatagram> answer;
-  const Doorman::Reply reply = doorman_.receive(now, from, hello, answer);
+  const ServerHandshake::Reply reply = handshake_.receive(now, from, hello, answer);
   if (reply.guest) admit(now, from, *reply.guest, hello);  // otherwise its cookie has expired
 }
 
 /// If keys are configured, a client without a key counts as a stranger, unless it does not need one.
-DatagramSieve::Sender NetworkLoop::sender_of(const Doorman::Guest& guest, const Address& from) const {
+DatagramSieve::Sender NetworkLoop::sender_of(const ServerHandshake::Guest& guest, const Address& from) const {
   const bool let_in = config_.keys.empty() || (config_.needs_no_key != nullptr && config_.needs_no_key(from));
   return guest.key != nullptr || let_in ? kGuest : kStranger;
 }
 
 /// Repeats the answer if the first one was lost. In suite 1 the request may come from any address, because only the
 /// holder of the ephemeral key can use the answer.
-bool NetworkLoop::answer_again(LocalTime now, const Address& from, const Doorman::Guest& guest) {
+bool NetworkLoop::answer_again(LocalTime now, const Address& from, const ServerHandshake::Guest& guest) {
   for (const auto* list : {&guests_, &half_open_}) {
     for (const Guest& present : *list) {
       if (present.random != guest.random || present.key != guest.key || present.gone) continue;
@@ -178,12 +179,12 @@ bool NetworkLoop::answer_again(LocalTime now, const Address& from, const Doorman
   return false;
 }
 
-void NetworkLoop::refuse(LocalTime now, const Address& from, const Doorman::Guest& guest, Refusal refusal) {
+void NetworkLoop::refuse(LocalTime now, const Address& from, const ServerHandshake::Guest& guest, Refusal refusal) {
   std::array<std::byte, kMaxDatagram> answer;
   ++stats_.refused;
   notice(true, "refused \"" + guest.hello.name + "\" at " + to_string(from) + ": " + refusal.reason);
   const Refused refused{refusal.code, std::move(refusal.reason), kProtocolVersion, kProtocolVersion};
-  const auto size = doorman_.refuse(guest, refused, answer).size;
+  const auto size = handshake_.refuse(guest, refused, answer).size;
   send(now, sender_of(guest, from), from, std::span(answer).first(size));
 }
 
@@ -193,7 +194,7 @@ std::uint32_t NetworkLoop::take_connection_id() {
   return std::exchange(next_connection_id_, next_connection_id_ + config_.shard.of);
 }
 
-void NetworkLoop::admit(LocalTime now, const Address& from, const Doorman::Guest& guest,
+void NetworkLoop::admit(LocalTime now, const Address& from, const ServerHandshake::Guest& guest,
                         std::span<const std::byte> hello) {
   if (answer_again(now, from, guest)) return;
   if (guest.version == 0) return refuse(now, from, guest, {Code::kUnsupported, "no common protocol version"});
@@ -226,7 +227,7 @@ void NetworkLoop::admit(LocalTime now, const Address& from, const Doorman::Guest
   welcome.timeout = session.timeout;
   welcome.server = config_.server_name;
   std::array<std::byte, kMaxDatagram> answer;
-  const Doorman::Answered answered = doorman_.welcome(guest, session.connection_id, welcome, answer);
+  const ServerHandshake::Answered answered = handshake_.welcome(guest, session.connection_id, welcome, answer);
   if (answered.size == 0) return;
   const auto bytes = std::span(answer).first(answered.size);
   send(now, sender_of(guest, from), from, bytes);
@@ -533,7 +534,7 @@ void NetworkLoop::close(LocalTime now) {
 
 NetworkStats NetworkLoop::stats() const {
   NetworkStats stats = stats_;
-  stats.hellos = doorman_.stats();
+  stats.hellos = handshake_.stats();
   for (const ServedDevice& device : devices_) stats.add(device, guests_);
   for (const Guest& guest : guests_) stats.add(guest);
   return stats;

@@ -133,10 +133,10 @@ class NetworkLoop {
   bool drain(LocalTime& now);  ///< `now` is updated
   void receive(LocalTime now, const Address& from, std::span<const std::byte> datagram);
   void greet(LocalTime now, const Address& from, std::span<const std::byte> datagram);
-  void admit(LocalTime now, const Address& from, const Doorman::Guest& guest, std::span<const std::byte> hello);
+  void admit(LocalTime now, const Address& from, const ServerHandshake::Guest& guest, std::span<const std::byte> hello);
   std::uint32_t take_connection_id();
-  bool answer_again(LocalTime now, const Address& from, const Doorman::Guest& guest);
-  void refuse(LocalTime now, const Address& from, const Doorman::Guest& guest, Refusal refusal);
+  bool answer_again(LocalTime now, const Address& from, const ServerHandshake::Guest& guest);
+  void refuse(LocalTime now, const Address& from, const ServerHandshake::Guest& guest, Refusal refusal);
   void open(LocalTime now, Guest guest);
   void take_events(LocalTime now, Guest& guest);
   void take_force(LocalTime now, Guest& guest, const ForceCommand& command);
@@ -153,7 +153,7 @@ class NetworkLoop {
   void measure(LocalTime now, Guest& guest);
   void adapt(LocalTime now, Guest& guest);
   void report(LocalTime now);
-  DatagramSieve::Sender sender_of(const Doorman::Guest& guest, const Address& from) const;
+  DatagramSieve::Sender sender_of(const ServerHandshake::Guest& guest, const Address& from) const;
   void send(LocalTime now, DatagramSieve::Sender partner, const Address& to, std::span<const std::byte> datagram);
   void tap(LocalTime now, DatagramRecord::Direction direction, DatagramSieve::Sender partner, const Address& peer,
            std::span<const std::byte> datagram, std::size_t size);
@@ -172,7 +172,7 @@ class NetworkLoop {
   std::vector<ServedDevice> devices_;
   std::size_t first_device_;
   std::vector<NewestState> states_;
-  Doorman doorman_;
+  ServerHandshake handshake_;
   Admission admission_;
   Leases leases_{devices_};
   Reports reports_;

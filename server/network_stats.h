@@ -44,7 +44,7 @@ struct NetworkStats {
   std::uint64_t half_open_forgotten = 0;
   std::uint64_t malformed = 0;           ///< the size or the header is invalid
   std::uint64_t unknown_connection = 0;  ///< Data with an unknown connection id or the wrong address
-  Doorman::Stats hellos;                 ///< Hellos that were not answered with a Welcome or a Refused
+  ServerHandshake::Stats hellos;         ///< Hellos that were not answered with a Welcome or a Refused
   std::uint64_t forces = 0;
   /// Forces and requests that need a channel, from clients that do not hold it. Includes torques and grip forces from
   /// clients without the feature `handle`.

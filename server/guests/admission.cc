@@ -141,7 +141,7 @@ std::optional<Refusal> Admission::reason_to_refuse(const Address& from, const Cl
   return std::nullopt;
 }
 
-Welcome Admission::welcome_for(const Doorman::Guest& guest, const Address& from, const std::vector<Seat>& seats,
+Welcome Admission::welcome_for(const ServerHandshake::Guest& guest, const Address& from, const std::vector<Seat>& seats,
                                const std::vector<ServedDevice>& devices, const std::vector<Guest>& guests) {
   Welcome welcome;
   welcome.version = guest.version;

@@ -46,7 +46,7 @@ class Admission {
   static bool takes_the_place_of(const Guest& present, const Address& from, const ClientKey* key,
                                  const std::vector<Seat>& seats);
 
-  static Welcome welcome_for(const Doorman::Guest& guest, const Address& from, const std::vector<Seat>& seats,
+  static Welcome welcome_for(const ServerHandshake::Guest& guest, const Address& from, const std::vector<Seat>& seats,
                              const std::vector<ServedDevice>& devices, const std::vector<Guest>& guests);
 
   static std::vector<View> views_of(const std::vector<Seat>& seats);

@@ -18,8 +18,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const ClientKey key{.name = "a", .role = Role::kController, .key = random.next()};
   const Suites all = suites_of_this_machine();
   // The second server supports only the first suite; both share the cookie secret.
-  Doorman every({.keys = {key}, .suites = all});
-  Doorman strict({.keys = {key}, .suites = {all.front()}});
+  ServerHandshake every({.keys = {key}, .suites = all});
+  ServerHandshake strict({.keys = {key}, .suites = {all.front()}});
   const auto client_of = [&](const Suites& suites) {
     ClientHandshake::Config config;
     config.hello = {.role = Role::kController, .name = "a", .features = {}};
@@ -50,7 +50,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     const bool sealed = choice % 2 == 1;
     const std::size_t which = sealed ? (choice & 4U ? 2 : 1) : 0;
     ClientHandshake& client = clients[which];
-    Doorman& door = choice & 8U ? strict : every;
+    ServerHandshake& door = choice & 8U ? strict : every;
     const Address& from = choice & 2U ? here : there;
     now += std::chrono::milliseconds(input.byte());
     client.tick(now);
@@ -69,7 +69,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       welcome.loop_hz = 1000;
       welcome.timeout = std::chrono::seconds(1);
       fuzz::require(reply.guest->suite.has_value() || (&door == &strict && which == 1));
-      const Doorman::Answered answered =
+      const ServerHandshake::Answered answered =
           reply.guest->suite ? door.welcome(*reply.guest, 1, welcome, answer) : door.refuse(*reply.guest, {}, answer);
       its = answered.keys;
       length = answered.size;

@@ -32,8 +32,8 @@ class Handshake : public ::testing::Test {
     config.random = examples::random();
     return config;
   }
-  static Doorman::Config door_config() {
-    Doorman::Config config;
+  static ServerHandshake::Config door_config() {
+    ServerHandshake::Config config;
     config.secret.fill(std::byte{0x5A});
     return config;
   }
@@ -42,7 +42,7 @@ class Handshake : public ::testing::Test {
     const std::size_t size = client.next_datagram(now_, buffer_);
     return {buffer_.begin(), buffer_.begin() + static_cast<std::ptrdiff_t>(size)};
   }
-  Doorman::Reply knock(const Bytes& datagram) { return z_->receive(now_, from_, datagram, answer_); }
+  ServerHandshake::Reply knock(const Bytes& datagram) { return z_->receive(now_, from_, datagram, answer_); }
   Bytes answer(std::size_t size) const {
     return {answer_.begin(), answer_.begin() + static_cast<std::ptrdiff_t>(size)};
   }
@@ -59,7 +59,7 @@ class Handshake : public ::testing::Test {
   Address from_ = address(1, 4000);
   Buffer buffer_{};
   Buffer answer_{};
-  std::optional<Doorman> z_{std::in_place, door_config()};
+  std::optional<ServerHandshake> z_{std::in_place, door_config()};
   ClientHandshake a_{client_config(), now_};
 };
 
@@ -120,11 +120,11 @@ TEST_F(Handshake, ACookieIsForOneAddressOnePortOneAttemptAndEachDoorOfOneServer)
   Bytes other_attempt = good;
   other_attempt[kHeaderSize] ^= std::byte{1};  // part of the client's random
   EXPECT_FALSE(knock(other_attempt).guest.has_value());
-  Doorman::Config config = door_config();
+  ServerHandshake::Config config = door_config();
   config.number = 1;
-  EXPECT_TRUE(Doorman(config).receive(now_, from_, good, answer_).guest.has_value());
+  EXPECT_TRUE(ServerHandshake(config).receive(now_, from_, good, answer_).guest.has_value());
   config.secret[31] = std::byte{0};
-  EXPECT_FALSE(Doorman(config).receive(now_, from_, good, answer_).guest.has_value()) << "another server";
+  EXPECT_FALSE(ServerHandshake(config).receive(now_, from_, good, answer_).guest.has_value()) << "another server";
 }
 
 TEST_F(Handshake, ACookieLivesOneKeyLifetimeAndNoLongerThanTwo) {
@@ -166,7 +166,7 @@ TEST_F(Handshake, TheHighestCommonVersionIsChosen) {
   };
   for (const Case& c : {Case{1, 1, 1, 1, 1}, Case{1, 3, 1, 2, 2}, Case{2, 9, 1, 5, 5}, Case{1, 2, 2, 7, 2},
                         Case{2, 3, 1, 1, 0}, Case{1, 1, 2, 3, 0}}) {
-    Doorman::Config door = door_config();
+    ServerHandshake::Config door = door_config();
     door.version_min = c.server_min;
     door.version_max = c.server_max;
     z_.emplace(door);
@@ -272,12 +272,12 @@ TEST_F(Handshake, ARefusalFitsADatagramHoweverMuchItHasToSay) {
 }
 
 TEST_F(Handshake, ImpossibleSettingsAreRefusedAtOnce) {
-  Doorman::Config config = door_config();
+  ServerHandshake::Config config = door_config();
   config.key_lifetime = Duration{};
-  EXPECT_THROW(Doorman{config}, std::invalid_argument);
+  EXPECT_THROW(ServerHandshake{config}, std::invalid_argument);
   config = door_config();
   config.version_min = 2;
-  EXPECT_THROW(Doorman{config}, std::invalid_argument);
+  EXPECT_THROW(ServerHandshake{config}, std::invalid_argument);
 }
 
 }  // namespace

@@ -80,7 +80,7 @@ bool take_everywhere(const Bytes& datagram) {
   ClientHandshake client({.hello = examples::hello(), .random = examples::random()}, LocalTime{});
   client.receive(LocalTime{}, datagram);
   client.next_datagram(LocalTime{}, buffer);
-  Doorman door({});
+  ServerHandshake door({});
   const auto reply = door.receive(LocalTime{}, parse_address("127.0.0.1:4000"), datagram, buffer);
   EXPECT_LE(reply.size, datagram.size());
   EXPECT_EQ(door.stats().malformed == 1, reply.size == 0 && !reply.guest);

@@ -96,7 +96,7 @@ void Server::say_bye(LocalTime now, Code code) {
 
 void Server::hello(LocalTime now, const Address& from, std::span<const std::byte> datagram) {
   std::array<std::byte, kMaxDatagram> buffer{};
-  const Doorman::Reply reply = doorman_.receive(now, from, datagram, buffer);
+  const ServerHandshake::Reply reply = handshake_.receive(now, from, datagram, buffer);
   const auto send = [&](std::size_t size) {
     if (size > 0) link_.send(from, std::span<const std::byte>(buffer).first(size));
   };
@@ -116,7 +116,7 @@ void Server::hello(LocalTime now, const Address& from, std::span<const std::byte
     }
   }
   if (refusal) {
-    send(doorman_.refuse(*reply.guest, *refusal, buffer).size);
+    send(handshake_.refuse(*reply.guest, *refusal, buffer).size);
     return;
   }
   Welcome welcome;
@@ -128,7 +128,7 @@ void Server::hello(LocalTime now, const Address& from, std::span<const std::byte
   welcome.loop_hz = kLoopHz;
   welcome.timeout = std::chrono::seconds(2);
   welcome.server = "Z";
-  send(doorman_.welcome(*reply.guest, connection_id_, welcome, buffer).size);
+  send(handshake_.welcome(*reply.guest, connection_id_, welcome, buffer).size);
 }
 
 void Server::flush(LocalTime now) {

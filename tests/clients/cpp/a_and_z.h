@@ -83,7 +83,7 @@ class Port : public Link {
 /// Z serves one client at a time, the newest. The simulated hand moves along a known path.
 class Server {
  public:
-  Server(Link& link, std::uint8_t secret) : link_(link), doorman_(doorman_config(secret)) {}
+  Server(Link& link, std::uint8_t secret) : link_(link), handshake_(handshake_config(secret)) {}
 
   LocalTime turn(LocalTime now);
   static Vec3 position(std::uint64_t tick) { return {1e-3 * static_cast<double>(tick), 0, -1}; }
@@ -109,8 +109,8 @@ class Server {
   std::uint64_t tick = 0;
 
  private:
-  static Doorman::Config doorman_config(std::uint8_t secret) {
-    Doorman::Config config;
+  static ServerHandshake::Config handshake_config(std::uint8_t secret) {
+    ServerHandshake::Config config;
     config.secret.fill(std::byte{secret});
     return config;
   }
@@ -119,7 +119,7 @@ class Server {
   void flush(LocalTime now);
 
   Link& link_;
-  Doorman doorman_;
+  ServerHandshake handshake_;
   std::optional<Session> session_;
   Address guest_;
   std::optional<std::array<std::byte, 16>> attempt_;

@@ -37,15 +37,15 @@ class SealedHandshake : public ::testing::Test {
     config.secret = {.key = key_.key, .ephemeral = secrets_.next()};
     return config;
   }
-  Doorman::Config door_config() {
-    Doorman::Config config;
+  ServerHandshake::Config door_config() {
+    ServerHandshake::Config config;
     config.secret.fill(std::byte{0x5A});
     config.keys = {key_, {.name = "screen", .role = Role::kObserver, .key = secrets_.next()}};
     return config;
   }
 
   Bytes said_by(ClientHandshake& client) { return first(buffer_, client.next_datagram(now_, buffer_)); }
-  Doorman::Reply knock(const Bytes& datagram) { return z_.receive(now_, from_, datagram, answer_); }
+  ServerHandshake::Reply knock(const Bytes& datagram) { return z_.receive(now_, from_, datagram, answer_); }
   Bytes reply_to(const Bytes& datagram) { return first(answer_, knock(datagram).size); }
 
   /// Returns a Hello with a cookie valid for `from_`.
@@ -64,7 +64,7 @@ class SealedHandshake : public ::testing::Test {
   Address from_ = parse_address("192.0.2.1:4000");
   Buffer buffer_{};
   Buffer answer_{};
-  Doorman z_{door_config()};
+  ServerHandshake z_{door_config()};
   ClientHandshake a_{client_config(), now_};
 };
 
@@ -264,9 +264,9 @@ class TwoSuites : public SealedHandshake {
     ClientHandshake::Config config = client_config();
     config.suites = client_suites;
     ClientHandshake client(config, now_);
-    Doorman::Config door = door_config();
+    ServerHandshake::Config door = door_config();
     door.suites = door_suites;
-    Doorman z(door);
+    ServerHandshake z(door);
     const auto said = [&] { return first(buffer_, client.next_datagram(now_, buffer_)); };
     client.receive(now_, first(answer_, z.receive(now_, from_, said(), answer_).size));
     Bytes hello = said();
@@ -371,8 +371,8 @@ TEST_F(TwoSuites, TheChoiceIsThereHoweverManyFeaturesThereAre) {
 }
 
 TEST_F(TwoSuites, InTheClearThereIsNothingToChoose) {
-  Doorman::Config config = door_config();
-  Doorman z(config);
+  ServerHandshake::Config config = door_config();
+  ServerHandshake z(config);
   Hello hello = examples::hello();
   hello.features.emplace_back(kFeatureAesGcm);
   ClientHandshake client({.hello = hello, .suites = kNew}, now_);
@@ -390,21 +390,21 @@ TEST_F(TwoSuites, InTheClearThereIsNothingToChoose) {
 
 TEST(SealedSuites, AreRefusedWhereTheyCannotBeSpoken) {
   for (const Suites& suites : {Suites{}, Suites{Suite::kPlain}}) {
-    Doorman::Config config;
+    ServerHandshake::Config config;
     config.suites = suites;
-    EXPECT_THROW(Doorman{config}, std::invalid_argument);
+    EXPECT_THROW(ServerHandshake{config}, std::invalid_argument);
   }
   EXPECT_EQ(contains(suites_of_this_machine(), Suite::kAesGcm), crypto::has_aes());
   if (crypto::has_aes()) return;
-  Doorman::Config config;
+  ServerHandshake::Config config;
   config.suites = all_suites();
-  EXPECT_THROW(Doorman{config}, std::invalid_argument);
+  EXPECT_THROW(ServerHandshake{config}, std::invalid_argument);
 }
 
 TEST_F(SealedHandshake, TwoClientsWithOneKeyAreAMistakeThatIsToldAtOnce) {
-  Doorman::Config config = door_config();
+  ServerHandshake::Config config = door_config();
   config.keys.push_back({.name = "copy", .role = Role::kController, .key = key_.key});
-  EXPECT_EQ(thrown_by([&] { Doorman door(config); }),
+  EXPECT_EQ(thrown_by([&] { ServerHandshake door(config); }),
             "the clients \"wall\" and \"copy\" have the same key: expected a different key for each client");
 }
 
