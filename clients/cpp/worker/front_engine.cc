@@ -26,13 +26,13 @@ std::string secret_from_system() {
 }  // namespace
 
 FrontEngine::FrontEngine(const Config& config, LocalTime now, std::ostream& says)
-    : name_(config.name), says_(says), front_(config.front, now), crew_(config.crew) {}
+    : name_(config.name), says_(says), front_(config.front, now), process_(config.process) {}
 
 void FrontEngine::see(LocalTime /*now*/, const Seen& seen) { front_.see(seen); }
 
 std::optional<Reply> FrontEngine::turn(LocalTime now) {
   for (;;) {
-    if (const auto event = crew_.next()) {
+    if (const auto event = process_.next()) {
       take(now, *event);
     } else if (const auto order = front_.turn(now)) {
       if (auto answer = carry_out(now, *order)) return answer;
@@ -42,11 +42,11 @@ std::optional<Reply> FrontEngine::turn(LocalTime now) {
   }
 }
 
-void FrontEngine::take(LocalTime now, const Crew::Event& event) {
-  if (std::holds_alternative<Crew::Opened>(event)) {
+void FrontEngine::take(LocalTime now, const WorkerProcess::Event& event) {
+  if (std::holds_alternative<WorkerProcess::Opened>(event)) {
     front_.opened();
     say("worker " + std::to_string(front_.stats().launches) + " is ready");
-  } else if (const auto* ended = std::get_if<Crew::Ended>(&event)) {
+  } else if (const auto* ended = std::get_if<WorkerProcess::Ended>(&event)) {
     front_.ended(now, ended->why);
   } else {
     const auto answer = codec_.read_answer(std::get<Record>(event), question_.sequence, question_.hand);
@@ -62,15 +62,15 @@ std::optional<Reply> FrontEngine::carry_out(LocalTime now, const Front::Order& o
   if (const auto* answer = std::get_if<Reply>(&order)) return *answer;
   if (const auto* ask = std::get_if<Front::Ask>(&order)) {
     question_ = *ask;
-    crew_.send(codec_.state(ask->sequence, ask->hand));
+    process_.send(codec_.state(ask->sequence, ask->hand));
   } else if (const auto* give_up = std::get_if<Front::GiveUp>(&order)) {
-    crew_.kill();
+    process_.kill();
     const auto wait = std::chrono::duration<double>(front_.next_turn() - now).count();
     says_ << name_ << ": worker " << front_.stats().launches << " was stopped: " << give_up->why
           << "; the next one starts in " << wait << " s\n"
           << std::flush;
   } else {
-    crew_.launch(secret_from_system());
+    process_.launch(secret_from_system());
   }
   return std::nullopt;
 }

@@ -6,8 +6,8 @@
 #include <string>
 
 #include "clients/cpp/run.h"
-#include "clients/cpp/worker/crew.h"
 #include "clients/cpp/worker/front.h"
+#include "clients/cpp/worker/worker_process.h"
 
 namespace tendon::worker {
 
@@ -20,29 +20,29 @@ class FrontEngine : public Elsewhere {
   struct Config {
     std::string name;  ///< program name, prefix of the messages
     Front::Config front{};
-    Crew::Config crew;
+    WorkerProcess::Config process;
   };
 
-  /// `says` receives a message for each change of the worker and must outlive this object. Throws as Front and Crew
-  /// do.
+  /// `says` receives a message for each change of the worker and must outlive this object. Throws as Front and
+  /// WorkerProcess do.
   FrontEngine(const Config& config, LocalTime now, std::ostream& says);
 
   void see(LocalTime now, const Seen& seen) override;
   std::optional<Reply> turn(LocalTime now) override;
   LocalTime next_turn() const override { return front_.next_turn(); }
-  int descriptor() const override { return crew_.descriptor(); }
+  int descriptor() const override { return process_.descriptor(); }
 
   Front::Stats stats() const { return front_.stats(); }
 
  private:
-  void take(LocalTime now, const Crew::Event& event);
+  void take(LocalTime now, const WorkerProcess::Event& event);
   std::optional<Reply> carry_out(LocalTime now, const Front::Order& order);
   void say(const std::string& text);
 
   std::string name_;
   std::ostream& says_;
   Front front_;
-  Crew crew_;
+  WorkerProcess process_;
   Codec codec_;
   Front::Ask question_{};
   std::string_view refused_{};

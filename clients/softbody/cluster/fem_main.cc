@@ -76,7 +76,7 @@ int serve(int argc, char** argv) {
   line.add("--worker", program, "COMMAND", "Program of the worker. Default: tendon-fem-worker");
   line.add("--fallback", fallback, "FILE",
            "Table from tendon-fem condense, which is used while no worker is available");
-  line.add("--listen", config.crew.listen, "HOST:PORT",
+  line.add("--listen", config.process.listen, "HOST:PORT",
            "Address for workers on other machines (TCP, not encrypted). Default: a Unix socket");
   line.add("--deadline-ms", deadline_ms,
            "Maximum age of an answer, ms; later answers are not sent. 0: three times the median with a force, at least "
@@ -88,7 +88,7 @@ int serve(int argc, char** argv) {
   if (const auto exit_code = line.parse(argc, argv)) return *exit_code;
 
   config.name = "tendon-fem";
-  config.crew.command =
+  config.process.command =
       launch + (launch.empty() ? "" : " ") + (program.empty() ? own_worker() : program) + " " + shell_word(scene);
   config.front.deadline = from_milliseconds(deadline_ms);
   config.front.dead = from_milliseconds(dead_ms);

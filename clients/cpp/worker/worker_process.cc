@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "clients/cpp/worker/crew.h"
+#include "clients/cpp/worker/worker_process.h"
 
 #include <fcntl.h>
 #include <netinet/in.h>
@@ -156,7 +156,7 @@ std::string in_words(int status) {
 
 }  // namespace
 
-struct Crew::Files {
+struct WorkerProcess::Files {
   struct Stranger {
     File file;
     RecordReader reader{};
@@ -178,7 +178,7 @@ struct Crew::Files {
   }
 };
 
-Crew::Crew(const Config& config) : config_(config), files_(std::make_unique<Files>()) {
+WorkerProcess::WorkerProcess(const Config& config) : config_(config), files_(std::make_unique<Files>()) {
   if (::prctl(PR_SET_CHILD_SUBREAPER, 1) != 0) fail_with("cannot become the subreaper of its worker processes");
   files_->poll = File(::epoll_create1(EPOLL_CLOEXEC));
   if (!files_->poll.is_open()) fail_with("epoll_create1");
@@ -194,7 +194,7 @@ Crew::Crew(const Config& config) : config_(config), files_(std::make_unique<File
   files_->watch(files_->listener);
 }
 
-Crew::~Crew() {
+WorkerProcess::~WorkerProcess() {
   kill();
   constexpr int kTurns = 200;
   for (int i = 0; i < kTurns && ending_; ++i) {
@@ -203,7 +203,7 @@ Crew::~Crew() {
   }
 }
 
-void Crew::launch(const std::string& secret) {
+void WorkerProcess::launch(const std::string& secret) {
   if (files_->pid != 0) kill();
   secret_ = secret;
   reader_ = RecordReader();
@@ -242,7 +242,7 @@ void Crew::launch(const std::string& secret) {
   files_->watch(files_->process);
 }
 
-void Crew::kill() {
+void WorkerProcess::kill() {
   files_->stream = File();
   files_->strangers.clear();
   files_->process = File();
@@ -253,7 +253,7 @@ void Crew::kill() {
 }
 
 /// Kills the remaining processes of earlier programs and reaps terminated children.
-void Crew::reap() {
+void WorkerProcess::reap() {
   if (ending_) {
     for (const pid_t pid : descendants(files_->pid != 0 ? files_->pid : -1)) ::kill(pid, SIGKILL);
   }
@@ -269,20 +269,20 @@ void Crew::reap() {
 }
 
 /// Reports that the worker is unusable. Only the first reason is reported.
-void Crew::fail(const std::string& why) {
+void WorkerProcess::fail(const std::string& why) {
   files_->stream = File();
   secret_.clear();
   if (!std::exchange(ended_, true)) events_.emplace_back(Ended{why});
 }
 
-void Crew::send(const Record& record) {
+void WorkerProcess::send(const Record& record) {
   if (!files_->stream.is_open()) return;
   const std::vector<std::byte> bytes = to_bytes(record);
   const ssize_t sent = ::send(files_->stream.get(), bytes.data(), bytes.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
   if (sent != static_cast<ssize_t>(bytes.size())) fail("it does not read the data");
 }
 
-void Crew::accept_one() {
+void WorkerProcess::accept_one() {
   File file(::accept4(files_->listener.get(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC));
   if (!file.is_open() || secret_.empty()) return;
   if (files_->strangers.size() >= kMostStrangers) files_->strangers.erase(files_->strangers.begin());
@@ -294,7 +294,7 @@ void Crew::accept_one() {
   files_->strangers.push_back({.file = std::move(file)});
 }
 
-void Crew::read_stream() {
+void WorkerProcess::read_stream() {
   std::array<std::byte, 4096> buffer;
   const auto read = [&](const File& file, RecordReader& to) {
     const ssize_t size = ::recv(file.get(), buffer.data(), buffer.size(), MSG_DONTWAIT);
@@ -335,7 +335,7 @@ void Crew::read_stream() {
   }
 }
 
-std::optional<Crew::Event> Crew::next() {
+std::optional<WorkerProcess::Event> WorkerProcess::next() {
   if (events_.empty()) {
     std::array<epoll_event, 16> ready;
     const int count = ::epoll_wait(files_->poll.get(), ready.data(), static_cast<int>(ready.size()), 0);
@@ -360,6 +360,6 @@ std::optional<Crew::Event> Crew::next() {
   return event;
 }
 
-int Crew::descriptor() const noexcept { return files_->poll.get(); }
+int WorkerProcess::descriptor() const noexcept { return files_->poll.get(); }
 
 }  // namespace tendon::worker

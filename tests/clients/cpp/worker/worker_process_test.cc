@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "clients/cpp/worker/crew.h"
+#include "clients/cpp/worker/worker_process.h"
 
 #include <gtest/gtest.h>
 #include <poll.h>
@@ -17,7 +17,7 @@
 #include <stdexcept>
 #include <string>
 
-namespace tendon::worker::crew_test {
+namespace tendon::worker::worker_process_test {
 namespace {
 
 const std::string kSecret(kSecretDigits, '5');
@@ -25,23 +25,23 @@ constexpr int kPatienceMs = 30'000;
 
 std::string fake(const std::string& arguments) { return TENDON_FAKE_WORKER " " + arguments; }
 
-std::optional<Crew::Event> next(Crew& crew, int patience_ms = kPatienceMs) {
+std::optional<WorkerProcess::Event> next(WorkerProcess& process, int patience_ms = kPatienceMs) {
   for (int waited = 0;;) {
-    if (auto event = crew.next()) return event;
+    if (auto event = process.next()) return event;
     if (waited >= patience_ms) return std::nullopt;
-    pollfd readable{.fd = crew.descriptor(), .events = POLLIN, .revents = 0};
+    pollfd readable{.fd = process.descriptor(), .events = POLLIN, .revents = 0};
     waited += ::poll(&readable, 1, 100) == 0 ? 100 : 0;
   }
 }
 
-bool opened(Crew& crew) {
-  const auto event = next(crew);
-  return event && std::holds_alternative<Crew::Opened>(*event);
+bool opened(WorkerProcess& process) {
+  const auto event = next(process);
+  return event && std::holds_alternative<WorkerProcess::Opened>(*event);
 }
 
-std::string ended(Crew& crew) {
-  const auto event = next(crew);
-  const auto* end = event ? std::get_if<Crew::Ended>(&*event) : nullptr;
+std::string ended(WorkerProcess& process) {
+  const auto event = next(process);
+  const auto* end = event ? std::get_if<WorkerProcess::Ended>(&*event) : nullptr;
   return end != nullptr ? end->why : "it has not ended";
 }
 
@@ -58,33 +58,33 @@ int running(const std::string& text) {
 }
 
 /// Waits until all processes have ended, at most kPatienceMs.
-bool gone(Crew& crew, const std::string& text) {
+bool gone(WorkerProcess& process, const std::string& text) {
   for (int i = 0; i < kPatienceMs / 10; ++i) {
-    crew.next();
+    process.next();
     if (running(text) == 0) return true;
     ::usleep(10'000);
   }
   return false;
 }
 
-class CrewTest : public ::testing::TestWithParam<const char*> {
+class WorkerProcessTest : public ::testing::TestWithParam<const char*> {
  protected:
-  static Crew::Config config(const std::string& arguments) {
+  static WorkerProcess::Config config(const std::string& arguments) {
     return {.command = fake(arguments), .listen = GetParam()};
   }
 };
 
-TEST_P(CrewTest, AWorkerOpensAndAnswers) {
-  Crew crew(config("well"));
-  crew.launch(kSecret);
-  ASSERT_TRUE(opened(crew));
+TEST_P(WorkerProcessTest, AWorkerOpensAndAnswers) {
+  WorkerProcess process(config("well"));
+  process.launch(kSecret);
+  ASSERT_TRUE(opened(process));
   Codec codec;
   for (std::uint64_t i = 1; i <= 100; ++i) {
     DeviceState hand;
     hand.tick = i;
     hand.position = Vec3(0.001 * static_cast<double>(i), 0, 0);
-    crew.send(codec.state(i, hand));
-    const auto event = next(crew);
+    process.send(codec.state(i, hand));
+    const auto event = next(process);
     ASSERT_TRUE(event && std::holds_alternative<Record>(*event));
     const auto answer = codec.read_answer(std::get<Record>(*event), i, hand);
     ASSERT_TRUE(answer.touch.has_value()) << answer.refused;
@@ -92,46 +92,46 @@ TEST_P(CrewTest, AWorkerOpensAndAnswers) {
   }
 }
 
-TEST_P(CrewTest, WhatEndsAWorkerIsSaid) {
+TEST_P(WorkerProcessTest, WhatEndsAWorkerIsSaid) {
   struct Case {
     const char* way;
     const char* why;
   };
   for (const Case& one : {Case{"dies 0", "it was terminated by signal 9"}, Case{"exits 0", "it exited with status 7"},
                           Case{"ends-at-once", "it exited with status 3"}}) {
-    Crew crew(config(one.way));
-    crew.launch(kSecret);
+    WorkerProcess process(config(one.way));
+    process.launch(kSecret);
     if (std::string(one.way) != "ends-at-once") {
-      ASSERT_TRUE(opened(crew)) << one.way;
+      ASSERT_TRUE(opened(process)) << one.way;
       Codec codec;
-      crew.send(codec.state(1, DeviceState{}));
+      process.send(codec.state(1, DeviceState{}));
     }
-    const std::string why = ended(crew);
+    const std::string why = ended(process);
     EXPECT_TRUE(why == one.why || why == "it has closed the connection") << one.way << ": " << why;
-    EXPECT_FALSE(next(crew, 100).has_value()) << "once";
+    EXPECT_FALSE(next(process, 100).has_value()) << "once";
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Streams, CrewTest, ::testing::Values("", "127.0.0.1:0"),
+INSTANTIATE_TEST_SUITE_P(Streams, WorkerProcessTest, ::testing::Values("", "127.0.0.1:0"),
                          [](const auto& stream) { return stream.param[0] == '\0' ? "Unix" : "Tcp"; });
 
-TEST(Crew, ACommandThatIsNotThereIsSaid) {
-  Crew crew({.command = "/nonexistent/tendon-fem-worker scene.toml"});
-  crew.launch(kSecret);
-  EXPECT_EQ(ended(crew), "it exited with status 127");
+TEST(WorkerProcess, ACommandThatIsNotThereIsSaid) {
+  WorkerProcess process({.command = "/nonexistent/tendon-fem-worker scene.toml"});
+  process.launch(kSecret);
+  EXPECT_EQ(ended(process), "it exited with status 127");
 }
 
-TEST(Crew, EndsEvenWhatHasLeftItsProcessGroupAndWhatIsStopped) {
+TEST(WorkerProcess, EndsEvenWhatHasLeftItsProcessGroupAndWhatIsStopped) {
   const std::string mark = "with-a-child 987123";
-  Crew crew({.command = fake(mark)});
-  crew.launch(kSecret);
-  ASSERT_TRUE(opened(crew));
+  WorkerProcess process({.command = fake(mark)});
+  process.launch(kSecret);
+  ASSERT_TRUE(opened(process));
   ASSERT_EQ(running("987123"), 2);
-  crew.kill();
-  EXPECT_TRUE(gone(crew, "987123"));
+  process.kill();
+  EXPECT_TRUE(gone(process, "987123"));
 
-  Crew::Config stops{.command = fake("stops 0 987124")};
-  Crew other(stops);
+  WorkerProcess::Config stops{.command = fake("stops 0 987124")};
+  WorkerProcess other(stops);
   other.launch(kSecret);
   ASSERT_TRUE(opened(other));
   Codec codec;
@@ -142,15 +142,15 @@ TEST(Crew, EndsEvenWhatHasLeftItsProcessGroupAndWhatIsStopped) {
   EXPECT_TRUE(gone(other, "987124"));
 }
 
-TEST(Crew, TheNextWorkerIsLeftAloneWhileTheLastOneIsEnded) {
-  Crew crew({.command = fake("with-a-child 987125")});
+TEST(WorkerProcess, TheNextWorkerIsLeftAloneWhileTheLastOneIsEnded) {
+  WorkerProcess process({.command = fake("with-a-child 987125")});
   for (int i = 0; i < 5; ++i) {
-    crew.launch(kSecret);
-    ASSERT_TRUE(opened(crew)) << i;
-    EXPECT_FALSE(next(crew, 50).has_value()) << "it goes on";
+    process.launch(kSecret);
+    ASSERT_TRUE(opened(process)) << i;
+    EXPECT_FALSE(next(process, 50).has_value()) << "it goes on";
   }
-  crew.kill();
-  EXPECT_TRUE(gone(crew, "987125"));
+  process.kill();
+  EXPECT_TRUE(gone(process, "987125"));
 }
 
 /// Connects to a Unix socket without the secret.
@@ -164,35 +164,35 @@ int connect_to(const std::string& address) {
   return socket;
 }
 
-TEST(Crew, AStrangerWithoutTheSecretDoesNotOpenTheStream) {
-  Crew crew({.command = fake("never-opens")});
-  crew.launch(kSecret);
-  const int silent = connect_to(crew.address());
-  const int wrong = connect_to(crew.address());
+TEST(WorkerProcess, AStrangerWithoutTheSecretDoesNotOpenTheStream) {
+  WorkerProcess process({.command = fake("never-opens")});
+  process.launch(kSecret);
+  const int silent = connect_to(process.address());
+  const int wrong = connect_to(process.address());
   const auto guess = to_bytes(opening(std::string(kSecretDigits, '6')));
   ASSERT_EQ(::write(wrong, guess.data(), guess.size()), static_cast<ssize_t>(guess.size()));
-  EXPECT_FALSE(next(crew, 300).has_value());
-  const int right = connect_to(crew.address());
+  EXPECT_FALSE(next(process, 300).has_value());
+  const int right = connect_to(process.address());
   const auto word = to_bytes(opening(kSecret));
   ASSERT_EQ(::write(right, word.data(), word.size()), static_cast<ssize_t>(word.size()));
-  EXPECT_TRUE(opened(crew));
-  const int late = connect_to(crew.address());
+  EXPECT_TRUE(opened(process));
+  const int late = connect_to(process.address());
   ASSERT_EQ(::write(late, word.data(), word.size()), static_cast<ssize_t>(word.size()));
-  EXPECT_FALSE(next(crew, 300).has_value());
+  EXPECT_FALSE(next(process, 300).has_value());
   for (const int socket : {silent, wrong, right, late}) ::close(socket);
 }
 
-TEST(Crew, DoesNotListenWhereNoWorkerCouldFindIt) {
+TEST(WorkerProcess, DoesNotListenWhereNoWorkerCouldFindIt) {
   for (const char* any : {"0.0.0.0:0", "[::]:0"}) {
-    EXPECT_THROW(Crew({.command = "true", .listen = any}), std::runtime_error) << any;
+    EXPECT_THROW(WorkerProcess({.command = "true", .listen = any}), std::runtime_error) << any;
   }
 }
 
-TEST(Crew, TheSocketIsInAFolderOfThisUserAlone) {
+TEST(WorkerProcess, TheSocketIsInAFolderOfThisUserAlone) {
   std::string path;
   {
-    const Crew crew({.command = "true"});
-    path = crew.address().substr(5);
+    const WorkerProcess process({.command = "true"});
+    path = process.address().substr(5);
     struct stat status {};
     ASSERT_EQ(::stat(std::filesystem::path(path).parent_path().c_str(), &status), 0);
     EXPECT_EQ(status.st_mode & 0777U, 0700U);
@@ -201,4 +201,4 @@ TEST(Crew, TheSocketIsInAFolderOfThisUserAlone) {
 }
 
 }  // namespace
-}  // namespace tendon::worker::crew_test
+}  // namespace tendon::worker::worker_process_test

@@ -22,10 +22,10 @@ namespace tendon::worker {
 /// All processes started by the program are killed with it, including those that left its process group, as the ranks
 /// of Open MPI do: this process adopts orphans (PR_SET_CHILD_SUBREAPER) and kills all its descendants. If this
 /// process dies, the kernel kills the program, and workers end with their stream. Processes on other machines are
-/// ended by their launcher. Only one Crew per process, because it kills all other children of the process as well.
+/// ended by their launcher. Only one object per process, because it kills all other children of the process as well.
 ///
 /// Thread-safe: no. Realtime-safe: no.
-class Crew {
+class WorkerProcess {
  public:
   struct Config {
     std::string command;   ///< for /bin/sh; its stdout is redirected to stderr
@@ -33,11 +33,11 @@ class Crew {
   };
 
   /// Throws std::system_error or std::runtime_error if it cannot listen at the address.
-  explicit Crew(const Config& config);
+  explicit WorkerProcess(const Config& config);
   /// Kills the running program.
-  ~Crew();
-  Crew(const Crew&) = delete;
-  Crew& operator=(const Crew&) = delete;
+  ~WorkerProcess();
+  WorkerProcess(const WorkerProcess&) = delete;
+  WorkerProcess& operator=(const WorkerProcess&) = delete;
 
   /// Starts the program. `secret` must consist of kSecretDigits hexadecimal digits. Throws std::system_error.
   void launch(const std::string& secret);
