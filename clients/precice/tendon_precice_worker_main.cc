@@ -22,14 +22,14 @@ int run(int argc, char** argv) {
   tendon::usage::dress(app);
   app.footer(
       "Example: tendon-fem serve SCENE --worker \"tendon-precice-worker --config precice-config.xml\"\nExit: 0 the "
-      "front has closed the stream; 1 failed; 2 wrong usage.");
+      "proxy has closed the stream; 1 failed; 2 wrong usage.");
   app.set_version_flag("--version", TENDON_VERSION);
   PreciceEngine::Config config;
   std::string scene;
   std::vector<double> middle_mm = {0, 0, 0};
   std::vector<double> normal = {-1, 0, 0};
   double radius_mm = 1e3 * config.patch.radius;
-  app.add_option("SCENE", scene, "Scene file from the front; not used, because the solver defines the body");
+  app.add_option("SCENE", scene, "Scene file from the proxy; not used, because the solver defines the body");
   app.add_option("--config", config.file, "Configuration file of preCICE")->type_name("FILE")->required();
   app.add_option("--participant", config.participant, "Name of this participant in the configuration")
       ->capture_default_str();

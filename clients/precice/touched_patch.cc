@@ -65,7 +65,7 @@ Touch TouchedPatch::answer(const DeviceState& hand, std::span<const double> held
   for (std::size_t i = 0; i < held.size(); ++i) sum[static_cast<Eigen::Index>(i % 3)] += held[i];
   const double deep = depth(hand);
   const double pushes = -sum.dot(config_.normal);
-  if (!std::isfinite(pushes)) return Vec3(pushes * config_.normal);  // the front reports it
+  if (!std::isfinite(pushes)) return Vec3(pushes * config_.normal);  // the proxy reports it
   const double force = deep > 0 ? std::max(0.0, pushes) : 0;
   Touch touch = Vec3(force * config_.normal);
   if (last_) {

@@ -170,7 +170,7 @@ rule("there are two engines", () => same(engines.map((d) => d.metadata.name).sor
 rule("an engine does not listen on any port", () => everywhere.every((c) => c.ports === undefined));
 rule("each engine only runs once at a time", () =>
   engines.every((engine) => engine.spec.replicas === 1 && engine.spec.strategy.type === "Recreate"));
-rule("there is one core for each rank and one for the front", () => {
+rule("there is one core for each rank and one for the proxy", () => {
   const [fem] = engines.find((d) => d.metadata.name === "fem").spec.template.spec.containers;
   const launch = fem.command[fem.command.indexOf("--launch") + 1];
   return launch === `mpirun -n ${Number(fem.resources.limits.cpu) - 1}` &&

@@ -13,7 +13,7 @@
 #include "clients/cpp/touch.h"
 #include "protocol/wire/codec.h"
 
-// The protocol between a front and its worker (README.md in this directory) consists of records on a byte stream in
+// The protocol between a proxy and its worker (README.md in this directory) consists of records on a byte stream in
 // both directions:
 //
 //     4 bytes   n, length of the rest, little-endian: 8 … 8 + kMaxDatagram
@@ -23,11 +23,11 @@
 // The worker opens the stream with sequence 0 and a body of kOpeningMagic and 64 hexadecimal digits of the secret.
 // Each further body is a `Datagram` of tendon.proto without the network header:
 //
-//     front → worker   sequence 1, 2, 3 …, one frame `state`
-//     worker → front   the same sequence, one frame `force` with based_on_tick = tick of the state and sequence = the
+//     proxy → worker   sequence 1, 2, 3 …, one frame `state`
+//     worker → proxy   the same sequence, one frame `force` with based_on_tick = tick of the state and sequence = the
 //                      record's sequence; or no frame if no force is known. valid_for_us is ignored but must be valid
 //
-// Only one state is in flight: the front waits for the answer before it sends the next. The worker exits at the end
+// Only one state is in flight: the proxy waits for the answer before it sends the next. The worker exits at the end
 // of the stream.
 
 namespace tendon::worker {
@@ -69,7 +69,7 @@ class Codec {
   std::optional<DeviceState> read_state(const Record& record);
 
   /// Encodes the answer `touch` to the state `hand` with that sequence. Invalid forces are encoded unchanged, so that
-  /// the front can report the reason.
+  /// the proxy can report the reason.
   Record answer(std::uint64_t sequence, const DeviceState& hand, const Touch& touch);
   struct ReadAnswer {
     std::optional<Touch> touch{};  ///< empty if refused

@@ -28,7 +28,7 @@ std::string variable(const char* name) {
   const char* const value = std::getenv(name);  // NOLINT(concurrency-mt-unsafe): before any thread
   if (value == nullptr) {
     throw std::runtime_error(std::string(name) +
-                             ": expected in the environment of the worker, which is started by a front");
+                             ": expected in the environment of the worker, which is started by a proxy");
   }
   return value;
 }
@@ -79,7 +79,7 @@ WorkerStream::WorkerStream() {
   if (socket_ < 0 || !send(opening(secret))) {
     const std::string why = std::strerror(errno);  // NOLINT(concurrency-mt-unsafe)
     if (socket_ >= 0) ::close(socket_);
-    throw std::runtime_error(std::string(kAddressVariable) + ": no front is listening at " + address + ": " + why);
+    throw std::runtime_error(std::string(kAddressVariable) + ": no proxy is listening at " + address + ": " + why);
   }
 }
 
@@ -112,7 +112,7 @@ void work(const Physics& engine) {
   Codec codec;
   while (const auto record = stream.next()) {
     const auto hand = codec.read_state(*record);
-    if (!hand) throw std::runtime_error("expected a state from the front, received something else");
+    if (!hand) throw std::runtime_error("expected a state from the proxy, received something else");
     if (!stream.send(codec.answer(record->sequence, *hand, engine(*hand)))) return;
   }
 }

@@ -9,7 +9,7 @@
 
 namespace tendon::worker {
 
-/// The worker's end of the stream to its front (stream.h). An MPI program uses it on one rank, which broadcasts the
+/// The worker's end of the stream to its proxy (stream.h). An MPI program uses it on one rank, which broadcasts the
 /// record; every rank decodes the state from it (Codec).
 ///
 /// Thread-safe: no. Realtime-safe: no (system calls).
@@ -22,7 +22,7 @@ class WorkerStream {
   WorkerStream(const WorkerStream&) = delete;
   WorkerStream& operator=(const WorkerStream&) = delete;
 
-  /// Blocks until the next record, which contains a state. Returns empty when the front has closed the stream.
+  /// Blocks until the next record, which contains a state. Returns empty when the proxy has closed the stream.
   std::optional<Record> next();
   /// Sends an answer (Codec::answer). Returns false if the stream is closed.
   bool send(const Record& answer);
@@ -32,8 +32,8 @@ class WorkerStream {
   RecordReader reader_;
 };
 
-/// Answers each state with `engine` until the front closes the stream. This is all that the `main` of a worker needs.
-/// Exceptions of `engine` propagate; the front then starts a new worker. Throws std::runtime_error as WorkerStream
+/// Answers each state with `engine` until the proxy closes the stream. This is all that the `main` of a worker needs.
+/// Exceptions of `engine` propagate; the proxy then starts a new worker. Throws std::runtime_error as WorkerStream
 /// does, and if a record is not a state.
 void work(const Physics& engine);
 

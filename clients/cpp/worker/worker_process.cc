@@ -59,7 +59,7 @@ class File {
 class PrivateFolder {
  public:
   PrivateFolder() {
-    std::string name = (std::filesystem::temp_directory_path() / "tendon-front-XXXXXX").string();
+    std::string name = (std::filesystem::temp_directory_path() / "tendon-proxy-XXXXXX").string();
     if (::mkdtemp(name.data()) == nullptr) fail_with("cannot create the folder " + name);
     path_ = name;
   }

@@ -15,7 +15,7 @@ YOUNG, POISSON = 1e4, 0.45  # Pa
 PATCH = 0.02  # m
 
 parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-parser.add_argument("scene", nargs="?", help="Scene file from the front; not used by this block")
+parser.add_argument("scene", nargs="?", help="Scene file from the proxy; not used by this block")
 parser.add_argument(
     "--cells", type=int, default=8, choices=range(2, 65, 2), metavar="N", help="Number of cells along y and z, even [%(default)s]"
 )

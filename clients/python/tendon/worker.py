@@ -1,18 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A worker: a program that computes forces for a front, and that may be slow, stop or crash.
+"""A worker: a program that computes forces for a proxy, and that may be slow, stop or crash.
 
     import tendon
 
     tendon.worker.run(lambda hand: [-500 * x for x in hand.position])
 
-The front owns the session with the server. It is `tendon-fem serve --worker "python3 FILE"` or another program
+The proxy owns the session with the server. It is `tendon-fem serve --worker "python3 FILE"` or another program
 based on clients/cpp/worker; the protocol is described in clients/cpp/worker/stream.h. With several MPI ranks,
 
     from mpi4py import MPI
 
     tendon.worker.run(answer, MPI.COMM_WORLD)
 
-only rank 0 communicates with the front. `tendon-conformance worker -- python3 FILE` tests a worker.
+only rank 0 communicates with the proxy. `tendon-conformance worker -- python3 FILE` tests a worker.
 """
 
 from __future__ import annotations
@@ -50,17 +50,17 @@ class Communicator(Protocol):
 
 
 def run(answer: Physics, comm: Communicator | None = None) -> None:
-    """Answers each state with the result of `answer` until the front closes the stream. If it is None, no force is
+    """Answers each state with the result of `answer` until the proxy closes the stream. If it is None, no force is
     known.
 
     With `comm`, all ranks must call this function. `answer` is called with the same state on each rank, and the
     result of rank 0 is sent. Exceptions of `answer` propagate. With `comm`, they are printed and terminate all
-    ranks, because the others could wait forever. The front then starts a new worker.
+    ranks, because the others could wait forever. The proxy then starts a new worker.
 
-    Forces that are not finite or out of bounds are sent unchanged; the front refuses, counts and reports them.
+    Forces that are not finite or out of bounds are sent unchanged; the proxy refuses, counts and reports them.
 
     Raises RuntimeError if the address or secret is missing in the environment ("TENDON_WORKER_ADDRESS: …") or
-    malformed, or if a record is not a state; ConnectionError if no front listens there; ValueError if an answer
+    malformed, or if a record is not a state; ConnectionError if no proxy listens there; ValueError if an answer
     has a wrong shape. The other ranks treat an error of the stream as its end.
     """
     if comm is None:
@@ -76,7 +76,7 @@ def run(answer: Physics, comm: Communicator | None = None) -> None:
 
 
 class Stream:
-    """The worker's end of the stream to its front, for programs with their own loop. Most programs only need run()."""
+    """The worker's end of the stream to its proxy, for programs with their own loop. Most programs only need run()."""
 
     def __init__(self) -> None:
         """Connects to the address in the environment and opens the stream, which reports that the worker is ready.
@@ -85,21 +85,21 @@ class Stream:
         self._bytes = bytearray()
 
     def next_state(self) -> tuple[int, DeviceState] | None:
-        """Blocks until the next state and returns its sequence and the state. Returns None if the front has closed
+        """Blocks until the next state and returns its sequence and the state. Returns None if the proxy has closed
         the stream. Raises RuntimeError if the record is not a state."""
         if (head := self._take(_LENGTH_BYTES)) is None:
             return None
         length = int.from_bytes(head, "little")
         most = _SEQUENCE_BYTES + limits.MAX_DATAGRAM
         if not _SEQUENCE_BYTES <= length <= most:
-            raise RuntimeError(f"the front has sent a record of {length} bytes: expected {_SEQUENCE_BYTES} to {most}")
+            raise RuntimeError(f"the proxy has sent a record of {length} bytes: expected {_SEQUENCE_BYTES} to {most}")
         if (record := self._take(length)) is None:
             return None
         content = codec.read_data(record[_SEQUENCE_BYTES:])
         match content.frames if content is not None else ():
             case [DeviceState() as hand]:
                 return int.from_bytes(record[:_SEQUENCE_BYTES], "little"), hand
-        raise RuntimeError("expected a state from the front, received something else")
+        raise RuntimeError("expected a state from the proxy, received something else")
 
     def send(self, sequence: int, hand: DeviceState, touch: Touch | Sequence[float] | None) -> bool:
         """Answers the state `hand` with that `sequence`. If it is None, no force is known. Returns False if the
@@ -182,7 +182,7 @@ def _record(sequence: int, body: bytes) -> bytes:
 def _variable(name: str) -> str:
     value = os.environ.get(name)
     if not value:
-        raise RuntimeError(f"{name}: expected in the environment of the worker, which is started by a front")
+        raise RuntimeError(f"{name}: expected in the environment of the worker, which is started by a proxy")
     return value
 
 
@@ -202,7 +202,7 @@ def _connected(address: str, opening: bytes) -> socket.socket:
             link.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         link.sendall(_record(0, opening))
     except OSError as error:
-        raise ConnectionError(f"{ADDRESS_VARIABLE}: no front is listening at {address}: {error}") from None
+        raise ConnectionError(f"{ADDRESS_VARIABLE}: no proxy is listening at {address}: {error}") from None
     return link
 
 

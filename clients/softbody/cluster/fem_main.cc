@@ -17,7 +17,7 @@
 #include "clients/cpp/machine.h"
 #include "clients/cpp/options.h"
 #include "clients/cpp/usage.h"
-#include "clients/cpp/worker/front_engine.h"
+#include "clients/cpp/worker/proxy_engine.h"
 #include "clients/softbody/cluster/estimate.h"
 #include "clients/softbody/placed_body.h"
 #include "server/machine/output.h"
@@ -50,7 +50,7 @@ softbody::PlacedBody from_table(const std::string& scene_file, const std::string
   return softbody::PlacedBody(scene);
 }
 
-nlohmann::ordered_json to_json(const worker::Front::Stats& stats) {
+nlohmann::ordered_json to_json(const worker::ProxyScheduler::Stats& stats) {
   return {{"launches", stats.launches}, {"asked", stats.asked},       {"answers", stats.answers},
           {"unknown", stats.unknown},   {"late", stats.late},         {"refused", stats.refused},
           {"fallback", stats.fallback}, {"given_up", stats.given_up}, {"median_ms", milliseconds(stats.median)}};
@@ -62,10 +62,10 @@ int serve(int argc, char** argv) {
   std::string launch;
   std::string program;
   std::string fallback;
-  worker::FrontEngine::Config config;
+  worker::ProxyEngine::Config config;
   double deadline_ms = 0;
   double dead_ms = 0;
-  double start_s = seconds(config.front.start);
+  double start_s = seconds(config.scheduler.start);
   CommandLine line(
       "Compute the forces in worker processes, which are restarted if they fail. The session with the server is not "
       "interrupted.",
@@ -90,18 +90,18 @@ int serve(int argc, char** argv) {
   config.name = "tendon-fem";
   config.process.command =
       launch + (launch.empty() ? "" : " ") + (program.empty() ? own_worker() : program) + " " + shell_word(scene);
-  config.front.deadline = from_milliseconds(deadline_ms);
-  config.front.dead = from_milliseconds(dead_ms);
-  config.front.start = from_seconds(start_s);
+  config.scheduler.deadline = from_milliseconds(deadline_ms);
+  config.scheduler.dead = from_milliseconds(dead_ms);
+  config.scheduler.start = from_seconds(start_s);
   std::optional<softbody::PlacedBody> table;
   if (!fallback.empty()) {
     table.emplace(from_table(scene, fallback));
-    config.front.fallback = [&](const DeviceState& hand) { return table->answer(hand); };
+    config.scheduler.fallback = [&](const DeviceState& hand) { return table->answer(hand); };
   }
   const UnblockedOutput output;
-  worker::FrontEngine engine(config, read_clock(), std::cerr);
+  worker::ProxyEngine engine(config, read_clock(), std::cerr);
   const int code = run(options, engine);
-  const worker::Front::Stats stats = engine.stats();
+  const worker::ProxyScheduler::Stats stats = engine.stats();
   if (options.json) {
     std::cout << nlohmann::ordered_json{{"workers", to_json(stats)}} << std::endl;
   } else {

@@ -129,7 +129,7 @@ int answer(const Arguments& arguments, const Ranks& ranks) {
     share_out(bytes);
     if (bytes.empty()) return 0;
     const auto hand = codec.read_state({.body = bytes});
-    if (!hand) throw std::runtime_error("expected a state from the front, received something else");
+    if (!hand) throw std::runtime_error("expected a state from the proxy, received something else");
     const tendon::Touch touch = body.answer(*hand);
     if (stream) stream->send(codec.answer(sequence, *hand, touch));
   }
@@ -139,7 +139,7 @@ int answer(const Arguments& arguments, const Ranks& ranks) {
 
 int main(int argc, char** argv) {
   CLI::App app(
-      "Simulate a soft body on all MPI ranks. Started by tendon-fem with only SCENE, it answers the front that is "
+      "Simulate a soft body on all MPI ranks. Started by tendon-fem with only SCENE, it answers the proxy that is "
       "specified in\nthe environment.",
       "tendon-fem-worker");
   tendon::usage::dress(app);

@@ -11,7 +11,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
-from front import HAND, SECRET, Front, mpirun, running
+from proxy import HAND, SECRET, Proxy, mpirun, running
 from processes import EXAMPLES, PROGRAMS
 
 BLOCK = EXAMPLES / "dolfinx_block.py"
@@ -41,23 +41,23 @@ pytestmark = pytest.mark.skipif(
 
 def pressed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, *command: str | Path, depth: float = 1e-3) -> list[float]:
     """Returns the stiffness at each place, N/m. The forces must be those of a linear spring."""
-    front = Front("unix", tmp_path)
-    monkeypatch.setenv("TENDON_WORKER_ADDRESS", front.address)
+    proxy = Proxy("unix", tmp_path)
+    monkeypatch.setenv("TENDON_WORKER_ADDRESS", proxy.address)
     monkeypatch.setenv("TENDON_WORKER_SECRET", SECRET)
     found = []
     with running(command) as program:
         try:
-            front.accept(COMPILED_S)
+            proxy.accept(COMPILED_S)
             for sequence, (y, z) in enumerate((MIDDLE, ASIDE, OFF), 1):
-                told = front.ask(sequence, replace(HAND, position=(depth, y, z)))
+                told = proxy.ask(sequence, replace(HAND, position=(depth, y, z)))
                 k = told.model.stiffness[0][0]
                 assert told.force == pytest.approx((-k * max(depth, 0), 0, 0))
                 assert told.model.contact.normal == (-1, 0, 0) and told.model.contact.gap == -depth
                 found.append(k)
         finally:
-            front.close()
+            proxy.close()
         assert program.wait(COMPILED_S) == 0
-    (tmp_path / "front").unlink()
+    (tmp_path / "proxy").unlink()
     return found
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Workers in Python: with a front in Python, on several ranks, and under tendon-conformance."""
+"""Workers in Python: with a proxy in Python, on several ranks, and under tendon-conformance."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from queue import Queue
 
 import pytest
 from conftest import ROOT
-from front import HAND, SECRET, Front, mpirun, running
+from proxy import HAND, SECRET, Proxy, mpirun, running
 from processes import EXAMPLES, PATIENCE_S, PROGRAMS
 
 from tendon import Contact, DeviceState, ForceTable, Grip, Joints, Touch, Turning, codec, limits, tendon_pb2, worker
@@ -44,8 +44,8 @@ WHOLE_HAND = replace(
 
 
 @pytest.fixture(params=["unix", "tcp"])
-def front(request, tmp_path, monkeypatch):
-    it = Front(request.param, tmp_path)
+def proxy(request, tmp_path, monkeypatch):
+    it = Proxy(request.param, tmp_path)
     monkeypatch.setenv("TENDON_WORKER_ADDRESS", it.address)
     monkeypatch.setenv("TENDON_WORKER_SECRET", SECRET)
     yield it
@@ -73,33 +73,33 @@ class Running(threading.Thread):
         return self.error
 
 
-def test_the_stream_opens_with_the_secret_and_its_end_ends_the_worker(front):
+def test_the_stream_opens_with_the_secret_and_its_end_ends_the_worker(proxy):
     thread = Running(lambda hand: None)
-    assert front.accept() == (0, b"tendon worker 1\n" + SECRET.encode())
-    front.close()
+    assert proxy.accept() == (0, b"tendon worker 1\n" + SECRET.encode())
+    proxy.close()
     assert thread.end() is None
 
 
-def test_every_part_of_a_state_reaches_the_answer(front):
+def test_every_part_of_a_state_reaches_the_answer(proxy):
     seen = []
     thread = Running(lambda hand: seen.append(hand))
-    front.accept()
+    proxy.accept()
     for sequence, hand in enumerate((HAND, WHOLE_HAND), 1):
-        assert front.ask(sequence, hand) is None
-    front.close()
+        assert proxy.ask(sequence, hand) is None
+    proxy.close()
     assert thread.end() is None
     assert seen == [HAND, WHOLE_HAND]
 
 
-def test_every_part_of_a_touch_reaches_the_front_with_its_tick(front):
+def test_every_part_of_a_touch_reaches_the_proxy_with_its_tick(proxy):
     table = ForceTable(0, 0.001, (1, 2, 3))
     touch = Touch(
         (1, 2, 3), 400, 0.01, Contact((0, 0, 1), -0.002, table), True, 0.5, (0.1, 0, 0), (1, 2, 3), -2.5
     )
     thread = Running(lambda hand: touch)
-    front.accept()
-    command = front.ask(1, WHOLE_HAND)
-    front.close()
+    proxy.accept()
+    command = proxy.ask(1, WHOLE_HAND)
+    proxy.close()
     assert thread.end() is None
     assert (command.sequence, command.based_on_tick, command.force) == (1, 2**53 + 1, (1, 2, 3))
     assert 1 <= command.valid_for_us <= limits.MAX_VALID_FOR_US
@@ -112,38 +112,38 @@ def test_every_part_of_a_touch_reaches_the_front_with_its_tick(front):
     assert command.torque.model.stiffness == ((1, 0, 0), (0, 2, 0), (0, 0, 3))
 
 
-def test_a_force_may_be_plain_numbers_and_none_is_no_force(front):
+def test_a_force_may_be_plain_numbers_and_none_is_no_force(proxy):
     answers = iter([[-5, 0, 0], None, (0, 0, 1)])
     thread = Running(lambda hand: next(answers))
-    front.accept()
-    assert front.ask(1, HAND).force == (-5, 0, 0)
-    assert front.ask(2, HAND) is None
-    assert front.ask(3, HAND).force == (0, 0, 1)
-    front.close()
+    proxy.accept()
+    assert proxy.ask(1, HAND).force == (-5, 0, 0)
+    assert proxy.ask(2, HAND) is None
+    assert proxy.ask(3, HAND).force == (0, 0, 1)
+    proxy.close()
     assert thread.end() is None
 
 
-def test_a_state_may_come_byte_by_byte(front):
+def test_a_state_may_come_byte_by_byte(proxy):
     thread = Running(lambda hand: (hand.position[0], 0, 0))
-    front.accept()
+    proxy.accept()
     body = codec.write_frame(WHOLE_HAND)
     for byte in (8 + len(body)).to_bytes(4, "little") + (1).to_bytes(8, "little") + body:
-        front.link.sendall(bytes([byte]))
-    sequence, answer = front.read()
+        proxy.link.sendall(bytes([byte]))
+    sequence, answer = proxy.read()
     assert sequence == 1
     assert codec.read_data(answer).frames[0].force == (0.01, 0, 0)
-    front.close()
+    proxy.close()
     assert thread.end() is None
 
 
-def test_a_force_that_is_no_number_goes_out_for_the_front_to_refuse(front):
+def test_a_force_that_is_no_number_goes_out_for_the_proxy_to_refuse(proxy):
     thread = Running(lambda hand: (float("nan"), 0, 0))
-    front.accept()
-    front.say(1, codec.write_frame(HAND))
-    _, body = front.read()
+    proxy.accept()
+    proxy.say(1, codec.write_frame(HAND))
+    _, body = proxy.read()
     assert codec.read_data(body).invalid == 1
     assert isnan(tendon_pb2.Datagram.FromString(body).frames[0].force.force_n.x)
-    front.close()
+    proxy.close()
     assert thread.end() is None
 
 
@@ -155,21 +155,21 @@ def test_a_force_that_is_no_number_goes_out_for_the_front_to_refuse(front):
         (Touch(contact=Contact((0, 0, 1), 0, ForceTable(0, 1, (1,) * 1000))), "expected at most 1200"),
     ],
 )
-def test_an_answer_of_a_wrong_shape_is_an_error_with_a_sentence(front, touch, sentence):
+def test_an_answer_of_a_wrong_shape_is_an_error_with_a_sentence(proxy, touch, sentence):
     thread = Running(lambda hand: touch)
-    front.accept()
-    front.say(1, codec.write_frame(HAND))
+    proxy.accept()
+    proxy.say(1, codec.write_frame(HAND))
     error = thread.end()
     assert isinstance(error, ValueError) and sentence in str(error)
 
 
-def test_an_exception_of_the_answer_passes_through(front):
+def test_an_exception_of_the_answer_passes_through(proxy):
     def fail(hand):
         raise ZeroDivisionError("singular")
 
     thread = Running(fail)
-    front.accept()
-    front.say(1, codec.write_frame(HAND))
+    proxy.accept()
+    proxy.say(1, codec.write_frame(HAND))
     assert isinstance(thread.end(), ZeroDivisionError)
 
 
@@ -178,36 +178,36 @@ def test_an_exception_of_the_answer_passes_through(front):
     [
         ((7).to_bytes(4, "little"), "a record of 7 bytes: expected 8 to 1208"),
         ((1209).to_bytes(4, "little"), "a record of 1209 bytes: expected 8 to 1208"),
-        ((8).to_bytes(4, "little") + (1).to_bytes(8, "little"), "expected a state from the front"),
-        ((10).to_bytes(4, "little") + (1).to_bytes(8, "little") + b"\xff\xff", "expected a state from the front"),
+        ((8).to_bytes(4, "little") + (1).to_bytes(8, "little"), "expected a state from the proxy"),
+        ((10).to_bytes(4, "little") + (1).to_bytes(8, "little") + b"\xff\xff", "expected a state from the proxy"),
     ],
 )
-def test_a_front_that_sends_no_state_is_an_error_with_a_sentence(front, bytes_, sentence):
+def test_a_proxy_that_sends_no_state_is_an_error_with_a_sentence(proxy, bytes_, sentence):
     thread = Running(lambda hand: None)
-    front.accept()
-    front.link.sendall(bytes_)
+    proxy.accept()
+    proxy.link.sendall(bytes_)
     error = thread.end()
     assert isinstance(error, RuntimeError) and sentence in str(error)
 
 
 @pytest.mark.parametrize("missing", ["TENDON_WORKER_ADDRESS", "TENDON_WORKER_SECRET"])
-def test_without_a_front_the_error_names_the_variable(front, monkeypatch, missing):
+def test_without_a_proxy_the_error_names_the_variable(proxy, monkeypatch, missing):
     monkeypatch.delenv(missing)
     with pytest.raises(RuntimeError, match=f"{missing}: expected in the environment of the worker"):
         worker.run(lambda hand: None)
 
 
 @pytest.mark.parametrize("address", ["unix:", "udp:127.0.0.1:1", "tcp:127.0.0.1", "tcp:127.0.0.1:0", "127.0.0.1:4"])
-def test_an_address_of_another_form_is_told_what_is_expected(front, monkeypatch, address):
+def test_an_address_of_another_form_is_told_what_is_expected(proxy, monkeypatch, address):
     monkeypatch.setenv("TENDON_WORKER_ADDRESS", address)
     with pytest.raises(RuntimeError, match=f'expected unix:PATH or tcp:HOST:PORT, found "{address}"'):
         worker.run(lambda hand: None)
 
 
-def test_where_no_front_listens_the_error_names_the_place(front):
-    front.close()
-    Path(front.address.removeprefix("unix:")).unlink(missing_ok=True)
-    with pytest.raises(ConnectionError, match=f"TENDON_WORKER_ADDRESS: no front is listening at {front.address}: "):
+def test_where_no_proxy_listens_the_error_names_the_place(proxy):
+    proxy.close()
+    Path(proxy.address.removeprefix("unix:")).unlink(missing_ok=True)
+    with pytest.raises(ConnectionError, match=f"TENDON_WORKER_ADDRESS: no proxy is listening at {proxy.address}: "):
         worker.run(lambda hand: None)
 
 
@@ -239,36 +239,36 @@ def ranks(count: int) -> list[Rank]:
     return [Rank(number, mail) for number in range(count)]
 
 
-def test_every_rank_gets_each_state_and_rank_0_answers(front):
+def test_every_rank_gets_each_state_and_rank_0_answers(proxy):
     seen: list[list[DeviceState]] = [[], [], []]
 
     def answer_of(rank):
         return lambda hand: seen[rank.number].append(hand) or (float(rank.number), 0, 0)
 
     threads = [Running(answer_of(rank), rank) for rank in ranks(3)]
-    front.accept()
-    assert front.ask(1, HAND).force == (0, 0, 0)
-    assert front.ask(2, WHOLE_HAND).force == (0, 0, 0)
-    front.close()
+    proxy.accept()
+    assert proxy.ask(1, HAND).force == (0, 0, 0)
+    assert proxy.ask(2, WHOLE_HAND).force == (0, 0, 0)
+    proxy.close()
     assert [one.end() for one in threads] == [None] * 3
     assert seen == [[HAND, WHOLE_HAND]] * 3
 
 
-def test_a_rank_that_fails_ends_all_of_them(front, capsys):
+def test_a_rank_that_fails_ends_all_of_them(proxy, capsys):
     first, second = ranks(2)
     threads = [Running(lambda hand: None, first), Running(lambda hand: 1 / 0, second)]
-    front.accept()
-    front.say(1, codec.write_frame(HAND))
+    proxy.accept()
+    proxy.say(1, codec.write_frame(HAND))
     assert isinstance(threads[1].end(), ZeroDivisionError)
     assert second.aborted == [1]
     assert "ZeroDivisionError" in capsys.readouterr().err
-    front.close()
+    proxy.close()
     assert threads[0].end() is None
 
 
-def test_without_a_front_the_other_ranks_end(front):
-    front.close()
-    Path(front.address.removeprefix("unix:")).unlink(missing_ok=True)
+def test_without_a_proxy_the_other_ranks_end(proxy):
+    proxy.close()
+    Path(proxy.address.removeprefix("unix:")).unlink(missing_ok=True)
     threads = [Running(lambda hand: None, rank) for rank in ranks(2)]
     assert isinstance(threads[0].end(), ConnectionError)
     assert threads[1].end() is None
@@ -297,22 +297,22 @@ def on_ranks(tmp_path: Path) -> AbstractContextManager[subprocess.Popen[str]]:
     return running(mpirun(sys.executable, script), stderr=subprocess.PIPE, text=True)
 
 
-def test_two_ranks_of_mpi_answer_together_and_a_failure_of_one_ends_both(front, tmp_path):
+def test_two_ranks_of_mpi_answer_together_and_a_failure_of_one_ends_both(proxy, tmp_path):
     with on_ranks(tmp_path) as program:
-        assert front.accept() == (0, b"tendon worker 1\n" + SECRET.encode())
+        assert proxy.accept() == (0, b"tendon worker 1\n" + SECRET.encode())
         for sequence in range(1, 20):
-            assert front.ask(sequence, HAND).force == pytest.approx((0.03, 0, 2))
-        front.say(20, codec.write_frame(replace(HAND, buttons=1)))
+            assert proxy.ask(sequence, HAND).force == pytest.approx((0.03, 0, 2))
+        proxy.say(20, codec.write_frame(replace(HAND, buttons=1)))
         _, said = program.communicate(timeout=PATIENCE_S)
         assert program.returncode != 0
         assert "ArithmeticError: on rank 1" in said
 
 
-def test_two_ranks_of_mpi_end_with_the_stream(front, tmp_path):
+def test_two_ranks_of_mpi_end_with_the_stream(proxy, tmp_path):
     with on_ranks(tmp_path) as program:
-        front.accept()
-        front.ask(1, HAND)
-        front.close()
+        proxy.accept()
+        proxy.ask(1, HAND)
+        proxy.close()
         program.communicate(timeout=PATIENCE_S)
         assert program.returncode == 0
 

@@ -217,9 +217,9 @@ constexpr std::array kChecks = {
           "secret."},
     Check{"record-length", kWorker, kStream, "", "n, length of the rest, little-endian: 8 … 8 + kMaxDatagram"},
     Check{"stream-silent", kWorker, kStream, "",
-          "Only one state is in flight: the front waits for the answer before it sends the next."},
-    Check{"answer-comes", kWorker, kStream, "", "worker → front the same sequence, one frame force"},
-    Check{"answer-sequence", kWorker, kStream, "", "worker → front the same sequence"},
+          "Only one state is in flight: the proxy waits for the answer before it sends the next."},
+    Check{"answer-comes", kWorker, kStream, "", "worker → proxy the same sequence, one frame force"},
+    Check{"answer-sequence", kWorker, kStream, "", "worker → proxy the same sequence"},
     Check{"answer-body", kWorker, kStream, "",
           "Each further body is a Datagram of tendon.proto without the network header"},
     Check{"answer-names-state", kWorker, kStream, "",
@@ -228,7 +228,7 @@ constexpr std::array kChecks = {
     Check{"state-in-pieces", kWorker, kStream, "", "records on a byte stream"},
     Check{"state-of-a-handle", kWorker, kWire, kData, "bit i: button i is held"},
     Check{"state-unknown-field", kWorker, kWire, "Ground rules", "Unknown fields, frames and requests are not errors."},
-    Check{"states-in-a-row", kWorker, kStream, "", "front → worker sequence 1, 2, 3 …, one frame state"},
+    Check{"states-in-a-row", kWorker, kStream, "", "proxy → worker sequence 1, 2, 3 …, one frame state"},
     Check{"stream-ends", kWorker, kStream, "", "The worker exits at the end of the stream."},
 };
 

@@ -157,7 +157,7 @@ int run(int argc, char** argv) {
   common(client);
   CLI::App* const worker =
       app.add_subcommand("worker",
-                         "Test a worker, as its front. The worker is started twice: with a Unix socket, then with "
+                         "Test a worker, as its proxy. The worker is started twice: with a Unix socket, then with "
                          "TCP.\nExample: tendon-conformance worker -- mpirun -n 2 ./my_worker");
   worker->add_option("--listen", line.listen, "TCP address for the worker. Port 0: a free port")->capture_default_str();
   worker->add_option("--log", line.log, "File for the output of the worker")->type_name("FILE");

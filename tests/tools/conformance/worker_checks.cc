@@ -21,7 +21,7 @@ using std::chrono::seconds;
 using worker::Record;
 using Road = WorkerWire::Road;
 
-/// From the start of the program to its opening record. MPI and an interpreter are slow on a busy machine. A front
+/// From the start of the program to its opening record. MPI and an interpreter are slow on a busy machine. A proxy
 /// waits as long.
 constexpr Duration kStart = std::chrono::minutes(2);
 /// The maximum time for an answer. The first answer may require a compilation or a factorization.

@@ -11,7 +11,7 @@
 
 namespace tendon::conformance {
 
-/// A worker under test (clients/cpp/worker/stream.h): its program, the front's end of its stream, and the clock. Uses
+/// A worker under test (clients/cpp/worker/stream.h): its program, the proxy's end of its stream, and the clock. Uses
 /// processes and sockets, or a toy in this process with virtual time.
 class WorkerWire {
  public:
@@ -34,7 +34,7 @@ class WorkerWire {
   virtual std::uint64_t random() = 0;
 };
 
-/// Acts as the front of the worker at `wire`, over a Unix socket and then over TCP, and judges it with
+/// Acts as the proxy of the worker at `wire`, over a Unix socket and then over TCP, and judges it with
 /// Report(Side::kWorker).
 void judge_worker(WorkerWire& wire, Report& report);
 

@@ -13,7 +13,7 @@ namespace tendon::conformance {
 
 /// A worker's process and the socket to which it connects. Accepts only the first connection.
 ///
-/// Does not use WorkerProcess (clients/cpp/worker/worker_process.h), because a front never sends half a record, nor
+/// Does not use WorkerProcess (clients/cpp/worker/worker_process.h), because a proxy never sends half a record, nor
 /// ends a stream while its program lives.
 ///
 /// Thread-safe: no.

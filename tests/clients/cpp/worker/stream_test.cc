@@ -37,10 +37,10 @@ Touch full_touch() {
 }
 
 TEST(WorkerStream, StatesAndAnswersComeBackAsTheyWere) {
-  Codec front;
+  Codec proxy;
   Codec worker;
   const DeviceState hand = full_state();
-  const auto read = worker.read_state(front.state(7, hand));
+  const auto read = worker.read_state(proxy.state(7, hand));
   ASSERT_TRUE(read.has_value());
   EXPECT_EQ(read->tick, hand.tick);
   EXPECT_EQ(read->position, hand.position);
@@ -48,7 +48,7 @@ TEST(WorkerStream, StatesAndAnswersComeBackAsTheyWere) {
   EXPECT_EQ(read->turning->orientation.x, hand.turning->orientation.x);
 
   const Touch touch = full_touch();
-  const auto answer = front.read_answer(worker.answer(7, *read, touch), 7, hand);
+  const auto answer = proxy.read_answer(worker.answer(7, *read, touch), 7, hand);
   ASSERT_TRUE(answer.touch.has_value()) << answer.refused;
   EXPECT_EQ(answer.touch->force, touch.force);
   EXPECT_EQ(answer.touch->stiffness, touch.stiffness);

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "clients/cpp/run.h"
-#include "clients/cpp/worker/front.h"
+#include "clients/cpp/worker/proxy_scheduler.h"
 #include "clients/cpp/worker/worker_process.h"
 
 namespace tendon::worker {
@@ -15,36 +15,36 @@ namespace tendon::worker {
 /// session with the server stays open in all cases.
 ///
 /// Thread-safe: no. Realtime-safe: no.
-class FrontEngine : public Elsewhere {
+class ProxyEngine : public Elsewhere {
  public:
   struct Config {
     std::string name;  ///< program name, prefix of the messages
-    Front::Config front{};
+    ProxyScheduler::Config scheduler{};
     WorkerProcess::Config process;
   };
 
-  /// `says` receives a message for each change of the worker and must outlive this object. Throws as Front and
+  /// `says` receives a message for each change of the worker and must outlive this object. Throws as ProxyScheduler and
   /// WorkerProcess do.
-  FrontEngine(const Config& config, LocalTime now, std::ostream& says);
+  ProxyEngine(const Config& config, LocalTime now, std::ostream& says);
 
   void see(LocalTime now, const Seen& seen) override;
   std::optional<Reply> turn(LocalTime now) override;
-  LocalTime next_turn() const override { return front_.next_turn(); }
+  LocalTime next_turn() const override { return scheduler_.next_turn(); }
   int descriptor() const override { return process_.descriptor(); }
 
-  Front::Stats stats() const { return front_.stats(); }
+  ProxyScheduler::Stats stats() const { return scheduler_.stats(); }
 
  private:
   void take(LocalTime now, const WorkerProcess::Event& event);
-  std::optional<Reply> carry_out(LocalTime now, const Front::Order& order);
+  std::optional<Reply> carry_out(LocalTime now, const ProxyScheduler::Order& order);
   void say(const std::string& text);
 
   std::string name_;
   std::ostream& says_;
-  Front front_;
+  ProxyScheduler scheduler_;
   WorkerProcess process_;
   Codec codec_;
-  Front::Ask question_{};
+  ProxyScheduler::Ask question_{};
   std::string_view refused_{};
 };
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A front (tendon-fem serve) with a hand and with faulty workers. No test measures a time.
+// A proxy (tendon-fem serve) with a hand and with faulty workers. No test measures a time.
 #include <gtest/gtest.h>
 #include <signal.h>
 
@@ -16,19 +16,19 @@
 #include "tests/e2e/stage/stage.h"
 #include "tests/server/scratch_folder.h"
 
-namespace tendon::e2e::front_test {
+namespace tendon::e2e::proxy_engine_test {
 namespace {
 
 using testing::ScratchFolder;
 
-/// kPressingHand with forces that fade so fast that a gap of 0.5 s, the minimum of a front, passes through every stage.
+/// kPressingHand with forces that fade so fast that a gap of 0.5 s, the minimum of a proxy, passes through every stage.
 std::string pressing_hand() {
   std::string text(kPressingHand);
   const auto force = text.find("[force]");
   return text.replace(force, std::string::npos, "[force]\nhold_ms = 100\nsafe_stop_ms = 200\n");
 }
 
-/// The result of a front with the worker `fake_worker WAY`.
+/// The result of a proxy with the worker `fake_worker WAY`.
 struct Outcome {
   std::string out;
   std::string err;
@@ -59,10 +59,10 @@ Outcome run(const std::string& way, const std::vector<std::string>& more = {}, c
                                         "--server",     server.address(), "--dead-ms", "200",
                                         "--duration-s", seconds,          "--json"};
   arguments.insert(arguments.end(), more.begin(), more.end());
-  Process front(program("tendon-fem"), arguments, folder.path());
-  EXPECT_EQ(front.wait(), 0) << front.err();
+  Process proxy(program("tendon-fem"), arguments, folder.path());
+  EXPECT_EQ(proxy.wait(), 0) << proxy.err();
   server.stop();
-  Outcome run{.out = front.out(), .err = front.err(), .recording = read_recording(file), .modes = {}};
+  Outcome run{.out = proxy.out(), .err = proxy.err(), .recording = read_recording(file), .modes = {}};
   for (std::size_t at = 0; (at = run.out.find(R"({"report")", at)) != std::string::npos; ++at) {
     run.late_engine += count_in(run.out.substr(at), "late_engine");
     run.late_network += count_in(run.out.substr(at), "late_network");
@@ -83,9 +83,9 @@ Outcome run(const std::string& way, const std::vector<std::string>& more = {}, c
 
 const std::vector<Mode> kLadder = {Mode::kActive, Mode::kHolding, Mode::kDecaying, Mode::kSafeStop, Mode::kActive};
 
-class FrontWorker : public ::testing::TestWithParam<const char*> {};
+class ProxyWorker : public ::testing::TestWithParam<const char*> {};
 
-TEST_P(FrontWorker, ThatGoesWrongIsReplacedInOneSession) {
+TEST_P(ProxyWorker, ThatGoesWrongIsReplacedInOneSession) {
   const std::string way = GetParam();
   const Outcome gone = run(way + " 300");
   EXPECT_TRUE(gone.went_through(kLadder)) << gone.err;
@@ -96,14 +96,14 @@ TEST_P(FrontWorker, ThatGoesWrongIsReplacedInOneSession) {
   EXPECT_NE(gone.err.find("tendon-fem: worker 1 was stopped: "), std::string::npos) << gone.err;
 }
 
-INSTANTIATE_TEST_SUITE_P(AllWays, FrontWorker, ::testing::Values("dies", "stops", "sleeps", "nan", "shouts"),
+INSTANTIATE_TEST_SUITE_P(AllWays, ProxyWorker, ::testing::Values("dies", "stops", "sleeps", "nan", "shouts"),
                          [](const auto& way) {
                            std::string name = way.param;
                            std::erase(name, '-');
                            return name;
                          });
 
-TEST(Front, RefusesNoiseAndTakesTheAnswerAfterIt) {
+TEST(ProxyEngine, RefusesNoiseAndTakesTheAnswerAfterIt) {
   const Outcome noise = run("babbles 300");
   EXPECT_GE(noise.workers("refused"), 1000U);
   EXPECT_GE(noise.workers("answers"), 301U);
@@ -111,7 +111,7 @@ TEST(Front, RefusesNoiseAndTakesTheAnswerAfterIt) {
       << noise.err;
 }
 
-TEST(Front, DoesNotSendLateAnswersAndKeepsTheWorker) {
+TEST(ProxyEngine, DoesNotSendLateAnswersAndKeepsTheWorker) {
   const Outcome late = run("is-slow 300", {"--deadline-ms", "60"});
   EXPECT_TRUE(late.went_through({Mode::kActive, Mode::kHolding, Mode::kDecaying, Mode::kSafeStop})) << late.err;
   EXPECT_EQ(late.workers("launches"), 1U) << late.err;
@@ -119,7 +119,7 @@ TEST(Front, DoesNotSendLateAnswersAndKeepsTheWorker) {
   EXPECT_GT(late.late_engine, late.late_network);
 }
 
-TEST(Front, WithoutAWorkerThatStartsIsASilentEngine) {
+TEST(ProxyEngine, WithoutAWorkerThatStartsIsASilentEngine) {
   const Outcome none = run("ends-at-once");
   EXPECT_EQ(none.sessions(), 1U);
   EXPECT_GE(none.workers("launches"), 2U);
@@ -127,7 +127,7 @@ TEST(Front, WithoutAWorkerThatStartsIsASilentEngine) {
   EXPECT_NE(none.err.find("it exited with status 3; the next one starts in 0.5 s"), std::string::npos) << none.err;
 }
 
-TEST(Front, AnswersFromATableUntilTheNextWorker) {
+TEST(ProxyEngine, AnswersFromATableUntilTheNextWorker) {
   const ScratchFolder folder;
   const auto scene = demo_scene().replace_filename("softbody.toml").string();
   const auto table = (folder.path() / "soft.table").string();
@@ -140,14 +140,14 @@ TEST(Front, AnswersFromATableUntilTheNextWorker) {
   write(folder.path() / "scene.toml", text);
   const auto file = folder.path() / "run.mcap";
   Server server(folder.path(), scene_file, {"--record", file.string()});
-  Process front(program("tendon-fem"),
+  Process proxy(program("tendon-fem"),
                 {"serve", "scene.toml", "--worker", TENDON_FAKE_WORKER " dies 300", "--server", server.address(),
                  "--fallback", table, "--duration-s", "3", "--json"},
                 folder.path());
-  EXPECT_EQ(front.wait(), 0) << front.err();
+  EXPECT_EQ(proxy.wait(), 0) << proxy.err();
   server.stop();
-  const std::string workers = front.out().substr(front.out().rfind(R"({"workers")"));
-  EXPECT_GE(count_in(workers, "launches"), 2U) << front.err();
+  const std::string workers = proxy.out().substr(proxy.out().rfind(R"({"workers")"));
+  EXPECT_GE(count_in(workers, "launches"), 2U) << proxy.err();
   EXPECT_GE(count_in(workers, "fallback"), 100U);
   EXPECT_GE(count_in(workers, "answers"), 300U);
 
@@ -168,21 +168,21 @@ TEST(Front, AnswersFromATableUntilTheNextWorker) {
   EXPECT_GE(with_error, 50U) << "the fallback's error is raised by what it differs from live answers";
 }
 
-TEST(Front, KilledLeavesNoWorkerBehind) {
+TEST(ProxyEngine, KilledLeavesNoWorkerBehind) {
   const ScratchFolder folder;
   const auto scene_file = folder.path() / "hand.toml";
   write(scene_file, pressing_hand());
   const auto file = folder.path() / "run.mcap";
   Server server(folder.path(), scene_file, {"--record", file.string()});
   {
-    Process front(
+    Process proxy(
         program("tendon-fem"),
-        {"serve", "scene-of-a-killed-front.toml", "--worker", TENDON_FAKE_WORKER, "--server", server.address()},
+        {"serve", "scene-of-a-killed-proxy.toml", "--worker", TENDON_FAKE_WORKER, "--server", server.address()},
         folder.path());
-    front.wait_for_line("worker 1 is ready");
+    proxy.wait_for_line("worker 1 is ready");
     std::this_thread::sleep_for(std::chrono::milliseconds(500));
-    front.signal(SIGKILL);
-    front.wait();
+    proxy.signal(SIGKILL);
+    proxy.wait();
   }
   const auto left = [] {
     int count = 0;
@@ -190,7 +190,7 @@ TEST(Front, KilledLeavesNoWorkerBehind) {
     for (const auto& entry : std::filesystem::directory_iterator("/proc", ignored)) {
       std::ifstream process(entry.path() / "cmdline", std::ios::binary);
       const std::string line{std::istreambuf_iterator<char>(process), {}};
-      count += line.find("scene-of-a-killed-front") != std::string::npos ? 1 : 0;
+      count += line.find("scene-of-a-killed-proxy") != std::string::npos ? 1 : 0;
     }
     return count;
   };
@@ -203,7 +203,7 @@ TEST(Front, KilledLeavesNoWorkerBehind) {
   EXPECT_EQ(recording.steps.back().mode, Mode::kSafeStop);
 }
 
-TEST(Front, ExplainsABodyWithoutAServer) {
+TEST(ProxyEngine, ExplainsABodyWithoutAServer) {
   const ScratchFolder folder;
   const auto scene = demo_scene().replace_filename("softbody.toml").string();
   Process explain(program("tendon-fem"), {"explain", scene, "--ranks", "1,64"}, folder.path());
@@ -216,4 +216,4 @@ TEST(Front, ExplainsABodyWithoutAServer) {
 }
 
 }  // namespace
-}  // namespace tendon::e2e::front_test
+}  // namespace tendon::e2e::proxy_engine_test

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "clients/cpp/worker/front.h"
+#include "clients/cpp/worker/proxy_scheduler.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-namespace tendon::worker::front_test {
+namespace tendon::worker::proxy_scheduler_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -22,16 +22,17 @@ Seen at_tick(std::uint64_t tick) {
 
 Touch force(double newtons) { return Vec3(newtons, 0, 0); }
 
-/// A Front and the orders that it has given so far.
+/// A ProxyScheduler and the orders that it has given so far.
 class Played {
  public:
-  explicit Played(const Front::Config& config = {}) : front(config, now) { turn(); }
+  explicit Played(const ProxyScheduler::Config& config = {}) : scheduler(config, now) { turn(); }
 
   void turn() {
-    while (const auto order = front.turn(now)) {
-      if (std::holds_alternative<Front::Launch>(*order)) said.emplace_back("launch");
-      if (std::holds_alternative<Front::GiveUp>(*order)) said.emplace_back("give up");
-      if (const auto* ask = std::get_if<Front::Ask>(&*order)) said.push_back("ask " + std::to_string(ask->hand.tick));
+    while (const auto order = scheduler.turn(now)) {
+      if (std::holds_alternative<ProxyScheduler::Launch>(*order)) said.emplace_back("launch");
+      if (std::holds_alternative<ProxyScheduler::GiveUp>(*order)) said.emplace_back("give up");
+      if (const auto* ask = std::get_if<ProxyScheduler::Ask>(&*order))
+        said.push_back("ask " + std::to_string(ask->hand.tick));
       if (const auto* reply = std::get_if<Reply>(&*order)) {
         said.push_back("send " + std::to_string(reply->to.hand.tick));
         sent.push_back(*reply);
@@ -43,15 +44,15 @@ class Played {
     turn();
   }
   void see(std::uint64_t tick) {
-    front.see(at_tick(tick));
+    scheduler.see(at_tick(tick));
     turn();
   }
   void open() {
-    front.opened();
+    scheduler.opened();
     turn();
   }
   void answer(double newtons = 1) {
-    front.answered(now, force(newtons));
+    scheduler.answered(now, force(newtons));
     turn();
   }
   /// Sends a state and answers it after `time`.
@@ -61,7 +62,7 @@ class Played {
     answer(newtons);
   }
   void die() {
-    front.ended(now, "it was terminated by signal 9");
+    scheduler.ended(now, "it was terminated by signal 9");
     turn();
   }
   /// Returns the orders since the last call.
@@ -73,12 +74,12 @@ class Played {
   }
 
   LocalTime now{};
-  Front front;
+  ProxyScheduler scheduler;
   std::vector<std::string> said;
   std::vector<Reply> sent;
 };
 
-TEST(Front, AWorkerHasOneStateAtATimeAndThenTheNewest) {
+TEST(Scheduler, AWorkerHasOneStateAtATimeAndThenTheNewest) {
   Played played;
   EXPECT_EQ(played.news(), "launch");
   played.see(1);
@@ -92,7 +93,7 @@ TEST(Front, AWorkerHasOneStateAtATimeAndThenTheNewest) {
   EXPECT_EQ(played.sent.at(0).touch.force.x(), 1);
 }
 
-TEST(Front, ALateAnswerIsNotSentAndTheWorkerStays) {
+TEST(Scheduler, ALateAnswerIsNotSentAndTheWorkerStays) {
   Played played;
   played.open();
   played.see(1);
@@ -101,25 +102,25 @@ TEST(Front, ALateAnswerIsNotSentAndTheWorkerStays) {
   played.news();
   played.answer();
   EXPECT_EQ(played.news(), "ask 9");
-  EXPECT_EQ(played.front.stats().late, 1U);
-  EXPECT_EQ(played.front.stats().answers, 0U);
+  EXPECT_EQ(played.scheduler.stats().late, 1U);
+  EXPECT_EQ(played.scheduler.stats().answers, 0U);
 }
 
-TEST(Front, TheDeadlineIsThreeTimesTheMedian) {
+TEST(Scheduler, TheDeadlineIsThreeTimesTheMedian) {
   Played played({.dead = seconds(9)});
   played.open();
   for (std::uint64_t tick = 1; tick <= 63; ++tick) {  // 40 ms each: the deadline becomes 120 ms
     played.ask(tick, milliseconds(40));
   }
   played.ask(100, milliseconds(119));
-  EXPECT_EQ(played.front.stats().late, 0U);
+  EXPECT_EQ(played.scheduler.stats().late, 0U);
   played.ask(101, milliseconds(121));
-  EXPECT_EQ(played.front.stats().late, 1U);
-  EXPECT_EQ(played.front.stats().median, milliseconds(40));
+  EXPECT_EQ(played.scheduler.stats().late, 1U);
+  EXPECT_EQ(played.scheduler.stats().median, milliseconds(40));
 }
 
 /// Answers are fast without contact, but take 100 ms with contact. The hand must feel every tap.
-TEST(Front, QuickAnswersWithoutAForceDoNotMakeSlowOnesLate) {
+TEST(Scheduler, QuickAnswersWithoutAForceDoNotMakeSlowOnesLate) {
   Played played;
   played.open();
   std::uint64_t tick = 0;
@@ -131,12 +132,12 @@ TEST(Front, QuickAnswersWithoutAForceDoNotMakeSlowOnesLate) {
       played.ask(++tick, milliseconds(100));
     }
   }
-  EXPECT_EQ(played.front.stats().late, 1U) << "the first of all, before anything is known of a touch";
-  EXPECT_EQ(played.front.stats().median, milliseconds(100));
+  EXPECT_EQ(played.scheduler.stats().late, 1U) << "the first of all, before anything is known of a touch";
+  EXPECT_EQ(played.scheduler.stats().median, milliseconds(100));
 }
 
 /// The client expects the interval of the last two answers, which is almost zero without contact.
-TEST(Front, AnAnswerOfASlowBodyHoldsUntilTheNextIsLate) {
+TEST(Scheduler, AnAnswerOfASlowBodyHoldsUntilTheNextIsLate) {
   Played played;
   played.open();
   for (std::uint64_t tick = 1; tick < 4; ++tick) {
@@ -149,7 +150,7 @@ TEST(Front, AnAnswerOfASlowBodyHoldsUntilTheNextIsLate) {
   EXPECT_EQ(played.sent[played.sent.size() - 2].touch.valid_for, milliseconds(300)) << "the one without a force";
 }
 
-TEST(Front, AnAnswerOfAQuickBodyHoldsAsLongAsTheClientSays) {
+TEST(Scheduler, AnAnswerOfAQuickBodyHoldsAsLongAsTheClientSays) {
   Played played;
   played.open();
   for (std::uint64_t tick = 1; tick < 9; ++tick) {
@@ -159,16 +160,16 @@ TEST(Front, AnAnswerOfAQuickBodyHoldsAsLongAsTheClientSays) {
 }
 
 /// Measured with 180 000 unknowns on two ranks: the first contact takes 0.8 s, later ones 0.2 s.
-TEST(Front, ASlowFirstTouchIsWaitedForAndTenTimesTheMedianAfterIt) {
+TEST(Scheduler, ASlowFirstTouchIsWaitedForAndTenTimesTheMedianAfterIt) {
   Played played;
   played.open();
   played.see(1);
   played.answer(0);
   played.see(2);
   played.news();
-  played.after(Front::kDeadAtFirst);
+  played.after(ProxyScheduler::kDeadAtFirst);
   EXPECT_EQ(played.news(), "");
-  EXPECT_EQ(played.front.next_turn(), played.now + Duration(1));
+  EXPECT_EQ(played.scheduler.next_turn(), played.now + Duration(1));
   played.answer();
   for (std::uint64_t tick = 3; tick < 9; ++tick) {
     played.ask(tick, milliseconds(200));
@@ -181,7 +182,7 @@ TEST(Front, ASlowFirstTouchIsWaitedForAndTenTimesTheMedianAfterIt) {
   EXPECT_EQ(played.news(), "give up");
 }
 
-TEST(Front, AQuickWorkerIsWaitedForHalfASecond) {
+TEST(Scheduler, AQuickWorkerIsWaitedForHalfASecond) {
   Played played;
   played.open();
   played.see(1);
@@ -194,17 +195,17 @@ TEST(Front, AQuickWorkerIsWaitedForHalfASecond) {
   EXPECT_EQ(played.news(), "give up");
 }
 
-TEST(Front, AWorkerThatDoesNotAnswerIsReplaced) {
+TEST(Scheduler, AWorkerThatDoesNotAnswerIsReplaced) {
   Played played({.dead = milliseconds(500)});
   played.open();
   played.see(1);
   played.news();
   played.after(milliseconds(500));
   EXPECT_EQ(played.news(), "");
-  EXPECT_EQ(played.front.next_turn(), played.now + Duration(1));
+  EXPECT_EQ(played.scheduler.next_turn(), played.now + Duration(1));
   played.after(Duration(1));
   EXPECT_EQ(played.news(), "give up");
-  EXPECT_EQ(played.front.stats().why_given_up, "it has not replied for 500 ms");
+  EXPECT_EQ(played.scheduler.stats().why_given_up, "it has not replied for 500 ms");
   played.after(milliseconds(499));
   EXPECT_EQ(played.news(), "");
   played.see(7);
@@ -215,23 +216,23 @@ TEST(Front, AWorkerThatDoesNotAnswerIsReplaced) {
   EXPECT_EQ(played.news(), "ask 8") << "the newest, no queue";
 }
 
-TEST(Front, AWorkerThatIsNotAskedMayBeSilentForEver) {
+TEST(Scheduler, AWorkerThatIsNotAskedMayBeSilentForEver) {
   Played played;
   played.open();
   played.news();
   played.after(std::chrono::hours(9));
   EXPECT_EQ(played.news(), "");
-  EXPECT_EQ(played.front.next_turn(), LocalTime::max());
+  EXPECT_EQ(played.scheduler.next_turn(), LocalTime::max());
 }
 
-TEST(Front, TheNextWorkersComeLaterAndLater) {
+TEST(Scheduler, TheNextWorkersComeLaterAndLater) {
   Played played;
   std::vector<int> waits;
   for (int i = 0; i < 9; ++i) {
     played.open();
     played.die();
     played.news();
-    const Duration wait = played.front.next_turn() - played.now;
+    const Duration wait = played.scheduler.next_turn() - played.now;
     waits.push_back(static_cast<int>(wait / milliseconds(1)));
     played.after(wait - Duration(1));
     EXPECT_EQ(played.news(), "");
@@ -241,12 +242,12 @@ TEST(Front, TheNextWorkersComeLaterAndLater) {
   EXPECT_EQ(waits, (std::vector<int>{500, 1000, 2000, 4000, 8000, 16000, 30000, 30000, 30000}));
 }
 
-TEST(Front, AWorkerThatLastedSetsTheWaitBack) {
+TEST(Scheduler, AWorkerThatLastedSetsTheWaitBack) {
   Played played;
   for (int i = 0; i < 3; ++i) {
     played.open();
     played.die();
-    played.after(played.front.next_turn() - played.now);
+    played.after(played.scheduler.next_turn() - played.now);
   }
   played.open();
   for (std::uint64_t tick = 1; tick < 60; ++tick) {  // 5.9 s, longer than the next deadline of 4 s
@@ -254,29 +255,29 @@ TEST(Front, AWorkerThatLastedSetsTheWaitBack) {
     played.after(milliseconds(60));
   }
   played.die();
-  EXPECT_EQ(played.front.next_turn() - played.now, milliseconds(500));
+  EXPECT_EQ(played.scheduler.next_turn() - played.now, milliseconds(500));
 }
 
-TEST(Front, AWorkerThatDiesAtOnceDoesNotSetTheWaitBack) {
+TEST(Scheduler, AWorkerThatDiesAtOnceDoesNotSetTheWaitBack) {
   Played played;
   for (int i = 0; i < 3; ++i) {
     played.open();
     played.see(static_cast<std::uint64_t>(i));
     played.answer();
     played.die();
-    EXPECT_EQ(played.front.next_turn() - played.now, milliseconds(500 << i));
-    played.after(played.front.next_turn() - played.now);
+    EXPECT_EQ(played.scheduler.next_turn() - played.now, milliseconds(500 << i));
+    played.after(played.scheduler.next_turn() - played.now);
   }
 }
 
-TEST(Front, AWorkerThatDoesNotOpenItsStreamIsReplaced) {
+TEST(Scheduler, AWorkerThatDoesNotOpenItsStreamIsReplaced) {
   Played played({.start = seconds(5)});
   played.news();
   played.after(seconds(5));
   EXPECT_EQ(played.news(), "give up");
 }
 
-TEST(Front, WhatAnOldWorkerSaysAfterwardsIsNotSent) {
+TEST(Scheduler, WhatAnOldWorkerSaysAfterwardsIsNotSent) {
   Played played;
   played.open();
   played.see(1);
@@ -287,36 +288,36 @@ TEST(Front, WhatAnOldWorkerSaysAfterwardsIsNotSent) {
   EXPECT_EQ(played.news(), "");
 }
 
-TEST(Front, AnUnusableAnswerIsCountedAndDoesNotKeepTheWorkerAlive) {
+TEST(Scheduler, AnUnusableAnswerIsCountedAndDoesNotKeepTheWorkerAlive) {
   Played played({.dead = milliseconds(500)});
   played.open();
   played.see(1);
   played.news();
   for (int i = 0; i < 5; ++i) {
     played.after(milliseconds(100));
-    played.front.refused("it contains a number that is not finite");
+    played.scheduler.refused("it contains a number that is not finite");
   }
-  EXPECT_EQ(played.front.stats().refused, 5U);
-  EXPECT_EQ(played.front.stats().why_refused, "it contains a number that is not finite");
+  EXPECT_EQ(played.scheduler.stats().refused, 5U);
+  EXPECT_EQ(played.scheduler.stats().why_refused, "it contains a number that is not finite");
   played.after(milliseconds(1));
   EXPECT_EQ(played.news(), "give up");
 }
 
-TEST(Front, AnUnknownForceIsNotSent) {
+TEST(Scheduler, AnUnknownForceIsNotSent) {
   Played played;
   played.open();
   played.see(1);
   played.news();
   Touch unknown;
   unknown.unknown = true;
-  played.front.answered(played.now, unknown);
+  played.scheduler.answered(played.now, unknown);
   played.see(2);
   EXPECT_EQ(played.news(), "ask 2");
-  EXPECT_EQ(played.front.stats().unknown, 1U);
+  EXPECT_EQ(played.scheduler.stats().unknown, 1U);
 }
 
-Front::Config with_fallback() {
-  Front::Config config;
+ProxyScheduler::Config with_fallback() {
+  ProxyScheduler::Config config;
   config.fallback = [](const DeviceState&) {
     Touch touch = Vec3(3, 0, 0);
     touch.error = 0.5;
@@ -325,7 +326,7 @@ Front::Config with_fallback() {
   return config;
 }
 
-TEST(Front, WithAFallbackEveryStateIsAnsweredWhileNoWorkerCan) {
+TEST(Scheduler, WithAFallbackEveryStateIsAnsweredWhileNoWorkerCan) {
   Played played(with_fallback());
   played.news();
   played.see(1);
@@ -335,7 +336,7 @@ TEST(Front, WithAFallbackEveryStateIsAnsweredWhileNoWorkerCan) {
   played.news();
   played.see(3);
   EXPECT_EQ(played.news(), "") << "the worker has a state, and is not late";
-  EXPECT_EQ(played.front.next_turn(), played.now + milliseconds(50) + Duration(1));
+  EXPECT_EQ(played.scheduler.next_turn(), played.now + milliseconds(50) + Duration(1));
   played.after(milliseconds(51));
   EXPECT_EQ(played.news(), "send 3") << "late";
   played.see(4);
@@ -343,10 +344,10 @@ TEST(Front, WithAFallbackEveryStateIsAnsweredWhileNoWorkerCan) {
   played.die();
   played.see(5);
   EXPECT_EQ(played.news(), "give up, send 5");
-  EXPECT_EQ(played.front.stats().fallback, 5U);
+  EXPECT_EQ(played.scheduler.stats().fallback, 5U);
 }
 
-TEST(Front, TheFallbacksErrorIsRaisedByWhatItLastDifferedFromAnAnswer) {
+TEST(Scheduler, TheFallbacksErrorIsRaisedByWhatItLastDifferedFromAnAnswer) {
   Played played(with_fallback());
   played.open();
   played.see(1);
@@ -358,7 +359,7 @@ TEST(Front, TheFallbacksErrorIsRaisedByWhatItLastDifferedFromAnAnswer) {
   EXPECT_EQ(played.sent[1].touch.error, 0.5 + 2);
 }
 
-TEST(Front, TicksOfTheAnswersNeverFall) {
+TEST(Scheduler, TicksOfTheAnswersNeverFall) {
   Played played(with_fallback());
   std::uint64_t tick = 0;
   for (int round = 0; round < 20; ++round) {
@@ -376,17 +377,17 @@ TEST(Front, TicksOfTheAnswersNeverFall) {
     }
   }
   ASSERT_GT(played.sent.size(), 25U);
-  EXPECT_GT(played.front.stats().answers, 3U);
+  EXPECT_GT(played.scheduler.stats().answers, 3U);
   for (std::size_t i = 1; i < played.sent.size(); ++i) {
     EXPECT_GE(played.sent[i].to.hand.tick, played.sent[i - 1].to.hand.tick);
   }
 }
 
-TEST(Front, RefusesTimesThatAreNone) {
-  EXPECT_THROW(Front({.dead = Duration(-1)}, LocalTime{}), std::invalid_argument);
-  EXPECT_THROW(Front({.deadline = Duration(-1)}, LocalTime{}), std::invalid_argument);
-  EXPECT_THROW(Front({.retry_min = seconds(40)}, LocalTime{}), std::invalid_argument);
+TEST(Scheduler, RefusesTimesThatAreNone) {
+  EXPECT_THROW(ProxyScheduler({.dead = Duration(-1)}, LocalTime{}), std::invalid_argument);
+  EXPECT_THROW(ProxyScheduler({.deadline = Duration(-1)}, LocalTime{}), std::invalid_argument);
+  EXPECT_THROW(ProxyScheduler({.retry_min = seconds(40)}, LocalTime{}), std::invalid_argument);
 }
 
 }  // namespace
-}  // namespace tendon::worker::front_test
+}  // namespace tendon::worker::proxy_scheduler_test

@@ -13,8 +13,8 @@
 
 namespace tendon::worker {
 
-/// Scheduling policy of a front: when to send a state to the worker, which answers to use, and when to replace the
-/// worker. A pure state machine without sockets, processes or clocks.
+/// Scheduling policy of a ProxyEngine: when to send a state to the worker, which answers to use, and when to replace
+/// the worker. A pure state machine without sockets, processes or clocks.
 ///
 /// * **Newest wins.** The worker has one state at a time. After its answer it gets the newest one; states are not
 ///   queued.
@@ -30,7 +30,7 @@ namespace tendon::worker {
 ///   Its error is increased by its last difference from an answer of the worker to the same state.
 ///
 /// Thread-safe: no. Realtime-safe: no.
-class Front {
+class ProxyScheduler {
  public:
   struct Config {
     Duration deadline{};  ///< 0: three times the median of the newest answers with a force, at least kMinDeadline
@@ -69,7 +69,7 @@ class Front {
   };
 
   /// Throws std::invalid_argument "FIELD = VALUE: expected …". The first launch is due immediately.
-  Front(const Config& config, LocalTime now);
+  ProxyScheduler(const Config& config, LocalTime now);
 
   // Inputs:
 

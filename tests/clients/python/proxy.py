@@ -24,12 +24,12 @@ SECRET = "0123456789abcdef" * 4
 HAND = DeviceState(7, 12_000_000, (0.01, -0.02, 0.03), (0, 0, 0.5), (0, 0, 1), 0.25, 8, 0, 0, 0, Mode.ACTIVE)
 
 
-class Front:
+class Proxy:
     def __init__(self, road: str, folder: Path) -> None:
         if road == "unix":
             self._listener = socket.socket(socket.AF_UNIX)
-            self._listener.bind(str(folder / "front"))
-            self.address = f"unix:{folder / 'front'}"
+            self._listener.bind(str(folder / "proxy"))
+            self.address = f"unix:{folder / 'proxy'}"
         else:
             self._listener = socket.socket()
             self._listener.bind(("127.0.0.1", 0))

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "clients/cpp/worker/front.h"
+#include "clients/cpp/worker/proxy_scheduler.h"
 
 #include <algorithm>
 #include <utility>
@@ -9,7 +9,7 @@
 namespace tendon::worker {
 namespace {
 
-const Front::Config& checked(const Front::Config& config) {
+const ProxyScheduler::Config& checked(const ProxyScheduler::Config& config) {
   const auto positive = [](const char* name, Duration value) {
     expect(value > Duration::zero(), name, seconds(value), "a time > 0");
   };
@@ -27,18 +27,19 @@ bool has_force(const Touch& touch) {
 
 }  // namespace
 
-Front::Front(const Config& config, LocalTime now) : config_(checked(config)), due_(now), wait_(config.retry_min) {}
+ProxyScheduler::ProxyScheduler(const Config& config, LocalTime now)
+    : config_(checked(config)), due_(now), wait_(config.retry_min) {}
 
-void Front::see(const Seen& seen) {
+void ProxyScheduler::see(const Seen& seen) {
   newest_ = seen;
   newest_answered_ = false;
 }
 
-void Front::opened() {
+void ProxyScheduler::opened() {
   if (worker_ == Worker::kStarting) worker_ = Worker::kIdle;
 }
 
-void Front::answered(LocalTime now, const Touch& touch) {
+void ProxyScheduler::answered(LocalTime now, const Touch& touch) {
   if (worker_ != Worker::kBusy) return;
   const Duration took = now - asked_;
   const bool late = took > deadline();
@@ -63,16 +64,16 @@ void Front::answered(LocalTime now, const Touch& touch) {
   if (const Duration usual = 3 * median(); usual > kMinDeadline) answer_->touch.valid_for = usual;
 }
 
-void Front::refused(std::string_view why) {
+void ProxyScheduler::refused(std::string_view why) {
   ++stats_.refused;
   stats_.why_refused = why;
 }
 
-void Front::ended(LocalTime now, const std::string& why) {
+void ProxyScheduler::ended(LocalTime now, const std::string& why) {
   if (worker_ != Worker::kAbsent) give_up(now, why);
 }
 
-void Front::give_up(LocalTime now, const std::string& why) {
+void ProxyScheduler::give_up(LocalTime now, const std::string& why) {
   worker_ = Worker::kAbsent;
   due_ = now + wait_;
   wait_ = std::min(2 * wait_, config_.retry_max);
@@ -82,7 +83,7 @@ void Front::give_up(LocalTime now, const std::string& why) {
   to_give_up_ = why;
 }
 
-std::optional<Front::Order> Front::turn(LocalTime now) {
+std::optional<ProxyScheduler::Order> ProxyScheduler::turn(LocalTime now) {
   if (worker_ == Worker::kBusy && now - asked_ > dead()) {
     give_up(now, "it has not replied for " + std::to_string(dead() / std::chrono::milliseconds(1)) + " ms");
   }
@@ -108,7 +109,7 @@ std::optional<Front::Order> Front::turn(LocalTime now) {
   return fall_back(now);
 }
 
-std::optional<Front::Order> Front::fall_back(LocalTime now) {
+std::optional<ProxyScheduler::Order> ProxyScheduler::fall_back(LocalTime now) {
   const bool able = worker_ == Worker::kIdle || (worker_ == Worker::kBusy && !overdue(now));
   if (!config_.fallback || able || !newest_ || newest_answered_) return std::nullopt;
   newest_answered_ = true;
@@ -119,7 +120,7 @@ std::optional<Front::Order> Front::fall_back(LocalTime now) {
   return Reply{.to = *newest_, .touch = touch};
 }
 
-LocalTime Front::next_turn() const {
+LocalTime ProxyScheduler::next_turn() const {
   if (to_give_up_ || answer_) return LocalTime::min();
   switch (worker_) {
     case Worker::kAbsent:
@@ -134,16 +135,16 @@ LocalTime Front::next_turn() const {
   return config_.fallback && newest_ && !newest_answered_ ? std::min(end, asked_ + deadline() + Duration(1)) : end;
 }
 
-Duration Front::deadline() const {
+Duration ProxyScheduler::deadline() const {
   return config_.deadline > Duration::zero() ? config_.deadline : std::max(3 * median(), kMinDeadline);
 }
 
-Duration Front::dead() const {
+Duration ProxyScheduler::dead() const {
   if (config_.dead > Duration::zero()) return config_.dead;
   return count_ == 0 ? kDeadAtFirst : std::max(10 * median(), kMinDead);
 }
 
-Duration Front::median() const {
+Duration ProxyScheduler::median() const {
   const std::size_t known = std::min(count_, kTimes);
   if (known == 0) return {};
   std::array<Duration, kTimes> sorted = times_;
@@ -152,7 +153,7 @@ Duration Front::median() const {
   return *middle;
 }
 
-Front::Stats Front::stats() const {
+ProxyScheduler::Stats ProxyScheduler::stats() const {
   Stats stats = stats_;
   stats.worker = worker_;
   stats.median = median();

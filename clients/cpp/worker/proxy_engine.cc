@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "clients/cpp/worker/front_engine.h"
+#include "clients/cpp/worker/proxy_engine.h"
 
 #include <array>
 #include <cstddef>
@@ -25,16 +25,16 @@ std::string secret_from_system() {
 
 }  // namespace
 
-FrontEngine::FrontEngine(const Config& config, LocalTime now, std::ostream& says)
-    : name_(config.name), says_(says), front_(config.front, now), process_(config.process) {}
+ProxyEngine::ProxyEngine(const Config& config, LocalTime now, std::ostream& says)
+    : name_(config.name), says_(says), scheduler_(config.scheduler, now), process_(config.process) {}
 
-void FrontEngine::see(LocalTime /*now*/, const Seen& seen) { front_.see(seen); }
+void ProxyEngine::see(LocalTime /*now*/, const Seen& seen) { scheduler_.see(seen); }
 
-std::optional<Reply> FrontEngine::turn(LocalTime now) {
+std::optional<Reply> ProxyEngine::turn(LocalTime now) {
   for (;;) {
     if (const auto event = process_.next()) {
       take(now, *event);
-    } else if (const auto order = front_.turn(now)) {
+    } else if (const auto order = scheduler_.turn(now)) {
       if (auto answer = carry_out(now, *order)) return answer;
     } else {
       return std::nullopt;
@@ -42,31 +42,31 @@ std::optional<Reply> FrontEngine::turn(LocalTime now) {
   }
 }
 
-void FrontEngine::take(LocalTime now, const WorkerProcess::Event& event) {
+void ProxyEngine::take(LocalTime now, const WorkerProcess::Event& event) {
   if (std::holds_alternative<WorkerProcess::Opened>(event)) {
-    front_.opened();
-    say("worker " + std::to_string(front_.stats().launches) + " is ready");
+    scheduler_.opened();
+    say("worker " + std::to_string(scheduler_.stats().launches) + " is ready");
   } else if (const auto* ended = std::get_if<WorkerProcess::Ended>(&event)) {
-    front_.ended(now, ended->why);
+    scheduler_.ended(now, ended->why);
   } else {
     const auto answer = codec_.read_answer(std::get<Record>(event), question_.sequence, question_.hand);
-    if (answer.touch) return front_.answered(now, *answer.touch);
-    front_.refused(answer.refused);
+    if (answer.touch) return scheduler_.answered(now, *answer.touch);
+    scheduler_.refused(answer.refused);
     if (answer.refused != std::exchange(refused_, answer.refused)) {
       say("an answer of the worker was rejected: " + std::string(answer.refused));
     }
   }
 }
 
-std::optional<Reply> FrontEngine::carry_out(LocalTime now, const Front::Order& order) {
+std::optional<Reply> ProxyEngine::carry_out(LocalTime now, const ProxyScheduler::Order& order) {
   if (const auto* answer = std::get_if<Reply>(&order)) return *answer;
-  if (const auto* ask = std::get_if<Front::Ask>(&order)) {
+  if (const auto* ask = std::get_if<ProxyScheduler::Ask>(&order)) {
     question_ = *ask;
     process_.send(codec_.state(ask->sequence, ask->hand));
-  } else if (const auto* give_up = std::get_if<Front::GiveUp>(&order)) {
+  } else if (const auto* give_up = std::get_if<ProxyScheduler::GiveUp>(&order)) {
     process_.kill();
-    const auto wait = std::chrono::duration<double>(front_.next_turn() - now).count();
-    says_ << name_ << ": worker " << front_.stats().launches << " was stopped: " << give_up->why
+    const auto wait = std::chrono::duration<double>(scheduler_.next_turn() - now).count();
+    says_ << name_ << ": worker " << scheduler_.stats().launches << " was stopped: " << give_up->why
           << "; the next one starts in " << wait << " s\n"
           << std::flush;
   } else {
@@ -75,6 +75,6 @@ std::optional<Reply> FrontEngine::carry_out(LocalTime now, const Front::Order& o
   return std::nullopt;
 }
 
-void FrontEngine::say(const std::string& text) { says_ << name_ << ": " << text << '\n' << std::flush; }
+void ProxyEngine::say(const std::string& text) { says_ << name_ << ": " << text << '\n' << std::flush; }
 
 }  // namespace tendon::worker
