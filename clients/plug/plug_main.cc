@@ -10,25 +10,25 @@
 #include "clients/plug/subcommands.h"
 
 namespace tendon::plug {
-void add_common(CLI::App& app, DeskConfig& desk) {
-  desk.client.name = "tendon-plug " + app.get_name();
+void add_common(CLI::App& app, BridgeConfig& config) {
+  config.client.name = "tendon-plug " + app.get_name();
   app.add_option_function<std::string>(
-         "--server", [&](const std::string& text) { desk.server = text; },
+         "--server", [&](const std::string& text) { config.server = text; },
          "Address of tendond: a host name or an IP address; or dns-sd:NAME, which requires --key")
       ->type_name("HOST:PORT")
-      ->default_str(desk.server.text())
+      ->default_str(config.server.text())
       ->check(usage::accepted_by([](const std::string& text) { ServerName{text}; }));
   app.add_option_function<std::string>(
-         "--key", [&](const std::string& file) { desk.client.key = read_client_key(file).key; },
+         "--key", [&](const std::string& file) { config.client.key = read_client_key(file).key; },
          "Key file from `tendond keygen`. Not required for a server on this machine without keys")
       ->type_name("FILE");
-  app.add_option("--device", desk.devices, "Name of a device, repeatable. Default: the first device of the server")
+  app.add_option("--device", config.devices, "Name of a device, repeatable. Default: the first device of the server")
       ->allow_extra_args(false)
       ->type_name("NAME");
-  app.add_option("--channel", desk.client.channel, "Name of the channel of the device")->type_name("NAME");
-  app.add_flag("--take-lease", desk.client.take_lease, "Request the channel until it is free");
-  app.add_flag("--observe", desk.observe, "Send no forces");
-  app.add_flag("--json", desk.json, "Print JSON on stdout, one object per line, once a second for each device");
+  app.add_option("--channel", config.client.channel, "Name of the channel of the device")->type_name("NAME");
+  app.add_flag("--take-lease", config.client.take_lease, "Request the channel until it is free");
+  app.add_flag("--observe", config.observe, "Send no forces");
+  app.add_flag("--json", config.json, "Print JSON on stdout, one object per line, once a second for each device");
 }
 
 namespace {

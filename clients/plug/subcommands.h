@@ -3,7 +3,7 @@
 
 #include <functional>
 
-#include "clients/plug/desk.h"
+#include "clients/plug/bridge_host.h"
 
 namespace CLI {
 class App;
@@ -17,7 +17,7 @@ using Chosen = std::function<int()>;
 
 /// Adds the options of all bridges: --server, --key, --device, --channel, --take-lease, --observe, --json. The client
 /// name sent to the server is "tendon-plug" followed by the name of the subcommand.
-void add_common(CLI::App& app, DeskConfig& desk);
+void add_common(CLI::App& app, BridgeConfig& config);
 
 // Each adds a subcommand, defined in FOLDER/…_main.cc, which sets `chosen` when it is selected.
 void add_chai3d(CLI::App& app, Chosen& chosen);

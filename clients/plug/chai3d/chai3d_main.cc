@@ -47,7 +47,7 @@ constexpr Duration kBeforeTheProgram = std::chrono::seconds(1);
 constexpr int kMaxWakes = 64;  ///< wake-ups read in one turn; the program sends one for each force
 
 struct Options {
-  DeskConfig desk;
+  BridgeConfig bridge;
   std::string model;
   std::string pace = "on";
   std::vector<std::string> program;
@@ -176,12 +176,12 @@ void refuse_openhaptics(const std::filesystem::path& program) {
 int serve(const Options& options) {
   const std::filesystem::path libraries = library_folder();
   refuse_openhaptics(find_program(options.program.front()));
-  if (options.desk.devices.size() > SharedHands::kMaxDevices) throw std::runtime_error("expected at most 16 devices");
+  if (options.bridge.devices.size() > SharedHands::kMaxDevices) throw std::runtime_error("expected at most 16 devices");
   Memory memory;
   const Waker waker;
   SharedHands& hands = memory.hands();
-  Desk desk(options.desk, read_clock());
-  hands.devices = static_cast<std::uint32_t>(desk.size());
+  BridgeHost bridge_host(options.bridge, read_clock());
+  hands.devices = static_cast<std::uint32_t>(bridge_host.size());
   hands.paced = options.pace == "on" ? 1 : 0;
   Host host(hands, {.model = options.model});
   const StopSignals signals;
@@ -191,21 +191,21 @@ int serve(const Options& options) {
   const LocalTime start = read_clock();
   for (;;) {
     LocalTime now = read_clock();
-    next = desk.turn(now);
+    next = bridge_host.turn(now);
     bool asked = false;
-    for (std::size_t i = 0; i < desk.size(); ++i) asked = host.exchange(i, desk.plug(i), now) || asked;
+    for (std::size_t i = 0; i < bridge_host.size(); ++i) asked = host.exchange(i, bridge_host.plug(i), now) || asked;
     if (host.announce()) ::syscall(SYS_futex, &hands.news, FUTEX_WAKE, INT_MAX, nullptr, nullptr, 0);
-    if (asked) next = std::min(next, desk.turn(read_clock()));
+    if (asked) next = std::min(next, bridge_host.turn(read_clock()));
     if (!child && (hands.ready.load() != 0 || now - start >= kBeforeTheProgram)) {
       if (hands.ready.load() == 0)
-        desk.say("no state was received from any device; starting the program without a device");
+        bridge_host.say("no state was received from any device; starting the program without a device");
       const std::string path = memory.path();
       child = ::fork();
       if (*child < 0) fail("cannot start the program");
       if (*child == 0) become(options, path, waker.name(), libraries);
     }
     if (int status = 0; child && ::waitpid(*child, &status, WNOHANG) == *child) {
-      desk.stop(read_clock());
+      bridge_host.stop(read_clock());
       return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
     }
     if (signals.asked() && !std::exchange(told, true)) {
@@ -213,7 +213,7 @@ int serve(const Options& options) {
       ::kill(*child, SIGTERM);  // the loop ends with the program
     }
     std::array<pollfd, 1> programs = {waker.to_poll()};
-    desk.wait(programs, read_clock(), next);
+    bridge_host.wait(programs, read_clock(), next);
     if (programs[0].revents != 0) waker.drain();
   }
 }
@@ -225,7 +225,7 @@ void add_chai3d(CLI::App& app, Chosen& chosen) {
   CLI::App& command = *app.add_subcommand(
       "chai3d", "Start an existing program that is built with CHAI3D. It sees the devices as Phantoms");
   command.footer("Example: tendon-plug chai3d --server lab:47100 --key wall.key -- ./01-mydevice");
-  add_common(command, options.desk);
+  add_common(command, options.bridge);
   command
       .add_option("--model", options.model,
                   "Name of the model, such as \"PHANTOM Omni\", for programs that require one. Empty: the name of the "

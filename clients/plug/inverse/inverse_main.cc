@@ -33,7 +33,7 @@ void add_inverse(CLI::App& app, Chosen& chosen) {
 namespace {
 
 struct InverseOptions {
-  DeskConfig desk;
+  BridgeConfig bridge;
   InverseServer::Config server;
   std::string listen = to_string(InverseServer::Config{}.listen);
   bool anybody = false;
@@ -49,19 +49,19 @@ int run_inverse(const InverseOptions& options) {
               << ": expected a loopback address, or --anybody: anyone who can reach this port can move the motors\n";
     return 2;
   }
-  DeskConfig desk_config = options.desk;
-  desk_config.client.valid_for = InverseSession::kFresh;
-  Desk desk(std::move(desk_config), read_clock());
-  InverseServer server(config, desk, read_clock);
-  if (!local) desk.say("anyone who can reach " + to_string(server.address()) + " can move the motors");
+  BridgeConfig host_config = options.bridge;
+  host_config.client.valid_for = InverseSession::kFresh;
+  BridgeHost host(std::move(host_config), read_clock());
+  InverseServer server(config, host, read_clock);
+  if (!local) host.say("anyone who can reach " + to_string(server.address()) + " can move the motors");
   const std::string at = to_string(server.address());
-  if (options.desk.json) {
+  if (options.bridge.json) {
     std::cout << nlohmann::ordered_json{{"event", "listening"}, {"address", at}} << std::endl;
   } else {
-    desk.say("listening at ws://" + at);
+    host.say("listening at ws://" + at);
   }
   server.run(from_seconds(options.duration_s));
-  return desk.stop(read_clock());
+  return host.stop(read_clock());
 }
 
 }  // namespace
@@ -72,7 +72,7 @@ void add_inverse(CLI::App& app, Chosen& chosen) {
                                                "for Isaac Lab, web pages and all languages");
   command->footer("Example: tendon-plug inverse --server lab:47100 --device right");
   static InverseOptions options;  // the parser writes to it until `chosen` is called
-  add_common(*command, options.desk);
+  add_common(*command, options.bridge);
   command
       ->add_option("--listen", options.listen,
                    "Address of the WebSocket. Port 0: a free port. Other machines are only accepted with --anybody")

@@ -44,7 +44,7 @@ using asio::ip::tcp;
 using boost::system::error_code;
 
 constexpr std::size_t kMostInOneTurn = 256;
-constexpr int kMostDeskTurns = 4;
+constexpr int kMostHostTurns = 4;
 /// Upper limit of a sleep, so that timeouts are noticed.
 constexpr Duration kLongestSleep = std::chrono::milliseconds(100);
 /// A WebSocket that is silent for this time gets a ping, and is closed if it does not answer.
@@ -73,7 +73,8 @@ auto waiting_time(Duration d) {
   return std::chrono::duration_cast<asio::steady_timer::duration>(std::max(d, Duration::zero()));
 }
 
-/// A socket of the desk, watched through a duplicated descriptor because the desk may close its own at any time.
+/// A socket of the BridgeHost, watched through a duplicated descriptor because the BridgeHost may close its own at any
+/// time.
 struct WatchedSocket {
   std::uint64_t number = 0;  ///< 1, 2, 3 …; lets handlers of a closed socket detect that it was replaced
   ino_t id = 0;              ///< inode; unlike descriptor numbers, it is not reused immediately
@@ -90,7 +91,7 @@ class InverseConnection;
 
 struct InverseShared {
   const InverseServer::Config& config;
-  Desk& desk;
+  BridgeHost& host;
   InverseServer::Clock clock;
   asio::io_context& context;
   std::vector<InverseDevice> devices{};
@@ -136,7 +137,7 @@ class InverseConnection {
     session_.reset();
     --shared_.clients;
     shared_.full_said = false;
-    shared_.desk.say("client " + std::to_string(program_) + " left" + (why_.empty() ? "" : ": " + why_));
+    shared_.host.say("client " + std::to_string(program_) + " left" + (why_.empty() ? "" : ": " + why_));
   }
 
   bool answer(LocalTime now) {
@@ -207,7 +208,7 @@ class InverseConnection {
     if (shared_.clients >= shared_.config.max_clients) {
       const std::string words = std::to_string(shared_.clients) + " clients are already connected";
       if (!std::exchange(shared_.full_said, true))
-        shared_.desk.say("another client from " + peer_ + " was refused: " + words);
+        shared_.host.say("another client from " + peer_ + " was refused: " + words);
       return refuse("503 Service Unavailable", words);
     }
     accept();
@@ -234,7 +235,7 @@ class InverseConnection {
     program_ = ++shared_.newest;
     session_.emplace(program_, shared_.devices, shared_.counts, shared_.clock());
     ++shared_.clients;
-    shared_.desk.say("client " + std::to_string(program_) + " connected from " + peer_);
+    shared_.host.say("client " + std::to_string(program_) + " connected from " + peer_);
     stream_.expires_never();
     web_socket_.emplace(std::move(stream_));
     websocket::stream_base::timeout timeout{};
@@ -311,8 +312,8 @@ class InverseConnection {
 }  // namespace
 
 struct InverseServer::State {
-  State(Config own, Desk& desk, Clock clock)
-      : config(std::move(own)), shared{.config = config, .desk = desk, .clock = clock, .context = context} {
+  State(Config own, BridgeHost& host, Clock clock)
+      : config(std::move(own)), shared{.config = config, .host = host, .clock = clock, .context = context} {
     const tcp::endpoint at(ip_of(config.listen), config.listen.port);
     error_code error;
     acceptor.open(at.protocol(), error);
@@ -321,9 +322,9 @@ struct InverseServer::State {
     if (!error) acceptor.listen(asio::socket_base::max_listen_connections, error);
     if (error) throw std::runtime_error("cannot listen on " + to_string(config.listen) + ": " + error.message());
     std::vector<std::pair<std::string, Plug*>> plugs;
-    for (std::size_t i = 0; i < desk.size(); ++i) plugs.emplace_back(desk.name(i), &desk.plug(i));
+    for (std::size_t i = 0; i < host.size(); ++i) plugs.emplace_back(host.name(i), &host.plug(i));
     shared.devices = inverse_devices(plugs);
-    owners.resize(desk.size());
+    owners.resize(host.size());
     shared.read_one = [this] { schedule_answers(); };
   }
 
@@ -351,21 +352,21 @@ struct InverseServer::State {
     });
   }
 
-  /// Calls the desk until no work is due. A force computed in one turn is sent in the next.
-  LocalTime turn_desk() {
+  /// Calls the BridgeHost until no work is due. A force computed in one turn is sent in the next.
+  LocalTime turn_host() {
     const InverseCounts& counts = shared.counts;
-    const std::array<Desk::Count, 6> all = {{{"clients", shared.clients},
-                                             {"messages", counts.messages},
-                                             {"skipped", counts.skipped},
-                                             {"unread", counts.unread},
-                                             {"refused", counts.refused},
-                                             {"ignored", counts.ignored}}};
+    const std::array<BridgeHost::Count, 6> all = {{{"clients", shared.clients},
+                                                   {"messages", counts.messages},
+                                                   {"skipped", counts.skipped},
+                                                   {"unread", counts.unread},
+                                                   {"refused", counts.refused},
+                                                   {"ignored", counts.ignored}}};
     const auto until_nothing_is_due = [&] {
       LocalTime next{};
-      for (int i = 0; i < kMostDeskTurns; ++i) {
+      for (int i = 0; i < kMostHostTurns; ++i) {
         const LocalTime now = shared.clock();
         if (i > 0 && next > now) break;
-        next = shared.desk.turn(now, all);
+        next = shared.host.turn(now, all);
       }
       return next;
     };
@@ -379,11 +380,11 @@ struct InverseServer::State {
   }
 
   void turn() {
-    LocalTime next = turn_desk();
+    LocalTime next = turn_host();
     const LocalTime now = shared.clock();
     bool answered = false;
     for (const auto& connection : shared.connections) answered |= connection->answer(now);
-    if (answered) next = turn_desk();
+    if (answered) next = turn_host();
     for (const auto& connection : shared.connections) {
       connection->pump(now);
       if (connection->has_session()) next = std::min(next, connection->session()->due());
@@ -408,20 +409,20 @@ struct InverseServer::State {
 
   void say_owners() {
     for (std::size_t i = 0; i < owners.size(); ++i) {
-      const Plug::Program owner = shared.desk.plug(i).owner();
+      const Plug::Program owner = shared.host.plug(i).owner();
       if (std::exchange(owners[i], owner) == owner) continue;
-      shared.desk.say(shared.desk.name(i) + ": " +
+      shared.host.say(shared.host.name(i) + ": " +
                       (owner == 0 ? "no client requests a force any more"
                                   : "client " + std::to_string(owner) + " controls the force"));
     }
   }
 
-  /// The sockets of the desk change after a name lookup, which happens only while a device has no session.
+  /// The sockets of the BridgeHost change after a name lookup, which happens only while a device has no session.
   void watch() {
     bool lost = false;
-    for (std::size_t i = 0; i < shared.desk.size(); ++i) lost = lost || shared.desk.plug(i).lost();
+    for (std::size_t i = 0; i < shared.host.size(); ++i) lost = lost || shared.host.plug(i).lost();
     const bool may_differ = std::exchange(was_lost, lost) || lost;
-    const std::vector<int> descriptors = shared.desk.descriptors();
+    const std::vector<int> descriptors = shared.host.descriptors();
     watched.resize(descriptors.size());
     for (std::size_t i = 0; i < descriptors.size(); ++i) {
       WatchedSocket& socket = watched[i];
@@ -456,8 +457,8 @@ struct InverseServer::State {
   std::size_t read_before = 0;
 };
 
-InverseServer::InverseServer(Config config, Desk& desk, Clock clock)
-    : state_(std::make_unique<State>(std::move(config), desk, clock)) {}
+InverseServer::InverseServer(Config config, BridgeHost& host, Clock clock)
+    : state_(std::make_unique<State>(std::move(config), host, clock)) {}
 
 InverseServer::~InverseServer() = default;
 

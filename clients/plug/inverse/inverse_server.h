@@ -7,14 +7,14 @@
 #include <string>
 #include <vector>
 
-#include "clients/plug/desk.h"
+#include "clients/plug/bridge_host.h"
 #include "clients/plug/inverse/inverse_session.h"
 #include "protocol/link.h"
 
 namespace tendon::plug {
 
-/// The WebSocket server of the bridge. It uses one thread; each client has an InverseSession, and all share one Desk.
-/// Only the source file uses Boost.Beast and Boost.Asio.
+/// The WebSocket server of the bridge. It uses one thread; each client has an InverseSession, and all share one
+/// BridgeHost. Only the source file uses Boost.Beast and Boost.Asio.
 ///
 /// * **Turns.** A turn reads at most kMostMessages of each client and 256 in total. Their forces are sent before the
 ///   replies are written, and the replies contain the newest states.
@@ -41,9 +41,9 @@ class InverseServer {
   static constexpr std::size_t kMostMessages = 64;  ///< of one client in one turn; 64 kB of replies for one device
   using Clock = LocalTime (*)();
 
-  /// Starts to listen. The desk must outlive the server. Throws std::runtime_error: "cannot listen on
+  /// Starts to listen. The BridgeHost must outlive the server. Throws std::runtime_error: "cannot listen on
   /// 127.0.0.1:10001: Address already in use".
-  InverseServer(Config config, Desk& desk, Clock clock);
+  InverseServer(Config config, BridgeHost& host, Clock clock);
   ~InverseServer();
 
   Address address() const;

@@ -26,7 +26,7 @@ namespace tendon::plug {
 namespace {
 
 struct Ros2Options {
-  DeskConfig desk;
+  BridgeConfig bridge;
   std::uint32_t domain = 0;
   std::string interface;
   std::vector<std::string> peers;
@@ -62,9 +62,9 @@ Duration since_1970() {
 class Ros2Bridge {
  public:
   explicit Ros2Bridge(const Ros2Options& options)
-      : options_(options), desk_(options.desk, read_clock()), node_(config(options, desk_)) {
-    for (std::size_t i = 0; i < desk_.size(); ++i) {
-      RosDevice::Config of_device{.name = ros_name(desk_.name(i)),
+      : options_(options), host_(options.bridge, read_clock()), node_(config(options, host_)) {
+    for (std::size_t i = 0; i < host_.size(); ++i) {
+      RosDevice::Config of_device{.name = ros_name(host_.name(i)),
                                   .rate_hz = options.rate_hz,
                                   .negate = options.negate,
                                   .clutch = options.clutch};
@@ -72,7 +72,7 @@ class Ros2Bridge {
         const std::string frame = options.servo_frame.empty() ? of_device.name + "_servo" : options.servo_frame;
         of_device.servo.emplace(*options.servo, options.servo_scale, frame);
       }
-      devices_.emplace_back(desk_.plug(i), std::move(of_device));
+      devices_.emplace_back(host_.plug(i), std::move(of_device));
     }
   }
 
@@ -85,10 +85,10 @@ class Ros2Bridge {
     LocalTime next_take = now;
     bool rings = true;
     for (; !signals.asked() && now < end; now = read_clock()) {
-      const std::array<Desk::Count, 4> counts = {{{"published", node_.published()},
-                                                  {"unsent", node_.unsent()},
-                                                  {"superseded", node_.superseded()},
-                                                  {"refused", refused()}}};
+      const std::array<BridgeHost::Count, 4> counts = {{{"published", node_.published()},
+                                                        {"unsent", node_.unsent()},
+                                                        {"superseded", node_.superseded()},
+                                                        {"refused", refused()}}};
       LocalTime next = std::min({turn(now, counts), next_diagnosis, end});
       if (rings && take(now)) {
         next_take = now + kLeastGap;
@@ -101,32 +101,32 @@ class Ros2Bridge {
       }
       std::array<pollfd, 1> bell = {{{node_.descriptor(), POLLIN, 0}}};
       const bool listens = now >= next_take;
-      desk_.wait(std::span(bell).first(listens ? 1 : 0), now, listens ? next : std::min(next, next_take));
+      host_.wait(std::span(bell).first(listens ? 1 : 0), now, listens ? next : std::min(next, next_take));
       rings = bell[0].revents != 0;
     }
-    return desk_.stop(read_clock());
+    return host_.stop(read_clock());
   }
 
  private:
   /// Turns until nothing is due. A force computed in one turn is sent in the next.
-  LocalTime turn(LocalTime now, std::span<const Desk::Count> counts) {
+  LocalTime turn(LocalTime now, std::span<const BridgeHost::Count> counts) {
     LocalTime next = now;
-    for (int turns = 0; next <= now && turns < 4; ++turns) next = desk_.turn(now, counts);
+    for (int turns = 0; next <= now && turns < 4; ++turns) next = host_.turn(now, counts);
     return next;
   }
 
-  static Ros2Node::Config config(const Ros2Options& options, const Desk& desk) {
+  static Ros2Node::Config config(const Ros2Options& options, const BridgeHost& host) {
     Ros2Node::Config config{.domain = options.domain,
                             .interface = options.interface,
                             .peers = options.peers,
                             .devices = {},
                             .servo = options.servo};
     std::map<std::string, std::string> taken;
-    for (std::size_t i = 0; i < desk.size(); ++i) {
-      const std::string name = ros_name(desk.name(i));
-      const auto [other, fresh] = taken.emplace(name, desk.name(i));
+    for (std::size_t i = 0; i < host.size(); ++i) {
+      const std::string name = ros_name(host.name(i));
+      const auto [other, fresh] = taken.emplace(name, host.name(i));
       if (!fresh) {
-        throw std::runtime_error("--device " + desk.name(i) + ": its ROS name would be " + name +
+        throw std::runtime_error("--device " + host.name(i) + ": its ROS name would be " + name +
                                  ", which is already used for " + other->second);
       }
       config.devices.push_back(name);
@@ -139,12 +139,12 @@ class Ros2Bridge {
     if (options_.negate) {
       sentence = "--negate: wrench_command is the force on a robot or of the hand, and its opposite acts on the hand";
     }
-    desk_.say(sentence + "; the topic wrench is always the force of the device on the hand");
+    host_.say(sentence + "; the topic wrench is always the force of the device on the hand");
     if (!options_.interface.empty()) {
-      desk_.say("--interface " + options_.interface + ": anyone who can reach DDS domain " +
+      host_.say("--interface " + options_.interface + ": anyone who can reach DDS domain " +
                 std::to_string(options_.domain) + " on this interface can move the motors");
     }
-    if (options_.desk.json) {
+    if (options_.bridge.json) {
       const nlohmann::ordered_json line = {{"event", "listening"},
                                            {"address", "domain " + std::to_string(options_.domain)}};
       std::cout << line << std::endl;
@@ -160,7 +160,7 @@ class Ros2Bridge {
         devices_[i].take(command->writer, command->called, command->wrench, now);
         asked = true;
       }
-      while (const auto sentence = devices_[i].next_sentence()) desk_.say(desk_.name(i) + ": " + *sentence);
+      while (const auto sentence = devices_[i].next_sentence()) host_.say(host_.name(i) + ": " + *sentence);
     }
     return asked;
   }
@@ -183,7 +183,7 @@ class Ros2Bridge {
   }
 
   Ros2Options options_;
-  Desk desk_;
+  BridgeHost host_;
   Ros2Node node_;
   std::deque<RosDevice> devices_;
 };
@@ -196,9 +196,9 @@ void add_ros2(CLI::App& app, Chosen& chosen) {
   ros2.footer(
       "Example: tendon-plug ros2 --server lab:47100 --device right\n"
       "Example: tendon-plug ros2 --server lab:47100 --device right --servo twist --clutch 0");
-  o.desk.client.joints = true;
-  o.desk.client.diagnostics = true;
-  add_common(ros2, o.desk);
+  o.bridge.client.joints = true;
+  o.bridge.client.diagnostics = true;
+  add_common(ros2, o.bridge);
   ros2.add_option("--domain", o.domain, "ROS_DOMAIN_ID")
       ->envname("ROS_DOMAIN_ID")
       ->check(CLI::Range(0U, Ros2Node::kMaxDomain))

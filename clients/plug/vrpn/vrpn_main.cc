@@ -18,7 +18,7 @@ namespace tendon::plug {
 namespace {
 
 struct VrpnOptions {
-  DeskConfig desk;
+  BridgeConfig bridge;
   std::vector<std::string> names;
   std::string listen = "127.0.0.1:3883";
   bool anybody = false;
@@ -56,12 +56,12 @@ vrpn::Server::Config config_of(VrpnOptions& options) {
                              ": expected a loopback address, or --anybody: anyone who can reach this port can move the "
                              "motors, because VRPN has no authentication");
   }
-  for (const std::string& text : options.names) config.names.push_back(alias_of(text, options.desk.devices));
-  if (config.names.empty() && options.desk.devices.empty())
-    config.names.push_back(alias_of("Phantom0", options.desk.devices));
+  for (const std::string& text : options.names) config.names.push_back(alias_of(text, options.bridge.devices));
+  if (config.names.empty() && options.bridge.devices.empty())
+    config.names.push_back(alias_of("Phantom0", options.bridge.devices));
   if (options.names.empty()) {
-    for (std::size_t i = config.names.size(); i < options.desk.devices.size(); ++i) {
-      config.names.push_back({options.desk.devices[i], i});
+    for (std::size_t i = config.names.size(); i < options.bridge.devices.size(); ++i) {
+      config.names.push_back({options.bridge.devices[i], i});
     }
   }
   for (std::size_t i = 0; i < config.names.size(); ++i) {
@@ -79,17 +79,17 @@ int run_vrpn(VrpnOptions& options) {
   const StopSignals signals;
   const LocalTime start = read_clock();
   const LocalTime end = options.duration_s > 0 ? start + from_seconds(options.duration_s) : LocalTime::max();
-  Desk desk(options.desk, start);
-  vrpn::Server server(desk, config, start);
-  if (options.desk.json) {
+  BridgeHost host(options.bridge, start);
+  vrpn::Server server(host, config, start);
+  if (options.bridge.json) {
     std::cout << nlohmann::json{{"event", "listening"}, {"address", to_string(server.address())}} << std::endl;
   }
   std::string names;
   for (const auto& alias : config.names)
-    names += (names.empty() ? "" : ", ") + alias.name + " (" + desk.name(alias.place) + ")";
-  desk.say("VRPN at " + to_string(server.address()) + ": " + names);
+    names += (names.empty() ? "" : ", ") + alias.name + " (" + host.name(alias.place) + ")";
+  host.say("VRPN at " + to_string(server.address()) + ": " + names);
   if (!is_loopback(config.listen))
-    desk.say("anyone who can reach this port can move the motors: VRPN has no authentication");
+    host.say("anyone who can reach this port can move the motors: VRPN has no authentication");
   // Messages contain the time of day, and the system clock may be adjusted while running.
   Duration to_1970{};
   LocalTime look_again = start;
@@ -99,14 +99,14 @@ int run_vrpn(VrpnOptions& options) {
       to_1970 = std::chrono::system_clock::now().time_since_epoch() - now.time_since_epoch();
       look_again = now + std::chrono::seconds(1);
     }
-    LocalTime next = desk.turn(now, server.counts());
-    for (int i = 0; i < kTurnsAtOnce && next <= now; ++i) next = desk.turn(now = read_clock(), server.counts());
+    LocalTime next = host.turn(now, server.counts());
+    for (int i = 0; i < kTurnsAtOnce && next <= now; ++i) next = host.turn(now = read_clock(), server.counts());
     next = std::min(next, server.turn({now, now.time_since_epoch() + to_1970}));
     now = read_clock();
-    desk.wait(server.polled(), now, std::min(next, end));
+    host.wait(server.polled(), now, std::min(next, end));
     now = read_clock();
   }
-  return desk.stop(now);
+  return host.stop(now);
 }
 
 }  // namespace
@@ -115,7 +115,7 @@ void add_vrpn(CLI::App& app, Chosen& chosen) {
   CLI::App* vrpn = app.add_subcommand("vrpn", "Run a VRPN server; programs connect to NAME@localhost");
   static VrpnOptions options;  // written by CLI11 while parsing
   vrpn->footer("Example: tendon-plug vrpn --server lab:47100 --name Phantom0=right");
-  add_common(*vrpn, options.desk);
+  add_common(*vrpn, options.bridge);
   vrpn->add_option("--name", options.names,
                    "VRPN name, and its device (default: the first device), repeatable. Default: the name of each "
                    "--device, or Phantom0")

@@ -110,7 +110,8 @@ struct Server::Client {
   std::string over;
 };
 
-Server::Server(Desk& desk, Config config, LocalTime now) : desk_(desk), config_(std::move(config)), dialled_(now) {
+Server::Server(BridgeHost& host, Config config, LocalTime now)
+    : host_(host), config_(std::move(config)), dialled_(now) {
   for (const Alias& alias : config_.names) {
     stations_.push_back({.name = alias.name});
   }
@@ -139,11 +140,11 @@ Server::Server(Desk& desk, Config config, LocalTime now) : desk_(desk), config_(
 
 Server::~Server() {
   for (const auto& client : clients_) {
-    for (const Alias& alias : config_.names) desk_.plug(alias.place).release(client->number);
+    for (const Alias& alias : config_.names) host_.plug(alias.place).release(client->number);
   }
 }
 
-std::span<const Desk::Count> Server::counts() {
+std::span<const BridgeHost::Count> Server::counts() {
   Peer::Counts sum = gone_;
   std::uint64_t open = 0;
   for (const auto& client : clients_) {
@@ -162,8 +163,8 @@ std::span<const Desk::Count> Server::counts() {
 
 void Server::serve_states(const Moment& now) {
   for (std::size_t i = 0; i < stations_.size(); ++i) {
-    const Plug& plug = desk_.plug(config_.names[i].place);
-    if (const auto sentence = stations_[i].learn(plug)) desk_.say(*sentence);
+    const Plug& plug = host_.plug(config_.names[i].place);
+    if (const auto sentence = stations_[i].learn(plug)) host_.say(*sentence);
     if (plug.lost() != seen_[i].lost) {
       seen_[i].lost = plug.lost();
       for (const auto& client : clients_) {
@@ -185,7 +186,7 @@ void Server::serve_states(const Moment& now) {
 bool Server::has_place(const std::string& whom) {
   if (clients_.size() < kMaxClients) return true;
   if (!std::exchange(full_said_, true)) {
-    desk_.say(whom + " was refused: " + std::to_string(kMaxClients) + " is the maximum number of clients");
+    host_.say(whom + " was refused: " + std::to_string(kMaxClients) + " is the maximum number of clients");
   }
   return false;
 }
@@ -312,8 +313,8 @@ void Server::write(Client& client) {
 }
 
 void Server::drop(Client& client, const std::string& why) {
-  for (const Alias& alias : config_.names) desk_.plug(alias.place).release(client.number);
-  desk_.say(client.name + " " + why);
+  for (const Alias& alias : config_.names) host_.plug(alias.place).release(client.number);
+  host_.say(client.name + " " + why);
   const Peer::Counts& counts = client.peer.counts();
   gone_.messages += counts.messages;
   gone_.skipped += counts.skipped;
@@ -337,13 +338,13 @@ LocalTime Server::turn(const Moment& now) {
     } else {
       read(now, client, ready, polled_[2 + kEach * c + 1].revents);
     }
-    while (const auto sentence = client.peer.next_sentence()) desk_.say(client.name + ": " + *sentence);
-    if (!was_open && client.peer.open()) desk_.say(client.name + " has connected");
+    while (const auto sentence = client.peer.next_sentence()) host_.say(client.name + ": " + *sentence);
+    if (!was_open && client.peer.open()) host_.say(client.name + " has connected");
     for (std::size_t i = 0; i < stations_.size(); ++i) {
       Asker& asker = client.askers[i];
       asked =
-          asker.turn(now.at, now.since_1970, desk_.plug(config_.names[i].place), stations_[i], client.peer) || asked;
-      if (const auto sentence = asker.next_sentence()) desk_.say(*sentence);
+          asker.turn(now.at, now.since_1970, host_.plug(config_.names[i].place), stations_[i], client.peer) || asked;
+      if (const auto sentence = asker.next_sentence()) host_.say(*sentence);
     }
     write(client);
     if (!client.peer.open() && now.at >= client.until && client.over.empty()) {

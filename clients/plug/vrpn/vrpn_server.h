@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include "clients/plug/desk.h"
+#include "clients/plug/bridge_host.h"
 #include "clients/plug/vrpn/vrpn_peer.h"
 
 namespace tendon::plug::vrpn {
@@ -37,8 +37,8 @@ class Descriptor {
 
 /// The sockets of a VRPN server: one port for TCP and UDP.
 ///
-///     Server server(desk, config, now);
-///     for (…) desk.turn(now, server.counts()); next = server.turn(moment); desk.wait(server.polled(), now, next);
+///     Server server(host, config, now);
+///     for (…) host.turn(now, server.counts()); next = server.turn(moment); host.wait(server.polled(), now, next);
 ///
 /// * **Connections.** A program sends a datagram with its TCP port, and the server connects to that port *at the
 ///   source address of the datagram*; or the program opens a TCP connection. Addresses in the text of the datagram or
@@ -58,7 +58,7 @@ class Server {
 
   struct Alias {
     std::string name;
-    std::size_t place;  ///< index of the device at the desk
+    std::size_t place;  ///< index of the device at the BridgeHost
   };
   struct Config {
     Address listen;  ///< IPv4; port 0: any
@@ -66,17 +66,17 @@ class Server {
   };
 
   /// Throws std::runtime_error "cannot listen at …: …".
-  Server(Desk& desk, Config config, LocalTime now);
+  Server(BridgeHost& host, Config config, LocalTime now);
   ~Server();
 
   const Address& address() const noexcept { return address_; }
 
-  /// Serves all clients; must be called after Desk::turn and Desk::wait. Returns the time of the next turn, or `now`
-  /// if a requested force should be sent immediately.
+  /// Serves all clients; must be called after BridgeHost::turn and BridgeHost::wait. Returns the time of the next turn,
+  /// or `now` if a requested force should be sent immediately.
   LocalTime turn(const Moment& now);
-  /// Arguments for Desk::wait; valid until the next turn.
+  /// Arguments for BridgeHost::wait; valid until the next turn.
   std::span<pollfd> polled() { return polled_; }
-  std::span<const Desk::Count> counts();
+  std::span<const BridgeHost::Count> counts();
 
  private:
   struct Client;
@@ -93,7 +93,7 @@ class Server {
   void drop(Client& client, const std::string& why);
   void poll_again(LocalTime now);
 
-  Desk& desk_;
+  BridgeHost& host_;
   Config config_;
   Address address_;
   Descriptor tcp_;
@@ -110,7 +110,7 @@ class Server {
   double dials_ = kDialsPerSecond;
   LocalTime dialled_{};
   Peer::Counts gone_;
-  std::vector<Desk::Count> counts_;
+  std::vector<BridgeHost::Count> counts_;
   std::vector<pollfd> polled_;
   Buffer buffer_;
 };

@@ -82,7 +82,7 @@ const std::vector<Door>& front_doors() {
        {"nlohmann/"},
        {"server/commands/", "server/main.cc", "clients/cpp/discovery/list.cc", "clients/cpp/engine/self_test.cc",
         "clients/cpp/run.cc", "clients/dashboard/page_json.cc", "clients/dashboard/foxglove_text.cc",
-        "clients/plug/desk.cc", "clients/plug/inverse/inverse_json.cc", "clients/softbody/cluster/estimate.cc",
+        "clients/plug/bridge_host.cc", "clients/plug/inverse/inverse_json.cc", "clients/softbody/cluster/estimate.cc",
         "clients/softbody/answered.cc", "clients/softbody/explain.cc", "*_main.cc"}},
       {"PETSc", {"petscksp.h"}, {"clients/softbody/mpi/spread_solver.cc"}},
       {"preCICE", {"precice/"}, {"clients/precice/precice_engine.cc", "tests/clients/precice/"}},

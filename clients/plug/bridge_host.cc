@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "clients/plug/desk.h"
+#include "clients/plug/bridge_host.h"
 
 #include <algorithm>
 #include <chrono>
@@ -19,7 +19,7 @@ namespace {
 constexpr Duration kLongestWait = std::chrono::milliseconds(100);
 constexpr Duration kLineEvery = std::chrono::seconds(1);
 
-Plug::Config config_of(const DeskConfig& config, const std::string& device, const std::string& found) {
+Plug::Config config_of(const BridgeConfig& config, const std::string& device, const std::string& found) {
   Plug::Config of_plug{.client = config.client, .new_seed = seed_from_system, .observe = config.observe};
   of_plug.client.device = device.empty() ? found : device;
   return of_plug;
@@ -27,39 +27,39 @@ Plug::Config config_of(const DeskConfig& config, const std::string& device, cons
 
 }  // namespace
 
-Desk::Place::Place(const DeskConfig& config, const std::string& device, LocalTime now)
+BridgeHost::Served::Served(const BridgeConfig& config, const std::string& device, LocalTime now)
     : name(device.empty() ? "device" : device),
       watcher(config.server, config.client.key.has_value()),
       controller(config.server, config.client.key.has_value()),
       plug({watcher, watcher.server()}, {controller, controller.server()}, config_of(config, device, watcher.device()),
            now) {}
 
-Desk::Desk(DeskConfig config, LocalTime now) : config_(std::move(config)), next_line_(now + kLineEvery) {
+BridgeHost::BridgeHost(BridgeConfig config, LocalTime now) : config_(std::move(config)), next_line_(now + kLineEvery) {
   if (config_.devices.empty()) config_.devices.emplace_back();
-  for (const std::string& device : config_.devices) places_.emplace_back(config_, device, now);
+  for (const std::string& device : config_.devices) served_.emplace_back(config_, device, now);
 }
 
-void Desk::say(const std::string& sentence) const { std::cerr << "tendon-plug: " + visible(sentence) + "\n"; }
+void BridgeHost::say(const std::string& sentence) const { std::cerr << "tendon-plug: " + visible(sentence) + "\n"; }
 
 /// The address of the server may have changed. If the current address did not answer, the next one is tried.
-void Desk::look_up_again(Place& place) {
+void BridgeHost::look_up_again(Served& served) {
   try {
-    const bool another = place.phase == ForceClient::Phase::kUnanswered;
-    place.watcher.look_up_again(another);
-    place.controller.look_up_again(another);
-    place.plug.move_to(place.watcher.server(), place.controller.server());
+    const bool another = served.phase == ForceClient::Phase::kUnanswered;
+    served.watcher.look_up_again(another);
+    served.controller.look_up_again(another);
+    served.plug.move_to(served.watcher.server(), served.controller.server());
   } catch (const std::runtime_error& error) {
-    say(place.name + ": " + error.what());
+    say(served.name + ": " + error.what());
   }
 }
 
-LocalTime Desk::turn(LocalTime now, std::span<const Count> counts) {
+LocalTime BridgeHost::turn(LocalTime now, std::span<const Count> counts) {
   LocalTime next = LocalTime::max();
-  for (Place& place : places_) {
-    next = std::min(next, place.plug.turn(now));
-    while (const auto sentence = place.plug.next_sentence()) say(place.name + ": " + *sentence);
-    const ForceClient::Phase phase = place.plug.phase();
-    if (phase != std::exchange(place.phase, phase) && is_between_attempts(phase)) look_up_again(place);
+  for (Served& served : served_) {
+    next = std::min(next, served.plug.turn(now));
+    while (const auto sentence = served.plug.next_sentence()) say(served.name + ": " + *sentence);
+    const ForceClient::Phase phase = served.plug.phase();
+    if (phase != std::exchange(served.phase, phase) && is_between_attempts(phase)) look_up_again(served);
   }
   if (config_.json) {
     if (now >= next_line_) {
@@ -71,11 +71,11 @@ LocalTime Desk::turn(LocalTime now, std::span<const Count> counts) {
   return next;
 }
 
-void Desk::write_line(std::span<const Count> counts) {
-  for (const Place& place : places_) {
-    const Plug& plug = place.plug;
+void BridgeHost::write_line(std::span<const Count> counts) {
+  for (const Served& served : served_) {
+    const Plug& plug = served.plug;
     nlohmann::ordered_json line = {
-        {"device", place.name},
+        {"device", served.name},
         {"states", plug.states()},
         {"forces", plug.forces()},
         {"dropped", plug.forces_dropped()},
@@ -88,16 +88,16 @@ void Desk::write_line(std::span<const Count> counts) {
   }
 }
 
-std::vector<int> Desk::descriptors() const {
+std::vector<int> BridgeHost::descriptors() const {
   std::vector<int> all;
-  for (const Place& place : places_) {
-    all.push_back(place.watcher.descriptor());
-    all.push_back(place.controller.descriptor());
+  for (const Served& served : served_) {
+    all.push_back(served.watcher.descriptor());
+    all.push_back(served.controller.descriptor());
   }
   return all;
 }
 
-void Desk::wait(std::span<pollfd> others, LocalTime now, LocalTime until) {
+void BridgeHost::wait(std::span<pollfd> others, LocalTime now, LocalTime until) {
   polled_.assign(others.begin(), others.end());
   for (const int descriptor : descriptors()) polled_.push_back({descriptor, POLLIN, 0});
   const Duration left = std::clamp(until - now, Duration::zero(), kLongestWait);
@@ -110,12 +110,12 @@ void Desk::wait(std::span<pollfd> others, LocalTime now, LocalTime until) {
   std::copy_n(polled_.begin(), others.size(), others.begin());
 }
 
-int Desk::stop(LocalTime now) {
+int BridgeHost::stop(LocalTime now) {
   int exit_code = 0;
-  for (Place& place : places_) {
-    place.plug.stop(now);
-    if (place.plug.states() > 0) continue;
-    say(place.name + ": no state was received from " + config_.server.text());
+  for (Served& served : served_) {
+    served.plug.stop(now);
+    if (served.plug.states() > 0) continue;
+    say(served.name + ": no state was received from " + config_.server.text());
     exit_code = 1;
   }
   return exit_code;

@@ -19,7 +19,7 @@
 namespace tendon::plug {
 
 /// Command-line options shared by all bridges.
-struct DeskConfig {
+struct BridgeConfig {
   ServerName server = "127.0.0.1:47100";
   ForceClient::Config client{};        ///< `device` and `seed` are set for each Plug
   std::vector<std::string> devices{};  ///< device names; empty: the first device of the server, named "device"
@@ -29,11 +29,11 @@ struct DeskConfig {
 
 /// All devices of a bridge with their sockets, for use in the main loop of the bridge.
 ///
-///     Desk desk(config, read_clock());
+///     BridgeHost host(config, read_clock());
 ///     for (LocalTime now = read_clock(); !stop; now = read_clock()) {
-///       const LocalTime next = desk.turn(now);
-///       … serve the programs: desk.plug(0).state(), desk.plug(0).ask(…); if a force was requested: desk.turn(now)
-///       desk.wait(sockets_of_the_programs, now, next);
+///       const LocalTime next = host.turn(now);
+///       … serve the programs: host.plug(0).state(), host.plug(0).ask(…); if a force was requested: host.turn(now)
+///       host.wait(sockets_of_the_programs, now, next);
 ///     }
 ///
 /// It resolves the name of the server again between two attempts, and prints each change to stderr: "tendon-plug:
@@ -43,17 +43,17 @@ struct DeskConfig {
 ///      "round_trip_ms":0.4, …}                     totals since the start, followed by the counts of the bridge
 ///
 /// Thread-safe: no. Realtime-safe: no.
-class Desk {
+class BridgeHost {
  public:
   /// Name and value of a counter of the bridge for the JSON lines.
   using Count = std::pair<std::string_view, std::uint64_t>;
 
   /// Throws std::runtime_error as UdpTransport does if the server's name cannot be resolved.
-  Desk(DeskConfig config, LocalTime now);
+  BridgeHost(BridgeConfig config, LocalTime now);
 
-  std::size_t size() const noexcept { return places_.size(); }
-  Plug& plug(std::size_t i) { return places_[i].plug; }
-  const std::string& name(std::size_t i) const { return places_[i].name; }
+  std::size_t size() const noexcept { return served_.size(); }
+  Plug& plug(std::size_t i) { return served_[i].plug; }
+  const std::string& name(std::size_t i) const { return served_[i].name; }
 
   /// Turns every Plug and returns the time of the next turn. `counts` are added to the JSON lines.
   LocalTime turn(LocalTime now, std::span<const Count> counts = {});
@@ -72,8 +72,8 @@ class Desk {
   int stop(LocalTime now);
 
  private:
-  struct Place {
-    Place(const DeskConfig& config, const std::string& device, LocalTime now);
+  struct Served {
+    Served(const BridgeConfig& config, const std::string& device, LocalTime now);
     std::string name;
     UdpTransport watcher;
     UdpTransport controller;
@@ -81,12 +81,12 @@ class Desk {
     ForceClient::Phase phase = ForceClient::Phase::kGreeting;
   };
 
-  void look_up_again(Place& place);
+  void look_up_again(Served& served);
   void write_line(std::span<const Count> counts);
 
   UnblockedOutput output_;
-  DeskConfig config_;
-  std::deque<Place> places_;
+  BridgeConfig config_;
+  std::deque<Served> served_;
   std::vector<pollfd> polled_;
   LocalTime next_line_{};
 };
