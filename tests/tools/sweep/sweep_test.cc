@@ -291,11 +291,11 @@ TEST_F(SweepOf, LinesOfOtherArgumentsAreRefused) {
 }
 
 TEST_F(Sweep, AResultIsSyncedBeforeItHasItsName) {
-  if (sweep({"--version"}, {std::string("LD_PRELOAD=") + TENDON_SYNC_WITNESS}).status != 0) {
+  if (sweep({"--version"}, {std::string("LD_PRELOAD=") + TENDON_SYNC_RECORDER}).status != 0) {
     GTEST_SKIP() << "nothing can be preloaded into this build";
   }
   ASSERT_EQ(plan("1:20", "10").status, 0);
-  const ChildEnd end = sweep({"run", folder(), "--shard", "0"}, {std::string("LD_PRELOAD=") + TENDON_SYNC_WITNESS});
+  const ChildEnd end = sweep({"run", folder(), "--shard", "0"}, {std::string("LD_PRELOAD=") + TENDON_SYNC_RECORDER});
   EXPECT_EQ(end.status, 0) << "99: it was not";
 }
 

@@ -87,23 +87,23 @@ Outcome run(const DrawnWorld& drawn, const Extras& extras) {
   config.players = extras.players;
   World world(config, port);
   if (extras.watch) world.network().watch(extras.watch);
-  Witness witness(drawn, world, port, device.simulated);
-  world.watch_steps([&](const StepRecord& step) { witness.see(step); });
-  world.watch_turns([&](const World::Turn& turn) { witness.see(turn); });
+  InvariantChecker checker(drawn, world, port, device.simulated);
+  world.watch_steps([&](const StepRecord& step) { checker.see(step); });
+  world.watch_turns([&](const World::Turn& turn) { checker.see(turn); });
 
   const LocalTime began = world.now();
   std::vector<Event> events;
   for (std::size_t i = 0; i < drawn.clients.size(); ++i) {
     const DrawnClient& client = drawn.clients[i];
-    events.push_back({client.joins, [&world, &client, &witness, i, began] {
+    events.push_back({client.joins, [&world, &client, &checker, i, began] {
                         add(world, client, began,
-                            [&witness, i](const DeviceState& state, const LinkStats&) { witness.see_state(i, state); });
+                            [&checker, i](const DeviceState& state, const LinkStats&) { checker.see_state(i, state); });
                       }});
     if (client.killed) {
-      events.push_back({*client.killed, [&world, &witness, i] {
+      events.push_back({*client.killed, [&world, &checker, i] {
                           world.kill(i);
                           // On a good network as well, the other clients wait until the server has timed out this one.
-                          if (witness.recovered_by()) witness.weather_clears(world.network().latest_arrival());
+                          if (checker.recovered_by()) checker.weather_clears(world.network().latest_arrival());
                         }});
     }
     if (client.restarted) {
@@ -125,7 +125,7 @@ Outcome run(const DrawnWorld& drawn, const Extras& extras) {
   }
   events.push_back({drawn.clears, [&] {
                       port.heal();
-                      witness.weather_clears(world.network().latest_arrival());
+                      checker.weather_clears(world.network().latest_arrival());
                     }});
   std::ranges::stable_sort(events, {}, &Event::at);
 
@@ -138,29 +138,29 @@ Outcome run(const DrawnWorld& drawn, const Extras& extras) {
       event.happens();
     }
     const LocalTime end = began + DrawnWorld::kLength;
-    if (const auto by = witness.recovered_by(); by && *by < end) {
+    if (const auto by = checker.recovered_by(); by && *by < end) {
       run_until(*by);
-      witness.see_recovered();
+      checker.see_recovered();
       for (std::size_t i = 0; i < drawn.clients.size(); ++i) {
         if (drawn.clients[i].kind == DrawnClient::Kind::kController && world.alive(i)) world.client(i).rearm();
       }
     }
     run_until(end);
-    witness.see_end();
+    checker.see_end();
   } catch (const std::runtime_error& error) {
-    witness.report(Oracle::kCalm, error.what());
+    checker.report(Oracle::kCalm, error.what());
   }
 
   Outcome outcome;
-  outcome.breach = witness.breach();
+  outcome.breach = checker.breach();
   if (outcome.breach) outcome.breach->at = LocalTime(outcome.breach->at - began);
-  outcome.felt = witness.felt();
-  outcome.limited = witness.limited();
-  outcome.turned = witness.turned();
-  outcome.gripped = witness.gripped();
-  outcome.presses = witness.presses();
-  outcome.recovered = witness.checked_recovery();
-  outcome.least_energy = witness.least_energy();
+  outcome.felt = checker.felt();
+  outcome.limited = checker.limited();
+  outcome.turned = checker.turned();
+  outcome.gripped = checker.gripped();
+  outcome.presses = checker.presses();
+  outcome.recovered = checker.checked_recovery();
+  outcome.least_energy = checker.least_energy();
   outcome.steps = world.haptic().stats().steps;
   outcome.network = world.network().counts();
   return outcome;

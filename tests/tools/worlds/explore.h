@@ -6,7 +6,7 @@
 #include <optional>
 
 #include "tests/tools/worlds/drawn_world.h"
-#include "tests/tools/worlds/witness.h"
+#include "tests/tools/worlds/invariant_checker.h"
 
 namespace tendon::simulation {
 

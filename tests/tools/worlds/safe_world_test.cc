@@ -73,7 +73,7 @@ class Pluggable final : public Device {
 
 TEST(SafeWorld, TheLedgerBooksTheForceAfterTheSafetyLayerAndStaysPassive) {
   SimulatedDevice device(hand());
-  WatchedDevice witness(device, {.friction = kBounds});
+  WatchedDevice watched(device, {.friction = kBounds});
   SafeDevice::Config config;
   config.arming.by = SafeDevice::Arming::By::kStart;
   config.growth_limit = GrowthLimit::Config{.rate = 200};
@@ -82,7 +82,7 @@ TEST(SafeWorld, TheLedgerBooksTheForceAfterTheSafetyLayerAndStaysPassive) {
   config.workspace =
       Workspace::Config{.centre = Vec3(-0.02, 0, 0), .shape = Workspace::Sphere{.radius = 0.025}, .margin = 0.01};
   config.ramp_in = RampIn::Config{.time = milliseconds(300)};
-  SafeDevice safe(config, witness);
+  SafeDevice safe(config, watched);
   World world(world_config(safe.info()), safe);
   world.add_controller(at_100_hz(), wall());
   double least = 0;
@@ -99,7 +99,7 @@ TEST(SafeWorld, TheLedgerBooksTheForceAfterTheSafetyLayerAndStaysPassive) {
   EXPECT_GT(peak, 1);     // N: the wall is felt
   EXPECT_GT(left, 1000);  // steps in which the safety layer reduced the force
   EXPECT_GE(least, -1e-9);
-  EXPECT_GE(witness.energy(), -1e-9);
+  EXPECT_GE(watched.energy(), -1e-9);
 }
 
 TEST(SafeWorld, ADeviceReplugedInMidForceWaitsForHomingAndTheEnginesRequest) {

@@ -381,7 +381,7 @@ TEST(World, TheLawBooksTheForceThatADeviceKeepsWhenItIsToldZero) {
   });
   world.run_for(seconds(4));
   EXPECT_GT(kept, 20) << "zero must have been ignored while a force was held";
-  EXPECT_LT(worst, 1e-9) << "J, the law's account against the witness's";
+  EXPECT_LT(worst, 1e-9) << "J, the law's account against the checker's";
 }
 
 TEST(World, PausesOfTheMachineAreFlaggedAndTheLedgerRecoversByItself) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "tests/tools/worlds/witness.h"
+#include "tests/tools/worlds/invariant_checker.h"
 
 #include <algorithm>
 #include <array>
@@ -83,7 +83,8 @@ Duration recovery_promise(const DrawnWorld& world) {
   return Session::Config{}.timeout + retry + std::chrono::milliseconds(600);
 }
 
-Witness::Witness(const DrawnWorld& drawn, World& world, const WatchedDevice& port, const SimulatedDevice* simulated)
+InvariantChecker::InvariantChecker(const DrawnWorld& drawn, World& world, const WatchedDevice& port,
+                                   const SimulatedDevice* simulated)
     : drawn_(drawn),
       world_(world),
       port_(port),
@@ -106,11 +107,11 @@ Witness::Witness(const DrawnWorld& drawn, World& world, const WatchedDevice& por
       began_(world.now()),
       seen_(drawn.clients.size()) {}
 
-void Witness::report(Oracle oracle, std::string what) {
+void InvariantChecker::report(Oracle oracle, std::string what) {
   if (!breach_) breach_ = Breach{oracle, world_.now(), std::move(what)};
 }
 
-double Witness::account() const {
+double InvariantChecker::account() const {
   switch (drawn_.config.loop.control.limiter.law) {
     case Law::kAolPerAxis:
       return port_.least_of_axes();
@@ -121,7 +122,7 @@ double Witness::account() const {
   }
 }
 
-void Witness::see(const StepRecord& step) {
+void InvariantChecker::see(const StepRecord& step) {
   if (breach_) return;
   const Effort& told = port_.told();
   const Effort& held = port_.held();
@@ -140,7 +141,7 @@ void Witness::see(const StepRecord& step) {
   gripped_ = gripped_ || held.grip != 0;
 }
 
-void Witness::see_bounds(const StepRecord& step) {
+void InvariantChecker::see_bounds(const StepRecord& step) {
   const HapticController::Config& control = drawn_.config.loop.control;
   const Effort& told = port_.told();
   const auto within = [&](double size, double bound, const char* unit) {
@@ -160,7 +161,7 @@ void Witness::see_bounds(const StepRecord& step) {
 
 /// The account must not fall below min(`last`, 0) − `may_take`, where `may_take` (J) is the most that a hold beyond the
 /// bound can take. Without such a hold, it must not decrease while it is below zero.
-void Witness::see_account(const char* whose, double& last, double now, double may_take) {
+void InvariantChecker::see_account(const char* whose, double& last, double now, double may_take) {
   const double before = std::exchange(last, now);
   const double may_leave = std::min(before, 0.0) - may_take;
   if (now < may_leave - kRounding) {
@@ -169,7 +170,7 @@ void Witness::see_account(const char* whose, double& last, double now, double ma
   if (before >= 0 && may_take == 0) least_energy_ = std::min(least_energy_, now);
 }
 
-void Witness::see_energy(const StepRecord& step) {
+void InvariantChecker::see_energy(const StepRecord& step) {
   const Duration held = drawn_.port.watchdog > Duration::zero() ? std::min(step.held, drawn_.port.watchdog) : step.held;
   const double beyond = std::max(0.0, seconds(held - std::exchange(bound_, step.longest_hold)));
   // (T_act − T)(‖F‖ − f_c)₊²/(4b)
@@ -188,7 +189,7 @@ void Witness::see_energy(const StepRecord& step) {
               grip != nullptr ? takes(std::abs(grip->was_applied), *drawn_.port.grip) : 0);
 }
 
-void Witness::see_age(const StepRecord& step) {
+void InvariantChecker::see_age(const StepRecord& step) {
   const LocalTime now = step.hand.at;
   if (step.mode == Mode::kActive && (!last_force_ || now - *last_force_ > valid_)) {
     report(Oracle::kFresh, last_force_ ? "the last force arrived " + ms(now - *last_force_) +
@@ -228,7 +229,7 @@ void Witness::see_age(const StepRecord& step) {
   answered_ = answered;
 }
 
-void Witness::see(const World::Turn& turn) {
+void InvariantChecker::see(const World::Turn& turn) {
   if (!turn.client) {
     const std::uint64_t arrived = world_.network().arrived_at_server();
     const bool more = std::exchange(server_wants_more_, turn.wants_more);
@@ -244,13 +245,13 @@ void Witness::see(const World::Turn& turn) {
   }
 }
 
-void Witness::see_server() {
+void InvariantChecker::see_server() {
   const NetworkLoop::Stats server = world_.server().stats();
   if (std::exchange(forces_, server.forces) != server.forces) last_force_ = world_.now();
   if (!clocks_step_ && !drawn_.believes_damage()) see_clock(server);
 }
 
-void Witness::see_clock(const NetworkLoop::Stats& server) {
+void InvariantChecker::see_clock(const NetworkLoop::Stats& server) {
   if (!server.controller_clock) return;
   const std::string& holder = server.channels.front().holder;
   for (std::size_t i = 0; i < drawn_.clients.size(); ++i) {
@@ -265,11 +266,11 @@ void Witness::see_clock(const NetworkLoop::Stats& server) {
   }
 }
 
-void Witness::weather_clears(LocalTime last_arrival) {
+void InvariantChecker::weather_clears(LocalTime last_arrival) {
   recovered_by_ = std::max(world_.now(), last_arrival) + recovery_promise(drawn_);
 }
 
-void Witness::see_recovered() {
+void InvariantChecker::see_recovered() {
   marks_.assign(drawn_.clients.size(), {});
   for (std::size_t i = 0; i < marks_.size(); ++i) {
     if (!world_.alive(i)) continue;
@@ -283,7 +284,7 @@ void Witness::see_recovered() {
   checked_recovery_ = true;
 }
 
-void Witness::see_served() {
+void InvariantChecker::see_served() {
   std::size_t controllers = 0;
   std::size_t open_controllers = 0;
   std::string others;  // why other clients are not served
@@ -322,14 +323,14 @@ void Witness::see_served() {
   }
 }
 
-void Witness::see_round_trip(const char* whose, Duration round_trip) {
+void InvariantChecker::see_round_trip(const char* whose, Duration round_trip) {
   const Duration expected = drawn_.one_way_up + drawn_.one_way_down;
   if (std::chrono::abs(round_trip - expected) > kRoundTripError) {
     report(Oracle::kRoundTrip, std::string(whose) + " measures " + ms(round_trip) + ", expected " + ms(expected));
   }
 }
 
-void Witness::see_counters() {
+void InvariantChecker::see_counters() {
   for (std::size_t i = 0; i < marks_.size(); ++i) {
     if (!world_.alive(i) || world_.client(i).phase() != ForceClient::Phase::kOpen) continue;
     const ForceClient::Stats stats = world_.client(i).stats();
@@ -354,7 +355,7 @@ void Witness::see_counters() {
   }
 }
 
-void Witness::see_end() {
+void InvariantChecker::see_end() {
   const Network::Counts& counts = world_.network().counts();
   const std::uint64_t in = counts.sent + counts.copies;
   const std::uint64_t out = counts.delivered + counts.lost + counts.nowhere + world_.network().in_flight();
@@ -385,7 +386,7 @@ void Witness::see_end() {
 
 /// Each press uses a different button. Worlds in which addresses change are skipped, because a press can be in a state
 /// that is sent to the old address.
-void Witness::see_presses() {
+void InvariantChecker::see_presses() {
   const auto* const device = std::get_if<SimulatedDevice::Config>(&drawn_.device);
   const bool roams = drawn_.changes.back().weather.up.rebind > Duration::zero();
   if (device == nullptr || roams) return;

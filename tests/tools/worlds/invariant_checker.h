@@ -60,10 +60,10 @@ Duration recovery_promise(const DrawnWorld& world);
 /// arrival times of forces, and datagrams counted at the network.
 ///
 /// Thread-safe: no.
-class Witness {
+class InvariantChecker {
  public:
   /// All arguments must outlive this object. `simulated` is null for an adversary.
-  Witness(const DrawnWorld& drawn, World& world, const WatchedDevice& port, const SimulatedDevice* simulated);
+  InvariantChecker(const DrawnWorld& drawn, World& world, const WatchedDevice& port, const SimulatedDevice* simulated);
 
   void see(const StepRecord& step);
   void see(const World::Turn& turn);
