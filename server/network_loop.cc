@@ -15,7 +15,7 @@ namespace tendon {
 
 namespace {
 
-using enum DatagramSieve::Sender;
+using enum DatagramFilter::Sender;
 
 constexpr std::size_t kMaxNotices = 64;
 constexpr std::size_t kMaxForeign = 64;
@@ -42,7 +42,7 @@ const ClockExchange* exchange_of(LocalTime now, const Guest& guest) {
 NetworkLoop::NetworkLoop(const Config& config, Link& link, LocalTime now)
     : config_(config),
       link_(link),
-      sieve_(config.recorded),
+      filter_(config.recorded),
       devices_(served_devices(config.devices, config.shard)),
       first_device_(config.shard.first_device(config.devices.size())),
       handshake_(
@@ -103,7 +103,7 @@ bool NetworkLoop::drain(LocalTime& now) {
 }
 
 void NetworkLoop::receive(LocalTime now, const Address& from, std::span<const std::byte> datagram) {
-  const auto tap_from = [&](DatagramSieve::Sender sender) {
+  const auto tap_from = [&](DatagramFilter::Sender sender) {
     tap(now, DatagramRecord::Direction::kIn, sender, from, datagram, datagram.size());
   };
   const auto header = decode_header(datagram);
@@ -147,7 +147,7 @@ void NetworkLoop::greet(LocalTime now, const Address& from, std::span<const std:
   const std::uint64_t unknown_keys = handshake_.stats().unknown_key;
   const ServerHandshake::Reply reply = handshake_.receive(now, from, datagram, answer);
   if (handshake_.stats().unknown_key > unknown_keys) note_unknown_key(notices_, from);
-  const DatagramSieve::Sender sender = reply.guest ? sender_of(*reply.guest, from) : kStranger;
+  const DatagramFilter::Sender sender = reply.guest ? sender_of(*reply.guest, from) : kStranger;
   tap(now, DatagramRecord::Direction::kIn, sender, from, datagram, datagram.size());
   if (reply.guest) return admit(now, from, *reply.guest, datagram);
   if (reply.size > 0) send(now, sender, from, std::span(answer).first(reply.size));
@@ -160,7 +160,7 @@ void NetworkLoop::receive_foreign(LocalTime now, const Address& from, std::span<
 }
 
 /// If keys are configured, a client without a key counts as a stranger, unless it does not need one.
-DatagramSieve::Sender NetworkLoop::sender_of(const ServerHandshake::Guest& guest, const Address& from) const {
+DatagramFilter::Sender NetworkLoop::sender_of(const ServerHandshake::Guest& guest, const Address& from) const {
   const bool let_in = config_.keys.empty() || (config_.needs_no_key != nullptr && config_.needs_no_key(from));
   return guest.key != nullptr || let_in ? kGuest : kStranger;
 }
@@ -540,24 +540,24 @@ NetworkStats NetworkLoop::stats() const {
   return stats;
 }
 
-void NetworkLoop::send(LocalTime now, DatagramSieve::Sender partner, const Address& to,
+void NetworkLoop::send(LocalTime now, DatagramFilter::Sender partner, const Address& to,
                        std::span<const std::byte> datagram) {
   link_.send(to, datagram);
   tap(now, DatagramRecord::Direction::kOut, partner, to, datagram, datagram.size());
 }
 
-/// Adds the datagram to the recording if it is accepted by the sieve. `peer` is the address of the other end.
-void NetworkLoop::tap(LocalTime now, DatagramRecord::Direction direction, DatagramSieve::Sender partner,
+/// Adds the datagram to the recording if it is accepted by the filter. `peer` is the address of the other end.
+void NetworkLoop::tap(LocalTime now, DatagramRecord::Direction direction, DatagramFilter::Sender partner,
                       const Address& peer, std::span<const std::byte> datagram, std::size_t size) {
   if (!config_.record) return;
   Mailboxes& mail = *devices_.front().mail;
   const auto left_out = [](std::atomic<std::uint64_t>& count) { count.fetch_add(1, std::memory_order_relaxed); };
-  switch (sieve_.judge(now, partner, size)) {
-    case DatagramSieve::Verdict::kRecord:
+  switch (filter_.judge(now, partner, size)) {
+    case DatagramFilter::Verdict::kRecord:
       break;
-    case DatagramSieve::Verdict::kStranger:
+    case DatagramFilter::Verdict::kStranger:
       return left_out(mail.strangers_left_out);
-    case DatagramSieve::Verdict::kOverBudget:
+    case DatagramFilter::Verdict::kOverBudget:
       return left_out(mail.datagrams_over_budget);
   }
   DatagramRecord* const record = mail.datagrams.back();

@@ -23,7 +23,7 @@
 #include "server/guests/reports.h"
 #include "server/mailboxes.h"
 #include "server/network_stats.h"
-#include "server/recording/datagram_sieve.h"
+#include "server/recording/datagram_filter.h"
 
 namespace tendon {
 
@@ -79,7 +79,7 @@ class NetworkLoop {
     /// Limits the datagrams in one turn, so that a flood does not delay the states.
     std::size_t max_datagrams = 256;
     bool record = true;  ///< if false, datagrams are not passed to the log thread
-    DatagramSieve::Config recorded{};
+    DatagramFilter::Config recorded{};
   };
 
   using Stats = NetworkStats;
@@ -153,9 +153,9 @@ class NetworkLoop {
   void measure(LocalTime now, Guest& guest);
   void adapt(LocalTime now, Guest& guest);
   void report(LocalTime now);
-  DatagramSieve::Sender sender_of(const ServerHandshake::Guest& guest, const Address& from) const;
-  void send(LocalTime now, DatagramSieve::Sender partner, const Address& to, std::span<const std::byte> datagram);
-  void tap(LocalTime now, DatagramRecord::Direction direction, DatagramSieve::Sender partner, const Address& peer,
+  DatagramFilter::Sender sender_of(const ServerHandshake::Guest& guest, const Address& from) const;
+  void send(LocalTime now, DatagramFilter::Sender partner, const Address& to, std::span<const std::byte> datagram);
+  void tap(LocalTime now, DatagramRecord::Direction direction, DatagramFilter::Sender partner, const Address& peer,
            std::span<const std::byte> datagram, std::size_t size);
   SessionChange change_of(const Guest& guest, bool came, const std::string& why) const;
   void notice(bool warning, std::string text, std::optional<SessionChange> session = std::nullopt);
@@ -168,7 +168,7 @@ class NetworkLoop {
 
   Config config_;
   Link& link_;
-  DatagramSieve sieve_;
+  DatagramFilter filter_;
   std::vector<ServedDevice> devices_;
   std::size_t first_device_;
   std::vector<NewestState> states_;

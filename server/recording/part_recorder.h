@@ -62,7 +62,7 @@ class PartRecorder {
     std::uint64_t datagrams_over_budget = 0;
     std::string error;  ///< the reason why recording is stopped, or empty
 
-    /// Returns true if no records are missing, except for those that have been left out by DatagramSieve.
+    /// Returns true if no records are missing, except for those that have been left out by DatagramFilter.
     bool complete() const noexcept { return lost_steps == 0 && lost_datagrams == 0 && error.empty(); }
   };
   struct Notice {

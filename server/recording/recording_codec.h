@@ -33,7 +33,7 @@ struct LossRecord {
   enum class Cause : std::uint8_t {
     kLogThread = 0,  ///< log thread too slow
     kDisk = 1,
-    kByteBudget = 2,  ///< exceeded the bytes per second, see DatagramSieve
+    kByteBudget = 2,  ///< exceeded the bytes per second, see DatagramFilter
     kSample = 3,
   };
   LocalTime at{};

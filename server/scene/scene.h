@@ -55,7 +55,7 @@ struct Scene {
   using AnyDevice = std::variant<SimulatedDevice::Config, falcon::Config, ReplayDevice::Config, spacemouse::Config,
                                  woodenhaptics::Config>;
 
-  /// See PartRecorder and DatagramSieve.
+  /// See PartRecorder and DatagramFilter.
   struct Recording {
     std::filesystem::path path;  ///< relative to the current directory
     double rotate_bytes = 4e9;

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "server/recording/datagram_sieve.h"
+#include "server/recording/datagram_filter.h"
 
 namespace tendon {
 
-DatagramSieve::Verdict DatagramSieve::judge(LocalTime now, Sender sender, std::size_t size) noexcept {
+DatagramFilter::Verdict DatagramFilter::judge(LocalTime now, Sender sender, std::size_t size) noexcept {
   if (now >= second_ends_) {
     second_ends_ = now + std::chrono::seconds(1);
     strangers_ = 0;

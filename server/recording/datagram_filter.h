@@ -18,7 +18,7 @@ namespace tendon {
 /// The caller must count the other datagrams. A second starts with the first datagram after the previous second.
 ///
 /// Thread-safe: no. Realtime-safe: yes.
-class DatagramSieve {
+class DatagramFilter {
  public:
   struct Config {
     std::uint32_t strangers_per_s = 16;
@@ -31,7 +31,7 @@ class DatagramSieve {
     kOverBudget,
   };
 
-  explicit DatagramSieve(const Config& config) noexcept : config_(config) {}
+  explicit DatagramFilter(const Config& config) noexcept : config_(config) {}
 
   /// `size` is in bytes on the wire. `now` must not decrease.
   Verdict judge(LocalTime now, Sender sender, std::size_t size) noexcept;
