@@ -68,7 +68,7 @@ const Connection::Event* Connection::receive(LocalTime& now) {
   more_ = --left_ == 0;
   now = link_.arrived(now);
   if (from != server_) {
-    ++strangers_;
+    ++foreign_;
     return nullptr;
   }
   const auto datagram = std::span<const std::byte>(buffer).first(std::min(size, buffer.size()));

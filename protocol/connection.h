@@ -90,7 +90,7 @@ class Connection {
   /// Of the current or the last session.
   const LinkStats& link_stats() const noexcept { return session_ ? session_->stats() : last_stats_; }
   /// The number of datagrams from other addresses, which were dropped.
-  std::uint64_t strangers() const noexcept { return strangers_; }
+  std::uint64_t foreign() const noexcept { return foreign_; }
 
  private:
   const Event* next_of_session(LocalTime now);
@@ -107,7 +107,7 @@ class Connection {
   std::optional<ClientHandshake> handshake_;
   std::optional<Session> session_;
   LinkStats last_stats_;
-  std::uint64_t strangers_ = 0;
+  std::uint64_t foreign_ = 0;
   LocalTime give_up_{};
   LocalTime retry_{};
   Duration back_off_;

@@ -186,13 +186,14 @@ void LogLoop::record_all(LocalTime now) {
 
 void LogLoop::record_left_out(LocalTime now) {
   if (!recorder_) return;
-  std::uint64_t strangers = 0;
+  std::uint64_t unauthenticated = 0;
   std::uint64_t datagrams = 0;
   for (NetworkLog& network : networks_) {
-    strangers += news(network.mail->strangers_left_out, network.strangers);
+    unauthenticated += news(network.mail->unauthenticated_left_out, network.unauthenticated);
     datagrams += news(network.mail->datagrams_over_budget, network.over_budget);
   }
-  if (strangers > 0) recorder_->lost({.at = now, .cause = LossRecord::Cause::kSample, .strangers = strangers});
+  if (unauthenticated > 0)
+    recorder_->lost({.at = now, .cause = LossRecord::Cause::kSample, .unauthenticated = unauthenticated});
   if (datagrams > 0) {
     say(Level::kWarning, std::to_string(datagrams) + " datagrams are not recorded: their rate exceeds " +
                              "[recording] datagrams_kb_per_s");

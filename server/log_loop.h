@@ -85,7 +85,7 @@ class LogLoop {
   struct NetworkLog {
     Mailboxes* mail;
     std::uint64_t datagrams_lost = 0;
-    std::uint64_t strangers = 0;
+    std::uint64_t unauthenticated = 0;
     std::uint64_t over_budget = 0;
   };
   struct ThreadLog {

@@ -115,9 +115,9 @@ struct Mailboxes {
   Latest<Health> health;
   Ways ways;
   SpscRing<DatagramRecord> datagrams;
-  std::atomic<std::uint64_t> datagrams_lost{0};         ///< because the queue was full
-  std::atomic<std::uint64_t> strangers_left_out{0};     ///< of unauthenticated senders, beyond the sample
-  std::atomic<std::uint64_t> datagrams_over_budget{0};  ///< beyond the bytes per second
+  std::atomic<std::uint64_t> datagrams_lost{0};            ///< because the queue was full
+  std::atomic<std::uint64_t> unauthenticated_left_out{0};  ///< of unauthenticated senders, beyond the sample
+  std::atomic<std::uint64_t> datagrams_over_budget{0};     ///< beyond the bytes per second
 };
 
 }  // namespace tendon

@@ -260,7 +260,7 @@ Json in_json(const Server::Summary& summary) {
     add("recorded_steps", recording->steps);
     add("lost_steps", recording->lost_steps);
     add("lost_datagrams", recording->lost_datagrams);
-    add("strangers_left_out", recording->strangers_left_out);
+    add("strangers_left_out", recording->unauthenticated_left_out);
     add("datagrams_over_budget", recording->datagrams_over_budget);
     add("recording_ended_early", !recording->error.empty());
   }

@@ -94,7 +94,7 @@ bool NetworkLoop::drain(LocalTime& now) {
     const auto datagram = std::span(buffer).first(std::min(size, buffer.size()));
     if (size > buffer.size()) {
       ++stats_.malformed;
-      tap(now, DatagramRecord::Direction::kIn, kStranger, from, datagram, size);
+      tap(now, DatagramRecord::Direction::kIn, kUnauthenticated, from, datagram, size);
     } else {
       receive(now, from, datagram);
     }
@@ -111,7 +111,7 @@ void NetworkLoop::receive(LocalTime now, const Address& from, std::span<const st
   if (ports_.receive(now, from, datagram)) return tap_from(kGuest);
   if (!header || header->type != DatagramType::kData) {
     ++stats_.malformed;
-    return tap_from(kStranger);
+    return tap_from(kUnauthenticated);
   }
   const auto is_meant = [&](const Guest& guest) {
     return !guest.gone && guest.id() == header->connection_id && (guest.key != nullptr || guest.address == from);
@@ -119,7 +119,7 @@ void NetworkLoop::receive(LocalTime now, const Address& from, std::span<const st
   if (const auto guest = std::find_if(guests_.begin(), guests_.end(), is_meant); guest != guests_.end()) {
     const std::uint64_t accepted = guest->session.stats().datagrams_received;
     const bool newest = guest->session.receive(now, datagram);
-    tap_from(guest->session.stats().datagrams_received > accepted ? kGuest : kStranger);
+    tap_from(guest->session.stats().datagrams_received > accepted ? kGuest : kUnauthenticated);
     if (newest && guest->address != from) {
       guest->address = from;
       ++stats_.roamed;
@@ -130,7 +130,7 @@ void NetworkLoop::receive(LocalTime now, const Address& from, std::span<const st
     if (newest) measure(now, *guest);
   } else if (const auto waiting = std::find_if(half_open_.begin(), half_open_.end(), is_meant);
              waiting != half_open_.end()) {
-    if (!waiting->session.receive(now, datagram)) return tap_from(kStranger);
+    if (!waiting->session.receive(now, datagram)) return tap_from(kUnauthenticated);
     tap_from(kGuest);
     Guest arrived = std::move(*waiting);
     half_open_.erase(waiting);
@@ -138,7 +138,7 @@ void NetworkLoop::receive(LocalTime now, const Address& from, std::span<const st
     open(now, std::move(arrived));
   } else {
     ++stats_.unknown_connection;
-    tap_from(kStranger);
+    tap_from(kUnauthenticated);
   }
 }
 
@@ -147,7 +147,7 @@ void NetworkLoop::greet(LocalTime now, const Address& from, std::span<const std:
   const std::uint64_t unknown_keys = handshake_.stats().unknown_key;
   const ServerHandshake::Reply reply = handshake_.receive(now, from, datagram, answer);
   if (handshake_.stats().unknown_key > unknown_keys) note_unknown_key(notices_, from);
-  const DatagramFilter::Sender sender = reply.guest ? sender_of(*reply.guest, from) : kStranger;
+  const DatagramFilter::Sender sender = reply.guest ? sender_of(*reply.guest, from) : kUnauthenticated;
   tap(now, DatagramRecord::Direction::kIn, sender, from, datagram, datagram.size());
   if (reply.guest) return admit(now, from, *reply.guest, datagram);
   if (reply.size > 0) send(now, sender, from, std::span(answer).first(reply.size));
@@ -159,10 +159,10 @@ void NetworkLoop::receive_foreign(LocalTime now, const Address& from, std::span<
   if (reply.guest) admit(now, from, *reply.guest, hello);  // otherwise its cookie has expired
 }
 
-/// If keys are configured, a client without a key counts as a stranger, unless it does not need one.
+/// If keys are configured, a client without a key counts as unauthenticated, unless it does not need one.
 DatagramFilter::Sender NetworkLoop::sender_of(const ServerHandshake::Guest& guest, const Address& from) const {
   const bool let_in = config_.keys.empty() || (config_.needs_no_key != nullptr && config_.needs_no_key(from));
-  return guest.key != nullptr || let_in ? kGuest : kStranger;
+  return guest.key != nullptr || let_in ? kGuest : kUnauthenticated;
 }
 
 /// Repeats the answer if the first one was lost. In suite 1 the request may come from any address, because only the
@@ -555,8 +555,8 @@ void NetworkLoop::tap(LocalTime now, DatagramRecord::Direction direction, Datagr
   switch (filter_.judge(now, partner, size)) {
     case DatagramFilter::Verdict::kRecord:
       break;
-    case DatagramFilter::Verdict::kStranger:
-      return left_out(mail.strangers_left_out);
+    case DatagramFilter::Verdict::kUnauthenticated:
+      return left_out(mail.unauthenticated_left_out);
     case DatagramFilter::Verdict::kOverBudget:
       return left_out(mail.datagrams_over_budget);
   }

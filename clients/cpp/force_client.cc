@@ -170,7 +170,7 @@ void ForceClient::stop(LocalTime now) {
 ForceClient::Stats ForceClient::stats() const {
   Stats stats = stats_;
   stats.link = connection_.link_stats();
-  stats.strangers = connection_.strangers();
+  stats.foreign = connection_.foreign();
   return stats;
 }
 

@@ -161,7 +161,7 @@ class ForceClient {
     std::string_view unusable{};        ///< reason for the newest unusable force; empty: none
     std::string_view left_out{};        ///< the omitted part of the forces, and the reason
     std::uint64_t forces_alike = 0;     ///< forces not sent because they are within the deadband
-    std::uint64_t strangers = 0;        ///< datagrams dropped because they did not come from the server
+    std::uint64_t foreign = 0;          ///< datagrams dropped because they did not come from the server
     std::string lease_lost_to;          ///< the client that has taken over the channel
   };
 

@@ -6,13 +6,14 @@ namespace tendon {
 DatagramFilter::Verdict DatagramFilter::judge(LocalTime now, Sender sender, std::size_t size) noexcept {
   if (now >= second_ends_) {
     second_ends_ = now + std::chrono::seconds(1);
-    strangers_ = 0;
+    unauthenticated_ = 0;
     bytes_ = 0;
   }
-  if (sender == Sender::kStranger && strangers_ >= config_.strangers_per_s) return Verdict::kStranger;
+  if (sender == Sender::kUnauthenticated && unauthenticated_ >= config_.unauthenticated_per_s)
+    return Verdict::kUnauthenticated;
   if (size > config_.bytes_per_s - bytes_) return Verdict::kOverBudget;
   bytes_ += size;
-  if (sender == Sender::kStranger) ++strangers_;
+  if (sender == Sender::kUnauthenticated) ++unauthenticated_;
   return Verdict::kRecord;
 }
 

@@ -10,7 +10,7 @@ namespace tendon {
 
 /// Selects the datagrams that are recorded, so that an attacker cannot fill the disk or the queue of the log thread.
 ///
-/// * Datagrams that do not belong to a client ("strangers") can be sent by anybody. The first `strangers_per_s` of each
+/// * Datagrams that do not belong to a client can be sent by anybody. The first `unauthenticated_per_s` of each
 ///   second are recorded. A normal handshake consists of four datagrams.
 /// * Datagrams of clients are recorded up to `bytes_per_s`, which is 10 times the rate of a 1 kHz engine and an
 ///   observer.
@@ -21,13 +21,13 @@ namespace tendon {
 class DatagramFilter {
  public:
   struct Config {
-    std::uint32_t strangers_per_s = 16;
-    std::uint64_t bytes_per_s = 4'000'000;  ///< on the wire, including strangers
+    std::uint32_t unauthenticated_per_s = 16;
+    std::uint64_t bytes_per_s = 4'000'000;  ///< on the wire, including these
   };
-  enum class Sender : std::uint8_t { kGuest, kStranger };
+  enum class Sender : std::uint8_t { kGuest, kUnauthenticated };
   enum class Verdict : std::uint8_t {
     kRecord,
-    kStranger,
+    kUnauthenticated,
     kOverBudget,
   };
 
@@ -39,7 +39,7 @@ class DatagramFilter {
  private:
   Config config_;
   LocalTime second_ends_ = LocalTime::min();
-  std::uint32_t strangers_ = 0;  ///< recorded in this second
+  std::uint32_t unauthenticated_ = 0;  ///< recorded in this second
   std::uint64_t bytes_ = 0;
 };
 

@@ -67,7 +67,7 @@ void PartRecorder::lost(const LossRecord& loss) {
     closed_.lost_steps += loss.steps;
     closed_.lost_datagrams += loss.datagrams;
   }
-  closed_.strangers_left_out += loss.strangers;
+  closed_.unauthenticated_left_out += loss.unauthenticated;
   if (!recorder_) return;
   told_.steps += loss.steps;
   told_.datagrams += loss.datagrams;

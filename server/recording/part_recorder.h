@@ -58,7 +58,7 @@ class PartRecorder {
     std::uint64_t datagrams = 0;
     std::uint64_t lost_steps = 0;  ///< because of a full disk or a slow log thread
     std::uint64_t lost_datagrams = 0;
-    std::uint64_t strangers_left_out = 0;
+    std::uint64_t unauthenticated_left_out = 0;
     std::uint64_t datagrams_over_budget = 0;
     std::string error;  ///< the reason why recording is stopped, or empty
 

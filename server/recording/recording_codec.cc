@@ -320,7 +320,7 @@ std::string encode(const LossRecord& loss) {
   out.set_steps(loss.steps);
   out.set_datagrams(loss.datagrams);
   out.set_cause(static_cast<pb::LossCause>(loss.cause));
-  out.set_strangers(loss.strangers);
+  out.set_strangers(loss.unauthenticated);
   return out.SerializeAsString();
 }
 
@@ -419,7 +419,7 @@ LossRecord decode_loss(std::string_view message, LocalTime at) {
           .steps = in.steps(),
           .datagrams = in.datagrams(),
           .cause = static_cast<LossRecord::Cause>(in.cause()),
-          .strangers = in.strangers()};
+          .unauthenticated = in.strangers()};
 }
 
 }  // namespace tendon::recording

@@ -40,7 +40,7 @@ struct LossRecord {
   std::uint64_t steps = 0;
   std::uint64_t datagrams = 0;
   Cause cause = Cause::kLogThread;
-  std::uint64_t strangers = 0;  ///< from and to strangers; only for kSample
+  std::uint64_t unauthenticated = 0;  ///< from and to unauthenticated senders; only for kSample
 
   bool operator==(const LossRecord&) const = default;
 };

@@ -129,7 +129,7 @@ TEST(Recordings, AFloodOfHellosIsASampleAndACountAndCostsNoStep) {
   EXPECT_GT(strangers, 0);
   EXPECT_LE(strangers, 16 * (number_in(end, "uptime_s") + 2));
   EXPECT_GT(count_in(end, "strangers_left_out"), 1000U);
-  EXPECT_EQ(recording.strangers_left_out, count_in(end, "strangers_left_out"));
+  EXPECT_EQ(recording.unauthenticated_left_out, count_in(end, "strangers_left_out"));
 }
 
 }  // namespace

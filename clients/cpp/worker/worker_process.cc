@@ -32,7 +32,7 @@
 namespace tendon::worker {
 namespace {
 
-constexpr std::size_t kMostStrangers = 8;
+constexpr std::size_t kMostPending = 8;
 
 [[noreturn]] void fail_with(const std::string& what) { throw std::system_error(errno, std::generic_category(), what); }
 
@@ -83,7 +83,7 @@ File listen_at_path(const std::string& path) {
   std::ranges::copy(path, std::begin(to.sun_path));
   File file(::socket(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
   if (!file.is_open() || ::bind(file.get(), reinterpret_cast<const sockaddr*>(&to), sizeof to) != 0 ||
-      ::listen(file.get(), kMostStrangers) != 0) {
+      ::listen(file.get(), kMostPending) != 0) {
     fail_with("cannot listen at " + path);
   }
   return file;
@@ -107,7 +107,7 @@ File listen_at(const ServerName& name, std::uint16_t& port) {
   if (!file.is_open() || ::setsockopt(file.get(), IPPROTO_IPV6, IPV6_V6ONLY, &no, sizeof no) != 0 ||
       ::setsockopt(file.get(), SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes) != 0 ||
       ::bind(file.get(), reinterpret_cast<const sockaddr*>(&to), sizeof to) != 0 ||
-      ::listen(file.get(), kMostStrangers) != 0 ||
+      ::listen(file.get(), kMostPending) != 0 ||
       ::getsockname(file.get(), reinterpret_cast<sockaddr*>(&to), &size) != 0) {
     fail_with("cannot listen at " + name.text());
   }
@@ -157,7 +157,7 @@ std::string in_words(int status) {
 }  // namespace
 
 struct WorkerProcess::Files {
-  struct Stranger {
+  struct Pending {
     File file;
     RecordReader reader{};
   };
@@ -166,7 +166,7 @@ struct WorkerProcess::Files {
   File poll;
   File listener;
   File stream;
-  std::vector<Stranger> strangers;
+  std::vector<Pending> pending;
   pid_t pid = 0;  ///< of the program; 0: not running
   File process;   ///< readable after the program's exit
 
@@ -244,7 +244,7 @@ void WorkerProcess::launch(const std::string& secret) {
 
 void WorkerProcess::kill() {
   files_->stream = File();
-  files_->strangers.clear();
+  files_->pending.clear();
   files_->process = File();
   files_->pid = 0;
   events_.clear();
@@ -285,13 +285,13 @@ void WorkerProcess::send(const Record& record) {
 void WorkerProcess::accept_one() {
   File file(::accept4(files_->listener.get(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC));
   if (!file.is_open() || secret_.empty()) return;
-  if (files_->strangers.size() >= kMostStrangers) files_->strangers.erase(files_->strangers.begin());
+  if (files_->pending.size() >= kMostPending) files_->pending.erase(files_->pending.begin());
   if (!config_.listen.empty()) {
     const int yes = 1;
     ::setsockopt(file.get(), IPPROTO_TCP, TCP_NODELAY, &yes, sizeof yes);
   }
   files_->watch(file);
-  files_->strangers.push_back({.file = std::move(file)});
+  files_->pending.push_back({.file = std::move(file)});
 }
 
 void WorkerProcess::read_stream() {
@@ -301,23 +301,23 @@ void WorkerProcess::read_stream() {
     if (size > 0) to.add({buffer.data(), static_cast<std::size_t>(size)});
     return size > 0 || (size < 0 && (errno == EAGAIN || errno == EINTR));
   };
-  for (std::size_t i = 0; i < files_->strangers.size() && !files_->stream.is_open();) {
-    Files::Stranger& stranger = files_->strangers[i];
+  for (std::size_t i = 0; i < files_->pending.size() && !files_->stream.is_open();) {
+    Files::Pending& connection = files_->pending[i];
     std::optional<Record> first;
-    bool keep = read(stranger.file, stranger.reader);
+    bool keep = read(connection.file, connection.reader);
     try {
-      first = stranger.reader.next();
+      first = connection.reader.next();
     } catch (const std::runtime_error&) {
       keep = false;
     }
     if (first && opens(*first, secret_)) {
-      files_->stream = std::move(stranger.file);
-      reader_ = std::move(stranger.reader);
-      files_->strangers.clear();
+      files_->stream = std::move(connection.file);
+      reader_ = std::move(connection.reader);
+      files_->pending.clear();
       secret_.clear();  // a secret opens the stream only once
       events_.emplace_back(Opened{});
     } else if (first || !keep) {
-      files_->strangers.erase(files_->strangers.begin() + static_cast<std::ptrdiff_t>(i));
+      files_->pending.erase(files_->pending.begin() + static_cast<std::ptrdiff_t>(i));
     } else {
       ++i;
     }

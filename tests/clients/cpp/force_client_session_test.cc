@@ -160,7 +160,7 @@ TEST(ForceClient, HearsNobodyButItsServer) {
   const std::vector<std::byte> noise(100, std::byte{0x54});
   for (int i = 0; i < 10; ++i) world.network().send(world.now, stranger, a_and_z::a_address, noise);
   world.run(milliseconds(100));
-  EXPECT_EQ(world.a->stats().strangers, 10U);
+  EXPECT_EQ(world.a->stats().foreign, 10U);
   EXPECT_EQ(world.a->stats().link.malformed, before.malformed);
 }
 

@@ -94,7 +94,7 @@ Recording read_recording(const std::filesystem::path& file) {
   while (const auto record = reader.next()) {
     if (const auto* step = std::get_if<StepRecord>(&*record)) recording.steps.push_back(*step);
     if (const auto* loss = std::get_if<LossRecord>(&*record)) {
-      recording.strangers_left_out += loss->strangers;
+      recording.unauthenticated_left_out += loss->unauthenticated;
       recording.losses += loss->steps + loss->datagrams > 0 ? 1U : 0U;
     }
     if (const auto* datagram = std::get_if<DatagramRecord>(&*record)) {

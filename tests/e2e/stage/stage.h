@@ -92,7 +92,7 @@ struct Recording {
   std::vector<StepRecord> steps;
   std::vector<DatagramRecord> arrived;
   std::uint64_t losses = 0;  ///< records of losses, excluding intended omissions
-  std::uint64_t strangers_left_out = 0;
+  std::uint64_t unauthenticated_left_out = 0;
   bool truncated = false;
 };
 Recording read_recording(const std::filesystem::path& file);

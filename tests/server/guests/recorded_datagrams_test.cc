@@ -57,7 +57,7 @@ TEST_F(SealedServer, AFloodOfStrangersIsASampleAndACountAndGuestsAreWhole) {
   EXPECT_LE(recorded.strangers, 2 * 16U) << "seconds begin where datagrams do";
   EXPECT_EQ(mail().datagrams_lost, 0U);
   EXPECT_EQ(mail().datagrams_over_budget, 0U);
-  EXPECT_GT(mail().strangers_left_out, 39'000U);
+  EXPECT_GT(mail().unauthenticated_left_out, 39'000U);
 }
 
 TEST_F(SealedServer, AGuestThatSendsMoreThanTheBudgetIsCountedAndNotRecorded) {

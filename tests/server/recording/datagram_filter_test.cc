@@ -16,11 +16,11 @@ using enum DatagramFilter::Sender;
 using Verdict = DatagramFilter::Verdict;
 
 TEST(DatagramFilter, RecordsTheFirstFewStrangersOfEachSecond) {
-  DatagramFilter filter({.strangers_per_s = 3});
+  DatagramFilter filter({.unauthenticated_per_s = 3});
   for (const int second : {0, 1, 5}) {
     for (int i = 0; i < 1000; ++i) {
-      const auto verdict = filter.judge(ms(1000 * second + i), kStranger, 1200);
-      EXPECT_EQ(verdict, i < 3 ? Verdict::kRecord : Verdict::kStranger) << second << " s, " << i;
+      const auto verdict = filter.judge(ms(1000 * second + i), kUnauthenticated, 1200);
+      EXPECT_EQ(verdict, i < 3 ? Verdict::kRecord : Verdict::kUnauthenticated) << second << " s, " << i;
     }
   }
 }

@@ -120,7 +120,7 @@ TEST(Recorder, SaysOfEachLossWhatItWas) {
   const std::vector<LossRecord> losses = {
       {.at = ms(1), .steps = 7, .datagrams = 9, .cause = LossRecord::Cause::kDisk},
       {.at = ms(2), .datagrams = 5, .cause = LossRecord::Cause::kByteBudget},
-      {.at = ms(3), .cause = LossRecord::Cause::kSample, .strangers = 39'000},
+      {.at = ms(3), .cause = LossRecord::Cause::kSample, .unauthenticated = 39'000},
   };
   for (const LossRecord& loss : losses) recorder.lost(loss);
   recorder.close();

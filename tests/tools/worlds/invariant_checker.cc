@@ -69,7 +69,7 @@ Duration longest_validity(const DrawnWorld& world) {
 /// Every datagram that a client reads from its link is in one of these counters.
 std::uint64_t counted(const ForceClient::Stats& stats) {
   const LinkStats& link = stats.link;
-  return link.datagrams_received + link.duplicated + link.malformed + link.forged + link.old_key + stats.strangers;
+  return link.datagrams_received + link.duplicated + link.malformed + link.forged + link.old_key + stats.foreign;
 }
 
 }  // namespace

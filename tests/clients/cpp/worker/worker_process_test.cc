@@ -164,7 +164,7 @@ int connect_to(const std::string& address) {
   return socket;
 }
 
-TEST(WorkerProcess, AStrangerWithoutTheSecretDoesNotOpenTheStream) {
+TEST(WorkerProcess, AConnectionWithoutTheSecretDoesNotOpenTheStream) {
   WorkerProcess process({.command = fake("never-opens")});
   process.launch(kSecret);
   const int silent = connect_to(process.address());
