@@ -230,7 +230,7 @@ Json in_json(const Server::Summary& summary) {
   add("forces_out_of_bounds", network.dropped.forces.out_of_bounds);
   add("forces_old_sequence", network.dropped.forces.old_sequence);
   add("hopeless", network.hopeless);
-  add("foretold", network.foretold);
+  add("foretold", network.predicted);
   add("replaced", network.replaced);
   add("roamed", network.roamed);
   add("half_open_forgotten", network.half_open_forgotten);

@@ -370,7 +370,7 @@ void NetworkLoop::publish(LocalTime now) {
   for (Guest& guest : guests_) {
     for (View& view : guest.views) {
       const DeviceState* const state = states_[view.device].fresh;
-      if (state != nullptr && tell_state(guest, view, *state)) ++stats_.foretold;
+      if (state != nullptr && tell_state(guest, view, *state)) ++stats_.predicted;
     }
     send_all(now, guest);
   }

@@ -44,7 +44,7 @@ NetworkStats& NetworkStats::operator+=(const NetworkStats& more) {
   late_network += more.late_network;
   late_engine += more.late_engine;
   late_unknown += more.late_unknown;
-  foretold += more.foretold;
+  predicted += more.predicted;
   hopeless += more.hopeless;
   add_dropped(dropped, more.dropped, more.dropped.forces);
   channels.insert(channels.end(), more.channels.begin(), more.channels.end());

@@ -208,7 +208,7 @@ void ForceClient::open(LocalTime now, const Welcome& welcome) {
   if (claims() || agreed_to(kFeatureHandle)) session.request(Describe{.device = lease_.place().device});
   if (agreed_to(kFeatureHandle)) session.request(Describe{.device = lease_.place().device, .handle = true});
   deadband_request_ = config_.state_deadband ? session.request(*config_.state_deadband) : std::nullopt;
-  foretell_ = false;
+  predicts_ = false;
   seen_tick_ = 0;
   report_.reset();
   device_report_.reset();
@@ -281,7 +281,7 @@ void ForceClient::take_answer(LocalTime now, const Session::RequestAnswered& ans
   if (answered.handle) handle_ = answered.handle;
   if (answered.id == order_) order_answer_ = answered;
   if (answered.id == deadband_request_) {
-    foretell_ = answered.code == Code::kOk && period_ > Duration::zero() &&
+    predicts_ = answered.code == Code::kOk && period_ > Duration::zero() &&
                 config_.state_deadband->max_silence > Duration::zero();
   }
   if (lease_.take(answered, now) && lease_.holds()) stats_.lease_lost_to.clear();
@@ -296,12 +296,12 @@ void ForceClient::take_request(LocalTime now, const Session::RequestArrived& arr
 }
 
 std::optional<DeviceState> ForceClient::due_state(LocalTime now) {
-  if (!foretell_) return std::exchange(unseen_, false) ? newest_ : std::nullopt;
+  if (!predicts_) return std::exchange(unseen_, false) ? newest_ : std::nullopt;
   if (!newest_ || now - newest_arrived_ > config_.state_deadband->max_silence) return {};
-  const DeviceState state = foretell(*newest_, now - newest_arrived_, haptic_period());
+  const DeviceState state = predict(*newest_, now - newest_arrived_, haptic_period());
   if (state.tick <= seen_tick_) return {};  // the network delay of the previous state was shorter
   unseen_ = false;
-  stats_.states_foretold += state.tick > newest_->tick ? 1 : 0;
+  stats_.states_predicted += state.tick > newest_->tick ? 1 : 0;
   return state;
 }
 
@@ -391,7 +391,7 @@ Duration ForceClient::valid_for(std::uint64_t tick) const {
 Duration ForceClient::haptic_period() const { return from_seconds(1.0 / welcome_->loop_hz); }
 
 LocalTime ForceClient::next_call() const {
-  if (!foretell_) return unseen_ ? next_call_ : LocalTime::max();
+  if (!predicts_) return unseen_ ? next_call_ : LocalTime::max();
   if (!newest_) return LocalTime::max();
   const std::uint64_t ahead = seen_tick_ >= newest_->tick ? seen_tick_ + 1 - newest_->tick : 0;
   const LocalTime at = std::max(next_call_, newest_arrived_ + static_cast<Duration::rep>(ahead) * haptic_period());

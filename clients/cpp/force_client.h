@@ -154,8 +154,8 @@ class ForceClient {
     std::uint64_t attempts = 0;
     std::uint64_t sessions = 0;  ///< attempts that the server accepted
     std::uint64_t states = 0;
-    std::uint64_t states_foretold = 0;  ///< predicted states that the callback received
-    std::uint64_t states_skipped = 0;   ///< received states that a newer one replaced before the callback ran
+    std::uint64_t states_predicted = 0;  ///< predicted states that the callback received
+    std::uint64_t states_skipped = 0;    ///< received states that a newer one replaced before the callback ran
     std::uint64_t forces = 0;
     std::uint64_t forces_unusable = 0;  ///< forces not sent because they are not finite or out of bounds
     std::string_view unusable{};        ///< reason for the newest unusable force; empty: none
@@ -297,7 +297,7 @@ class ForceClient {
   LocalTime newest_arrived_{};
   std::uint64_t seen_tick_ = 0;                      ///< newest tick passed to the callback
   std::optional<std::uint32_t> deadband_request_{};  ///< request id
-  bool foretell_ = false;                            ///< the server omits predictable states
+  bool predicts_ = false;                            ///< the server omits predictable states
   LocalTime next_call_{};
   std::optional<HandleDeadband> deadband_;
   std::uint64_t sequence_ = 0;       ///< of the newest force

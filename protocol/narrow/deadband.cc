@@ -60,7 +60,7 @@ void HandleDeadband::sent(LocalTime now, const Value& value) noexcept {
   grip_.sent(now, grip_of(value));
 }
 
-DeviceState foretell(const DeviceState& sent, Duration later, Duration haptic_period) noexcept {
+DeviceState predict(const DeviceState& sent, Duration later, Duration haptic_period) noexcept {
   const Duration::rep periods = std::max<Duration::rep>(later / haptic_period, 0);
   DeviceState state = sent;
   state.tick += static_cast<std::uint64_t>(periods);

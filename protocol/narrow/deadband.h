@@ -93,9 +93,9 @@ class HandleDeadband {
 ///     orientation turned by the rotation vector angular velocity · n T      opening + its velocity · n T
 ///
 /// Copies all other fields. A negative `later` is treated as zero. Realtime-safe: yes.
-DeviceState foretell(const DeviceState& sent, Duration later, Duration haptic_period) noexcept;
+DeviceState predict(const DeviceState& sent, Duration later, Duration haptic_period) noexcept;
 
-/// Omits device states that the receiver can predict using foretell(), by a deadband on all velocities. States with new
+/// Omits device states that the receiver can predict using predict(), by a deadband on all velocities. States with new
 /// modes or buttons are always sent.
 /// Thread-safe: no. Realtime-safe: yes.
 class StateDeadband {

@@ -124,7 +124,7 @@ class Stats:
     attempts: int = 0
     sessions: int = 0  # attempts that the server accepted
     states: int = 0  # received states
-    states_foretold: int = 0  # predicted states that were returned
+    states_predicted: int = 0  # predicted states that were returned
     states_skipped: int = 0  # received states that a newer one replaced before they were due
     forces: int = 0
     forces_unusable: int = 0  # forces not sent: not finite, out of bounds, or for an unknown state

@@ -63,7 +63,7 @@ class Deadband:
         return dist(value, before) <= max(self._config.share * hypot(*before), floor)
 
 
-def foretell(sent: DeviceState, later_ns: int, haptic_period_ns: int) -> DeviceState:
+def predict(sent: DeviceState, later_ns: int, haptic_period_ns: int) -> DeviceState:
     """Predicts the device state `later_ns` after `sent` with constant velocities of position, rotation and gripper,
     in whole haptic periods."""
     periods = max(later_ns // haptic_period_ns, 0)

@@ -13,7 +13,7 @@ from . import limits
 from .answer import Answer, read_touch
 from .codec import is_request
 from .config import Config, Phase, Stats
-from .deadband import Deadband, foretell
+from .deadband import Deadband, predict
 from .handshake import ClientHandshake
 from .messages import (
     FEATURE_CHANNELS,
@@ -117,7 +117,7 @@ class ForceClient:
         self._newest_arrived = now
         self._seen_tick = 0  # newest returned tick
         self._deadband_request: int | None = None  # id of the request for the state deadband
-        self._foretell = False  # the server omits predictable states
+        self._predicts = False  # the server omits predictable states
         self._deadband: Deadband | None = None
         self._next_call = now
         self._sequence = 0  # of the newest force
@@ -316,7 +316,7 @@ class ForceClient:
         """Returns the newest state if it is due and was not returned before."""
         if now < self._next_call or self._waits_for_lease():
             return None
-        state = self._foretold(now) if self._foretell else self._unseen
+        state = self._predicted(now) if self._predicts else self._unseen
         if state is None:
             return None
         self._unseen = None
@@ -345,7 +345,7 @@ class ForceClient:
         not held."""
         if self._waits_for_lease():
             return NEVER
-        if not self._foretell:
+        if not self._predicts:
             return NEVER if self._unseen is None else self._next_call
         if self._newest is None:
             return NEVER
@@ -430,7 +430,7 @@ class ForceClient:
             self._session.request(SetStateRate(self.config.state_hz, self._place.device))
         asked = self.config.state_deadband
         self._deadband_request = self._session.request(asked) if asked else None
-        self._foretell = False
+        self._predicts = False
         self._seen_tick = 0
         self.report = self.device_report = None
         self.peer_reports = {}
@@ -484,7 +484,7 @@ class ForceClient:
         if answer.handle is not None:
             self.handle = answer.handle
         if answer.id == self._deadband_request:
-            self._foretell = answer.code is Code.OK and self._period > 0 and self._silence_ns() > 0
+            self._predicts = answer.code is Code.OK and self._period > 0 and self._silence_ns() > 0
         if answer.id != self._asked_lease:
             return
         self._asked_lease = None
@@ -518,15 +518,15 @@ class ForceClient:
     def _silence_ns(self) -> int:
         return 1000 * self.config.state_deadband.max_silence_us if self.config.state_deadband else 0
 
-    def _foretold(self, now: int) -> DeviceState | None:
+    def _predicted(self, now: int) -> DeviceState | None:
         """Returns the state predicted for `now`, or None if there is nothing new or the last state is too old."""
         newest, age = self._newest, now - self._newest_arrived
         if newest is None or age > self._silence_ns():
             return None
-        state = foretell(newest, age, self._haptic_period())
+        state = predict(newest, age, self._haptic_period())
         if state.tick <= self._seen_tick:  # the previous state had a shorter network delay
             return None
-        self._stats.states_foretold += state.tick > newest.tick
+        self._stats.states_predicted += state.tick > newest.tick
         return state
 
     def _valid_for_us(self, tick: int, loop_hz: int) -> int:

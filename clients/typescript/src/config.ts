@@ -86,7 +86,7 @@ export interface ClientStats {
   sessions: number;
   states: number;
   /** Predicted states that the callback received. */
-  statesForetold: number;
+  statesPredicted: number;
   /** Received states that a newer one replaced before the callback ran. */
   statesSkipped: number;
   forces: number;

@@ -86,7 +86,7 @@ function turned({ w, x, y, z }: Quat, { x: b, y: c, z: d }: Vec3, seconds: numbe
 
 /** Predicts the state `later` after `sent` with constant velocities of position, rotation and gripper, in whole
  * periods. */
-export function foretell(sent: DeviceState, later: Nanoseconds, hapticPeriod: Nanoseconds): DeviceState {
+export function predict(sent: DeviceState, later: Nanoseconds, hapticPeriod: Nanoseconds): DeviceState {
   const periods = later > 0n ? later / hapticPeriod : 0n;
   const seconds = Number(periods * hapticPeriod) / 1e9;
   const { position: p, velocity: v, turning, grip } = sent;

@@ -2,7 +2,7 @@
 import { objection, usable, type Touch } from "./answer.js";
 import { isRequest, type ControlAck } from "./codec.js";
 import { checked, type ClientConfig, type ClientStats, type Phase } from "./config.js";
-import { Deadband, foretell } from "./deadband.js";
+import { Deadband, predict } from "./deadband.js";
 import { expect } from "./expect.js";
 import { ClientHandshake } from "./handshake.js";
 import { kMaxValidForMs } from "./limits.js";
@@ -85,7 +85,7 @@ export class ForceClient {
   /** Id of the pending request for the state deadband. */
   #deadbandRequest: number | undefined;
   /** The server omits predictable states. */
-  #foretells = false;
+  #predicts = false;
   #deadband: Deadband | undefined;
   #report: LinkReport | undefined;
   #deviceReport: DeviceReport | undefined;
@@ -95,7 +95,7 @@ export class ForceClient {
   /** State tick that the newest force answers. */
   #answeredTick = 0n;
   readonly #stats: ClientStats = {
-    phase: "greeting", code: Code.OK, reason: "", link: undefined, attempts: 0, sessions: 0, states: 0, statesForetold: 0,
+    phase: "greeting", code: Code.OK, reason: "", link: undefined, attempts: 0, sessions: 0, states: 0, statesPredicted: 0,
     statesSkipped: 0, forces: 0, forcesUnusable: 0, unusable: "", leftOut: "", forcesAlike: 0, leaseLostTo: "",
   };
 
@@ -322,7 +322,7 @@ export class ForceClient {
     if (this.#config.stateHz > 0) this.#session.request({ kind: "setStateRate", hz: this.#config.stateHz, device });
     const { deadband, stateDeadband } = this.#config;
     this.#deadbandRequest = stateDeadband && this.#session.request({ kind: "setStateDeadband", ...stateDeadband });
-    this.#foretells = false;
+    this.#predicts = false;
     this.#seenTick = 0n;
     this.#report = this.#deviceReport = undefined;
     this.#peerReports = new Map();
@@ -390,7 +390,7 @@ export class ForceClient {
   #takeAnswer(now: Nanoseconds, { id, code, device, handle, waitMs = 0 }: ControlAck): void {
     if (device) this.#description = device;
     if (handle) this.#handle = handle;
-    if (id === this.#deadbandRequest) this.#foretells = code === Code.OK && this.#period > 0n && this.#silence() > 0n;
+    if (id === this.#deadbandRequest) this.#predicts = code === Code.OK && this.#period > 0n && this.#silence() > 0n;
     if (id !== this.#askedLease) return;
     this.#askedLease = undefined;
     this.#askLease = kNever;
@@ -423,7 +423,7 @@ export class ForceClient {
   /** Returns whether a force is waiting to be sent. */
   #call(now: Nanoseconds): boolean {
     if (now < this.#nextCall || (this.#physics && !this.#holds)) return false;
-    const newest = this.#foretells ? this.#foretold(now) : this.#unseen;
+    const newest = this.#predicts ? this.#predicted(now) : this.#unseen;
     if (!newest) return false;
     const buttons = (newest.buttons | this.#pressed) >>> 0;
     const hand = buttons === newest.buttons ? newest : { ...newest, buttons };
@@ -447,12 +447,12 @@ export class ForceClient {
   }
 
   /** Returns the state predicted for `now`, or undefined if there is nothing new or the last state is too old. */
-  #foretold(now: Nanoseconds): DeviceState | undefined {
+  #predicted(now: Nanoseconds): DeviceState | undefined {
     const age = now - this.#newestArrived;
     if (!this.#newest || age > this.#silence()) return undefined;
-    const state = foretell(this.#newest, age, this.#hapticPeriod());
+    const state = predict(this.#newest, age, this.#hapticPeriod());
     if (state.tick <= this.#seenTick) return undefined; // the previous state had a shorter network delay
-    if (state.tick > this.#newest.tick) ++this.#stats.statesForetold;
+    if (state.tick > this.#newest.tick) ++this.#stats.statesPredicted;
     return state;
   }
 
@@ -512,7 +512,7 @@ export class ForceClient {
 
   /** Returns the time of the next callback, or kNever if no unseen state is available. */
   #nextDue(): Nanoseconds {
-    if (!this.#foretells) return this.#unseen ? this.#nextCall : kNever;
+    if (!this.#predicts) return this.#unseen ? this.#nextCall : kNever;
     if (!this.#newest) return kNever;
     const ahead = latest(this.#seenTick + 1n - this.#newest.tick, 0n); // the first unseen tick
     const due = latest(this.#nextCall, this.#newestArrived + ahead * this.#hapticPeriod());

@@ -183,10 +183,10 @@ def test_no_state_is_handed_out_while_another_holds_the_channel():
     assert len(leases(stage)) == 1
 
 
-def test_foretold_states_wait_for_the_lease_too():
+def test_predicted_states_wait_for_the_lease_too():
     stage = named(ANOTHERS, rate_hz=500, state_deadband=KEPT)
     stage.run(500 * MS)
-    assert (stage.seen, stage.client.stats.states_foretold) == ([], 0)
+    assert (stage.seen, stage.client.stats.states_predicted) == ([], 0)
 
 
 def test_an_observer_has_no_use_for_a_lease():

@@ -498,13 +498,13 @@ def sparse(every: int) -> Stage:
     return stage
 
 
-def test_states_that_were_left_out_are_foretold_at_the_callbacks_rate():
+def test_states_that_were_left_out_are_predicted_at_the_callbacks_rate():
     stage = sparse(10)
     stage.run(1 * SECOND)
     assert [control.request for control in stage.requests] == [KEPT]
     stats = stage.client.stats
     assert stats.states < 110
-    assert stats.states_foretold > 300
+    assert stats.states_predicted > 300
     assert len(stage.seen) > 450
     ticks = [hand.tick for hand in stage.seen]
     assert all(before < after for before, after in zip(ticks, ticks[1:]))
@@ -514,7 +514,7 @@ def test_states_that_were_left_out_are_foretold_at_the_callbacks_rate():
     assert {force.based_on_tick for force in stage.forces} <= set(ticks)
 
 
-def test_nothing_is_foretold_beyond_the_longest_silence():
+def test_nothing_is_predicted_beyond_the_longest_silence():
     stage = sparse(200)
     stage.run(1 * SECOND)
     assert 5 * 8 < len(stage.seen) < 5 * 12 + 2  # 20 ms of each 200 ms
@@ -525,7 +525,7 @@ def test_no_state_is_predicted_for_a_server_without_deadbands():
     stage.grant = Code.UNSUPPORTED
     stage.run(500 * MS)
     assert stage.client.stats.states > 450
-    assert stage.client.stats.states_foretold == 0
+    assert stage.client.stats.states_predicted == 0
 
 
 @pytest.mark.parametrize(

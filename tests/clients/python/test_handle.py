@@ -11,7 +11,7 @@ from stage import Stage
 from world import MS, SECOND
 
 from tendon import Config, ForceDeadband, Grip, Mode, Touch, Turning
-from tendon.deadband import Deadband, foretell
+from tendon.deadband import Deadband, predict
 from tendon.messages import ZERO, DeviceState, RotationModel, Torque
 
 TURNING = Turning((0.6, 0.8, 0.0, 0.0), (0.0, 1.0, 0.0))
@@ -80,14 +80,14 @@ def test_a_deadband_leaves_out_no_torque_that_a_hand_can_tell():
     assert [passes(1, None, 0.06), passes(1, None, 0.06)] == [True, False]
 
 
-def test_a_state_is_foretold_with_the_velocities_of_rotation_and_gripper():
+def test_a_state_is_predicted_with_the_velocities_of_rotation_and_gripper():
     sent = DeviceState(100, 0, ZERO, ZERO, ZERO, 0.0, inf, 0, 0, 0, Mode.ACTIVE)
     sent = replace(sent, turning=Turning((1.0009, 0.0, 0.0, 0.0), (0.0, 0.0, 2.0)), grip=Grip(0.5, -3.0))
-    later = foretell(sent, 10 * MS, MS)
+    later = predict(sent, 10 * MS, MS)
     assert later.turning.orientation == pytest.approx((cos(0.01), 0, 0, sin(0.01)), abs=1e-12)
     assert later.turning.angular_velocity == sent.turning.angular_velocity
     assert later.grip == Grip(pytest.approx(0.47), -3.0)
-    assert foretell(sent, 0, MS).turning == sent.turning
+    assert predict(sent, 0, MS).turning == sent.turning
     about = Turning((0.6, 0.0, 0.8, 0.0), (0.0, 2.0, 0.0))
-    turned = foretell(replace(sent, turning=about), 10 * MS, MS).turning.orientation
+    turned = predict(replace(sent, turning=about), 10 * MS, MS).turning.orientation
     assert turned[0] == pytest.approx(cos(acos(0.6) + 0.01), abs=1e-12)  # the angle grows

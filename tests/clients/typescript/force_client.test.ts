@@ -479,12 +479,12 @@ describe("what need not be sent", () => {
     }),
   });
 
-  it("states left out are foretold, time included, at the callback's rate", () => {
+  it("states left out are predicted, time included, at the callback's rate", () => {
     const { seen, world } = controller(1, kFair, { rateHz: 500, stateDeadband }, moving(10n));
     world.runMs(1000);
     assert.deepEqual(world.server.requests, [{ kind: "setStateDeadband", ...stateDeadband }]);
-    const { states, statesForetold } = world.client.stats();
-    assert.ok(states < 110 && statesForetold > 300 && seen.length > 440, `${states} ${statesForetold} ${seen.length}`);
+    const { states, statesPredicted } = world.client.stats();
+    assert.ok(states < 110 && statesPredicted > 300 && seen.length > 440, `${states} ${statesPredicted} ${seen.length}`);
     seen.forEach((hand, i) => {
       assert.ok(i === 0 || hand.tick > seen[i - 1]!.tick);
       assert.ok(Math.abs(hand.position.x - Number(hand.tick) * 1e-4) < 1e-12);
@@ -493,13 +493,13 @@ describe("what need not be sent", () => {
     assert.ok(world.server.forces.every(({ command }) => seen.some(({ tick }) => tick === command.basedOnTick)));
   });
 
-  it("nothing is foretold after the longest silence or without a grant", () => {
+  it("nothing is predicted after the longest silence or without a grant", () => {
     const silent = controller(1, kFair, { rateHz: 500, stateDeadband }, moving(200n));
     silent.world.runMs(1000);
     assert.ok(silent.seen.length > 30 && silent.seen.length < 65, `${silent.seen.length}`);
     const old = controller(1, kFair, { rateHz: 500, stateDeadband }, { answer: () => ({ code: Code.UNSUPPORTED, detail: "" }) });
     old.world.runMs(1000);
-    assert.equal(old.world.client.stats().statesForetold, 0);
+    assert.equal(old.world.client.stats().statesPredicted, 0);
     assert.ok(old.seen.length > 450);
   });
 

@@ -2,7 +2,7 @@
 // Orientation, torque and gripper of a handle.
 import assert from "node:assert/strict";
 import { describe, it } from "node:test";
-import { Deadband, foretell } from "../../../clients/typescript/src/deadband.js";
+import { Deadband, predict } from "../../../clients/typescript/src/deadband.js";
 import type { Touch } from "../../../clients/typescript/src/index.js";
 import { kFair, World, type ServerConduct } from "./support/world.js";
 
@@ -70,19 +70,19 @@ describe("the whole handle", () => {
     assert.deepEqual([passes(1, undefined, 0.06), passes(1, undefined, 0.06)], [true, false]);
   });
 
-  it("a state is foretold with the velocities of rotation and gripper", () => {
+  it("a state is predicted with the velocities of rotation and gripper", () => {
     const conduct: Pick<ServerConduct, "state"> = world(kTouch, [], false).server.conduct;
     const sent = {
       ...conduct.state(100n), grip: { opening: 0.5, velocity: -3 },
       turning: { orientation: { w: 1.0009, x: 0, y: 0, z: 0 }, angularVelocity: { x: 0, y: 0, z: 2 } },
     };
-    const { turning, grip } = foretell(sent, 10_000_000n, 1_000_000n);
+    const { turning, grip } = predict(sent, 10_000_000n, 1_000_000n);
     assert.ok(Math.abs(turning!.orientation.w - Math.cos(0.01)) < 1e-12);
     assert.ok(Math.abs(turning!.orientation.z - Math.sin(0.01)) < 1e-12);
     assert.ok(Math.abs(grip!.opening - 0.47) < 1e-12);
-    assert.deepEqual(foretell(sent, 0n, 1_000_000n).turning, sent.turning);
+    assert.deepEqual(predict(sent, 0n, 1_000_000n).turning, sent.turning);
     const about = { orientation: { w: 0.6, x: 0, y: 0.8, z: 0 }, angularVelocity: { x: 0, y: 2, z: 0 } };
-    const turned = foretell({ ...sent, turning: about }, 10_000_000n, 1_000_000n).turning!.orientation;
+    const turned = predict({ ...sent, turning: about }, 10_000_000n, 1_000_000n).turning!.orientation;
     assert.ok(Math.abs(turned.w - Math.cos(Math.acos(0.6) + 0.01)) < 1e-12, "the angle grows");
   });
 });

@@ -81,14 +81,14 @@ DeviceState state(int ms, const Vec3& position, const Vec3& velocity, Mode mode 
           .mode = mode};
 }
 
-TEST(Foretell, GoesOnAlongTheLineInWholeHapticPeriods) {
+TEST(Predict, GoesOnAlongTheLineInWholeHapticPeriods) {
   const DeviceState sent = state(100, {1, 2, 3}, {0.5, 0, -1});
-  const DeviceState later = foretell(sent, milliseconds(3) + Duration(999'999), milliseconds(1));
+  const DeviceState later = predict(sent, milliseconds(3) + Duration(999'999), milliseconds(1));
   EXPECT_EQ(later.tick, 103U);
   EXPECT_EQ(later.sampled, PeerTime(milliseconds(103)));
   EXPECT_LT((later.position - Vec3(1.0015, 2, 2.997)).norm(), 1e-12);
   EXPECT_EQ(later.velocity, sent.velocity);
-  EXPECT_EQ(foretell(sent, Duration(-1), milliseconds(1)).tick, 100U);
+  EXPECT_EQ(predict(sent, Duration(-1), milliseconds(1)).tick, 100U);
 }
 
 TEST(StateDeadband, LeavesOutAHandThatGoesStraightOnAndSendsWhenItTurns) {
@@ -115,18 +115,18 @@ DeviceState turning(int ms, const Vec3& angular_velocity, double grip_velocity =
   return turning;
 }
 
-TEST(Foretell, TurnsAndGripsOnWithTheVelocitiesOfBoth) {
+TEST(Predict, TurnsAndGripsOnWithTheVelocitiesOfBoth) {
   DeviceState sent = turning(100, {0, 0, 2}, -3);
   sent.turning->orientation = {.w = 1.0009, .x = 0, .y = 0, .z = 0};
-  const DeviceState later = foretell(sent, milliseconds(10), milliseconds(1));
+  const DeviceState later = predict(sent, milliseconds(10), milliseconds(1));
   EXPECT_NEAR(later.turning->orientation.w, std::cos(0.01), 1e-12);
   EXPECT_NEAR(later.turning->orientation.z, std::sin(0.01), 1e-12);
   EXPECT_EQ(later.turning->angular_velocity, sent.turning->angular_velocity);
   EXPECT_NEAR(later.grip->opening, 0.47, 1e-12);
-  EXPECT_EQ(foretell(sent, Duration(0), milliseconds(1)).turning, sent.turning) << "to the last bit";
+  EXPECT_EQ(predict(sent, Duration(0), milliseconds(1)).turning, sent.turning) << "to the last bit";
 }
 
-TEST(StateDeadband, SendsAHandThatTurnsOrGripsAnotherWayThanForetold) {
+TEST(StateDeadband, SendsAHandThatTurnsOrGripsAnotherWayThanPredicted) {
   StateDeadband deadband(kAsked);  // 1 mm/s corresponds to 20 mrad/s at 50 mm
   EXPECT_TRUE(deadband.passes(turning(1, {0, 0, 0.5}, -0.5)));
   EXPECT_FALSE(deadband.passes(turning(2, {0, 0, 0.54}, -0.46)));
@@ -157,7 +157,7 @@ TEST(HandleDeadband, LeavesOutNoTorqueOrGripForceThatAHandCanTell) {
 }
 
 /// The prediction error for a hand at `position(t)` is at most the velocity band times the silence.
-TEST(StateDeadband, WhatIsForetoldIsOffByAtMostTheBandTimesTheSilence) {
+TEST(StateDeadband, WhatIsPredictedIsOffByAtMostTheBandTimesTheSilence) {
   StateDeadband deadband(kAsked);
   DeviceState believed;
   int sent = 0;
@@ -169,10 +169,10 @@ TEST(StateDeadband, WhatIsForetoldIsOffByAtMostTheBandTimesTheSilence) {
       believed = now;
       ++sent;
     }
-    const DeviceState foretold = foretell(believed, now.sampled - believed.sampled, milliseconds(1));
-    ASSERT_EQ(foretold.tick, now.tick);
+    const DeviceState predicted = predict(believed, now.sampled - believed.sampled, milliseconds(1));
+    ASSERT_EQ(predicted.tick, now.tick);
     const double band = std::max(0.1 * believed.velocity.norm(), 1e-3);
-    EXPECT_LE((foretold.position - now.position).norm(), band * 20e-3);
+    EXPECT_LE((predicted.position - now.position).norm(), band * 20e-3);
   }
   EXPECT_LT(sent, 1000);
   EXPECT_GE(sent, 500);

@@ -208,7 +208,7 @@ void ChannelChecks::check_deadband(Conversation& talk, const pb::Welcome& welcom
   // own times.
   struct Count {
     std::size_t all = 0;
-    std::size_t foretold = 0;
+    std::size_t predicted = 0;
   };
   const auto count = [&](std::size_t since) {
     Count out;
@@ -223,14 +223,14 @@ void ChannelChecks::check_deadband(Conversation& talk, const pb::Welcome& welcom
         const double changed = std::hypot(w.x() - v.x(), w.y() - v.y(), w.z() - v.z());
         const bool in_band = changed <= std::max(kShare * std::hypot(v.x(), v.y(), v.z()), kFloor);
         const bool in_time = state.sampled_ns() - sent->sampled_ns() < kLongest.count();
-        out.foretold += in_band && in_time && state.mode() == sent->mode() ? 1 : 0;
+        out.predicted += in_band && in_time && state.mode() == sent->mode() ? 1 : 0;
       }
       sent = state;
     });
     return out;
   };
   const auto said = [](const Count& states) {
-    return std::to_string(states.all) + " states, " + std::to_string(states.foretold) + " of them predictable";
+    return std::to_string(states.all) + " states, " + std::to_string(states.predicted) + " of them predictable";
   };
 
   const pb::ControlAck on = set(kShare, kFloor, 20'000);
@@ -243,7 +243,7 @@ void ChannelChecks::check_deadband(Conversation& talk, const pb::Welcome& welcom
   guest_.report.judge("deadband", with.all >= least, said(with) + ", in 500 ms",
                       "at least one every 20 ms; at least " + std::to_string(least));
   // A state replaced before it was sent is not visible here, so its successor can look as if it was predicted.
-  guest_.report.judge("deadband", 10 * with.foretold <= with.all, said(with),
+  guest_.report.judge("deadband", 10 * with.predicted <= with.all, said(with),
                       "no state that the previous one predicts");
 
   const pb::ControlAck off = set(0, 0, 0);
@@ -252,7 +252,7 @@ void ChannelChecks::check_deadband(Conversation& talk, const pb::Welcome& welcom
   before = talk.heard().size();
   constexpr std::size_t kMany = 20;
   if (welcome.loop_hz() < 100) return;  // the states are too far apart to be predicted
-  const bool all = talk.listen_until(kPatience, [&] { return count(before).foretold >= kMany; });
+  const bool all = talk.listen_until(kPatience, [&] { return count(before).predicted >= kMany; });
   guest_.report.judge("deadband", all, said(count(before)) + ", after it was disabled",
                       "all states, including " + std::to_string(kMany) + " that the previous one predicts");
 }

@@ -82,7 +82,7 @@ enum class Fault : std::uint8_t {
   kDeniesTheHolder,
   kKeepsTheLease,
   kTakesAnyDeadband,
-  kSendsTheForetold,
+  kSendsThePredicted,
   kSilentWithDeadband,
   kDeadbandForEver,
   kTellsNothing,

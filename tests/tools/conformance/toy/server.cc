@@ -191,7 +191,7 @@ pb::Code ToyServer::set_deadband(Member& member, const pb::SetStateDeadband& ask
                                         asked.share() <= 0.5 && asked.floor_mps() >= 0 && asked.floor_mps() <= 0.1);
   if (!good && !is(Fault::kTakesAnyDeadband)) return pb::CODE_INVALID;
   const bool stays = is(Fault::kDeadbandForEver) && silence_us == 0;
-  if (!stays && !is(Fault::kSendsTheForetold)) member.silence = silence_us / 1000;
+  if (!stays && !is(Fault::kSendsThePredicted)) member.silence = silence_us / 1000;
   return pb::CODE_OK;
 }
 
@@ -367,9 +367,9 @@ void ToyServer::tick(LocalTime now) {
     std::vector<pb::Frame> frames = std::exchange(member.due, {});
     if (auto told = report(now, member)) frames.push_back(std::move(*told));
     if (member.coupled && !is(Fault::kCoupledInSilence)) frames.push_back(port(now, member));
-    const bool foretold = tick_ - member.said_at < member.silence;  // the simulated hand does not move
+    const bool predicted = tick_ - member.said_at < member.silence;  // the simulated hand does not move
     const bool sees = !member.coupled || is(Fault::kStatesWhileCoupled);
-    if (sees && tick_ % member.every == 0 && !foretold && !(member.silence > 0 && is(Fault::kSilentWithDeadband))) {
+    if (sees && tick_ % member.every == 0 && !predicted && !(member.silence > 0 && is(Fault::kSilentWithDeadband))) {
       member.said_at = tick_;
       frames.emplace_back();
       pb::DeviceState& state = *frames.back().mutable_state();

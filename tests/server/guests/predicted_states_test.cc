@@ -4,7 +4,7 @@
 #include <deque>
 #include <utility>
 
-namespace tendon::foretold_states_test {
+namespace tendon::predicted_states_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -12,7 +12,7 @@ using std::chrono::seconds;
 
 const SetStateDeadband kDeadband{.share = 0.1, .floor = 1e-3, .max_silence = milliseconds(20)};
 
-TEST_F(SealedServer, LeavesOutStatesThatAClientCanForetellWhenItAsksForIt) {
+TEST_F(SealedServer, LeavesOutStatesThatAClientCanPredictWhenItAsksForIt) {
   for (const bool asks : {false, true}) {
     ForceClient::Config config{.rate_hz = 500};
     if (asks) config.state_deadband = kDeadband;
@@ -28,10 +28,10 @@ TEST_F(SealedServer, LeavesOutStatesThatAClientCanForetellWhenItAsksForIt) {
     run(seconds(2), {&a});
     if (asks) {
       EXPECT_LT(a->stats().states, 150U);  // hand at rest: one state in 20
-      EXPECT_GT(stats().foretold, 1800U);
+      EXPECT_GT(stats().predicted, 1800U);
     } else {
       EXPECT_GT(a->stats().states, 1900U);
-      EXPECT_EQ(stats().foretold, 0U);
+      EXPECT_EQ(stats().predicted, 0U);
     }
     EXPECT_GT(calls, 950U);
     EXPECT_EQ(stats().unanswerable, unanswerable);
@@ -40,7 +40,7 @@ TEST_F(SealedServer, LeavesOutStatesThatAClientCanForetellWhenItAsksForIt) {
   }
 }
 
-TEST_F(SealedServer, TakesForcesThatAnswerAForetoldStepWhichItWasTooLateToSee) {
+TEST_F(SealedServer, TakesForcesThatAnswerAPredictedStepWhichItWasTooLateToSee) {
   const LocalTime first_step = now_;
   Client a = controller(wall_, "192.0.2.1:4000", {.rate_hz = 1000, .state_deadband = kDeadband});
   run(seconds(1), {&a});
@@ -71,4 +71,4 @@ TEST_F(SealedServer, TakesForcesThatAnswerAForetoldStepWhichItWasTooLateToSee) {
 }
 
 }  // namespace
-}  // namespace tendon::foretold_states_test
+}  // namespace tendon::predicted_states_test
