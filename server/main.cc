@@ -229,7 +229,7 @@ Json in_json(const Server::Summary& summary) {
   add("forces_not_finite", network.dropped.forces.not_finite);
   add("forces_out_of_bounds", network.dropped.forces.out_of_bounds);
   add("forces_old_sequence", network.dropped.forces.old_sequence);
-  add("hopeless", network.hopeless);
+  add("hopeless", network.unusable);
   add("foretold", network.predicted);
   add("replaced", network.replaced);
   add("roamed", network.roamed);

@@ -323,10 +323,10 @@ void NetworkLoop::adapt(LocalTime now, Guest& guest) {
     notice(one_in > before, "\"" + guest.name + "\" receives one state in " + std::to_string(one_in) +
                                 (one_in > before ? ": the network to it is congested" : " again"));
   }
-  if (std::exchange(guest.hopeless, guest.adaptation->hopeless()) != guest.hopeless) {
-    notice(guest.hopeless,
+  if (std::exchange(guest.unusable, guest.adaptation->unusable()) != guest.unusable) {
+    notice(guest.unusable,
            "the connection to \"" + guest.name +
-               (guest.hopeless ? "\" loses too many datagrams: its forces are ignored" : "\" is usable again"));
+               (guest.unusable ? "\" loses too many datagrams: its forces are ignored" : "\" is usable again"));
   }
 }
 
@@ -431,8 +431,8 @@ void NetworkLoop::take_force(LocalTime now, Guest& guest, const ForceCommand& co
     channel.lateness.refused(Lateness::Cause::kUnknownTick, 1);
     return;
   }
-  if (guest.adaptation && guest.adaptation->hopeless()) {
-    ++stats_.hopeless;
+  if (guest.adaptation && guest.adaptation->unusable()) {
+    ++stats_.unusable;
     return;
   }
   leases_.renew(now, place, command.channel);

@@ -45,7 +45,7 @@ NetworkStats& NetworkStats::operator+=(const NetworkStats& more) {
   late_engine += more.late_engine;
   late_unknown += more.late_unknown;
   predicted += more.predicted;
-  hopeless += more.hopeless;
+  unusable += more.unusable;
   add_dropped(dropped, more.dropped, more.dropped.forces);
   channels.insert(channels.end(), more.channels.begin(), more.channels.end());
   if (controller.datagrams_received == 0) {

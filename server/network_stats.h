@@ -56,7 +56,7 @@ struct NetworkStats {
   std::uint64_t late_engine = 0;
   std::uint64_t late_unknown = 0;
   std::uint64_t predicted = 0;  ///< states that were not sent because the client can predict them
-  std::uint64_t hopeless = 0;   ///< forces that were not used because the link loses too many datagrams
+  std::uint64_t unusable = 0;   ///< forces that were not used because the link loses too many datagrams
   Dropped dropped;
   std::vector<Channel> channels;
   LinkStats controller;

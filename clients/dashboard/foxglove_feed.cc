@@ -67,19 +67,19 @@ bool FoxgloveFeed::hear(LocalTime now, ClientId client, std::string_view text) {
         object("Subscription " + std::to_string(subscription) + " already exists, or channel " +
                std::to_string(channel) + " already has a subscription: each channel can only have one.");
       }
-      if (session.hopeless()) return false;
+      if (session.too_slow()) return false;
     }
   } else if (const auto* unsubscribe = std::get_if<Unsubscribe>(&order)) {
     for (const std::uint32_t subscription : unsubscribe->subscriptions) {
       if (!session.unsubscribe(subscription)) {
         object("There is no subscription " + std::to_string(subscription) + ".");
       }
-      if (session.hopeless()) return false;
+      if (session.too_slow()) return false;
     }
   } else {
     object(std::get<NotUnderstood>(order).sentence);
   }
-  return !session.hopeless();
+  return !session.too_slow();
 }
 
 void FoxgloveFeed::take(LocalTime now) {

@@ -19,7 +19,7 @@ namespace tendon::dash {
 /// * Channel messages are limited to `kMaxBytes`. Beyond that, the oldest interval of 0.1 s is dropped as a whole:
 ///   the messages of all channels with the same ⌊t / 0.1 s⌋. This leaves a visible gap in plots instead of an
 ///   interpolated line. A status message then reports the number of dropped messages.
-/// * Texts are never dropped, except outdated server states. A client with `kMaxTexts` waiting texts is `hopeless`
+/// * Texts are never dropped, except outdated server states. A client with `kMaxTexts` waiting texts is too slow
 ///   and should be closed.
 ///
 /// Thread-safe: no. Realtime-safe: no.
@@ -53,7 +53,7 @@ class FoxgloveSession {
   /// Returns the next message: dropped count, texts in order, server state, then data.
   std::optional<Message> next();
 
-  bool hopeless() const noexcept { return texts_.size() > kMaxTexts; }
+  bool too_slow() const noexcept { return texts_.size() > kMaxTexts; }
   std::size_t waiting_bytes() const noexcept { return bytes_; }
 
  private:

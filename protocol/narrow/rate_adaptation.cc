@@ -29,9 +29,9 @@ RateAdaptation::RateAdaptation(const Config& config, LocalTime now)
   expect_above_zero(seconds(config.patience), "patience_s");
   expect_above_zero(seconds(config.clean), "clean_s");
   expect(config.longest_clean >= config.clean, "longest_clean_s", seconds(config.longest_clean), "at least clean_s");
-  expect_above_zero(seconds(config.hopeless_after), "hopeless_after_s");
+  expect_above_zero(seconds(config.unusable_after), "unusable_after_s");
   expect_share(config.loss, "loss");
-  expect_share(config.hopeless_loss, "hopeless_loss");
+  expect_share(config.unusable_loss, "unusable_loss");
   clean_.fill(config.clean);
 }
 
@@ -80,12 +80,12 @@ void RateAdaptation::observe(LocalTime now, Duration round_trip, std::uint64_t s
     const double loss = static_cast<double>(missed_now) / static_cast<double>(seen_now + missed_now);
     lossy = loss > config_.loss;
     if (lossy) trouble_at_ = now;
-    if (loss <= config_.hopeless_loss || step_ + 1 < kOneIn.size()) bearable_at_ = now;
+    if (loss <= config_.unusable_loss || step_ + 1 < kOneIn.size()) bearable_at_ = now;
     window_start_ = now;
     window_seen_ = seen;
     window_missed_ = missed;
   }
-  hopeless_ = now - bearable_at_ >= config_.hopeless_after;
+  unusable_ = now - bearable_at_ >= config_.unusable_after;
 
   if (lossy || full) {
     step_down(now);

@@ -17,7 +17,7 @@ namespace tendon {
 ///   more than `loss` of our datagrams were lost in a window of at least `patience` and 20 datagrams.
 /// * Step up: after `clean` without congestion. If this causes congestion again, the next wait is doubled, up to
 ///   `longest_clean`.
-/// * hopeless(): if more than `hopeless_loss` is lost at the lowest rate for `hopeless_after`. This is a circuit
+/// * unusable(): if more than `unusable_loss` is lost at the lowest rate for `unusable_after`. This is a circuit
 ///   breaker as described in RFC 8084, and the owner should stop sending.
 ///
 /// Source: RFC 8085 (a sender of UDP must not overload the path).
@@ -31,8 +31,8 @@ class RateAdaptation {
     double loss = 0.05;
     Duration clean = std::chrono::seconds(5);
     Duration longest_clean = std::chrono::seconds(80);
-    double hopeless_loss = 0.10;
-    Duration hopeless_after = std::chrono::seconds(2);
+    double unusable_loss = 0.10;
+    Duration unusable_after = std::chrono::seconds(2);
   };
   static constexpr std::array<std::uint32_t, 5> kOneIn = {1, 2, 4, 10, 20};
 
@@ -45,7 +45,7 @@ class RateAdaptation {
   void observe(LocalTime now, Duration round_trip, std::uint64_t seen, std::uint64_t missed) noexcept;
 
   std::uint32_t one_in() const noexcept { return kOneIn[step_]; }
-  bool hopeless() const noexcept { return hopeless_; }
+  bool unusable() const noexcept { return unusable_; }
 
  private:
   void step_down(LocalTime now) noexcept;
@@ -53,7 +53,7 @@ class RateAdaptation {
 
   Config config_;
   std::size_t step_ = 0;
-  bool hopeless_ = false;
+  bool unusable_ = false;
 
   // Minimum round trips of the current and the previous window of 10 s.
   LocalTime least_since_;

@@ -94,7 +94,7 @@ struct Guest {
   std::uint64_t lost = 0;         ///< lost datagrams in both directions at the newest force
   RefusedForces refused{};        ///< since the session was opened
   RefusedForces refused_told{};   ///< at the time of the last report
-  bool hopeless = false;          ///< as last logged
+  bool unusable = false;          ///< as last logged
   std::optional<Seat> coupled{};  ///< set if it is the peer of a coupling
   bool gone = false;              ///< removed at the end of the turn
 

@@ -88,7 +88,7 @@ void Reports::tell_of_engine(LocalTime now, const Guest& engine, const LinkMeter
     report.channel = seat.channel;
     report.name = engine.name;
     report.state_one_in = engine.adaptation ? engine.adaptation->one_in() : 1;
-    report.forces_refused = engine.adaptation && engine.adaptation->hopeless();
+    report.forces_refused = engine.adaptation && engine.adaptation->unusable();
     report.link = link_report(now, engine, link, channel.newest);
     report.link.number = ++channel.reports;
     const ServedChannel::Doubt doubt = std::exchange(channel.doubt, {});

@@ -126,9 +126,9 @@ TEST(FoxgloveSession, TextsComeFirstInTheirOrderAndOnlyTheNewestOfTheServer) {
   session.put_server_state("connected");
   for (const char* text : {"one", "two", "connected"}) EXPECT_EQ(session.next()->bytes, text);
   EXPECT_TRUE(session.next()->binary);
-  EXPECT_FALSE(session.hopeless());
+  EXPECT_FALSE(session.too_slow());
   for (std::size_t i = 0; i <= FoxgloveSession::kMaxTexts; ++i) session.put_text("more");
-  EXPECT_TRUE(session.hopeless());
+  EXPECT_TRUE(session.too_slow());
 }
 
 }  // namespace

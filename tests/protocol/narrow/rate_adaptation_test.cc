@@ -112,15 +112,15 @@ TEST(RateAdaptation, LossLowersTheRateAndATenthBreaksTheCircuitAtTheLowest) {
   lossy.run(seconds(10), 5000, 0.08);
   EXPECT_EQ(lossy.adaptation().one_in(), 20U);
   lossy.run(seconds(60), 5000, 0.02);
-  EXPECT_FALSE(lossy.adaptation().hopeless());
+  EXPECT_FALSE(lossy.adaptation().unusable());
 
-  NarrowLink hopeless;
-  hopeless.run(milliseconds(700), 5000, 0.4);
-  EXPECT_FALSE(hopeless.adaptation().hopeless());
-  hopeless.run(seconds(8), 5000, 0.4);
-  EXPECT_TRUE(hopeless.adaptation().hopeless());
-  hopeless.run(seconds(3), 5000, 0);
-  EXPECT_FALSE(hopeless.adaptation().hopeless());
+  NarrowLink unusable;
+  unusable.run(milliseconds(700), 5000, 0.4);
+  EXPECT_FALSE(unusable.adaptation().unusable());
+  unusable.run(seconds(8), 5000, 0.4);
+  EXPECT_TRUE(unusable.adaptation().unusable());
+  unusable.run(seconds(3), 5000, 0);
+  EXPECT_FALSE(unusable.adaptation().unusable());
 }
 
 TEST(RateAdaptation, RefusesWhatIsImpossible) {

@@ -442,7 +442,7 @@ TEST(World, OverALinkThatLosesTooMuchForcesAreNotTakenWhereTheRateIsAdapted) {
   Log log;
   log.attach(world);
   world.run_for(seconds(12));
-  EXPECT_GT(world.server().stats().hopeless, 100U);
+  EXPECT_GT(world.server().stats().unusable, 100U);
   EXPECT_NE(log.steps.back().mode, Mode::kActive);
 }
 
