@@ -202,16 +202,16 @@ void NetworkLoop::admit(LocalTime now, const Address& from, const ServerHandshak
     return refuse(now, from, guest,
                   {Code::kUnsupported, "no common cipher suite: this server only accepts " + names_of(config_.suites)});
   }
-  auto claimed = Admission::seats_of(guest.hello, config_.devices);
+  auto claimed = Admission::slots_of(guest.hello, config_.devices);
   if (auto* const cannot_be = std::get_if<Refusal>(&claimed)) return refuse(now, from, guest, std::move(*cannot_be));
-  auto& seats = std::get<std::vector<Seat>>(claimed);
-  const std::uint32_t owner = config_.shard.owner_of(seats.front().device, config_.devices.size());
+  auto& slots = std::get<std::vector<Slot>>(claimed);
+  const std::uint32_t owner = config_.shard.owner_of(slots.front().device, config_.devices.size());
   if (owner != config_.shard.number) {
     if (foreign_.size() < kMaxForeign) foreign_.push_back({owner, from, {hello.begin(), hello.end()}});
     return;
   }
-  for (Seat& seat : seats) seat.device -= static_cast<std::uint32_t>(first_device_);
-  if (auto refusal = admission_.reason_to_refuse(from, guest.key, seats, devices_, guests_)) {
+  for (Slot& slot : slots) slot.device -= static_cast<std::uint32_t>(first_device_);
+  if (auto refusal = admission_.reason_to_refuse(from, guest.key, slots, devices_, guests_)) {
     return refuse(now, from, guest, std::move(*refusal));
   }
 
@@ -221,7 +221,7 @@ void NetworkLoop::admit(LocalTime now, const Address& from, const ServerHandshak
   session.timeout = role == Role::kController ? config_.controller_timeout : config_.observer_timeout;
   session.rekey = config_.rekey;
   session.life = config_.session_life;
-  Welcome welcome = Admission::welcome_for(guest, from, seats, devices_, guests_);
+  Welcome welcome = Admission::welcome_for(guest, from, slots, devices_, guests_);
   const Features features(welcome.features);
   session.states_in_columns = features.has<kFeatureStateColumns>();
   welcome.timeout = session.timeout;
@@ -239,8 +239,8 @@ void NetworkLoop::admit(LocalTime now, const Address& from, const ServerHandshak
                 role,
                 features,
                 features.has<kFeatureWays>() ? guest.hello.ways : std::vector<std::string>(),
-                seats,
-                Admission::views_of(seats),
+                slots,
+                Admission::views_of(slots),
                 {bytes.begin(), bytes.end()},
                 answered.keys ? Session(session, *answered.keys, now) : Session(session, now),
                 now};
@@ -252,15 +252,15 @@ void NetworkLoop::admit(LocalTime now, const Address& from, const ServerHandshak
 }
 
 void NetworkLoop::open(LocalTime now, Guest guest) {
-  // Another client may have taken the seats in the meantime.
-  if (const auto refusal = admission_.reason_to_refuse(guest.address, guest.key, guest.seats, devices_, guests_)) {
+  // Another client may have taken the slots in the meantime.
+  if (const auto refusal = admission_.reason_to_refuse(guest.address, guest.key, guest.slots, devices_, guests_)) {
     ++stats_.refused;
     notice(true, "refused \"" + guest.name + "\" at " + to_string(guest.address) + ": " + refusal->reason);
     guest.session.close(refusal->code, refusal->reason);
     return send_all(now, guest);
   }
   for (Guest& present : guests_) {
-    if (present.gone || !Admission::takes_the_place_of(present, guest.address, guest.key, guest.seats)) continue;
+    if (present.gone || !Admission::replaces(present, guest.address, guest.key, guest.slots)) continue;
     if (present.address == guest.address) {
       leave(present, "the client has restarted");
     } else {
@@ -283,13 +283,13 @@ void NetworkLoop::open(LocalTime now, Guest guest) {
   if (config_.adapt_state_rate) guest.adaptation.emplace(RateAdaptation::Config{}, now);
   guests_.push_back(std::move(guest));
   Guest& arrived = guests_.back();
-  for (const Seat& seat : arrived.seats) {
-    if (seat.role != Role::kController) continue;
-    const Guest* const holder = guest_of(guests_, leases_.holder(seat.device, seat.channel));
+  for (const Slot& slot : arrived.slots) {
+    if (slot.role != Role::kController) continue;
+    const Guest* const holder = guest_of(guests_, leases_.holder(slot.device, slot.channel));
     if (holder == nullptr) {
-      leases_.hold(now, seat.device, seat.channel, arrived);
+      leases_.hold(now, slot.device, slot.channel, arrived);
     } else if (arrived.has<kFeatureChannels>()) {
-      arrived.session.request(LeaseLost{.device = number_of(seat.device), .channel = seat.channel, .to = holder->name});
+      arrived.session.request(LeaseLost{.device = number_of(slot.device), .channel = slot.channel, .to = holder->name});
     }
   }
 }
@@ -334,8 +334,8 @@ void NetworkLoop::adapt(LocalTime now, Guest& guest) {
 void NetworkLoop::hear(LocalTime now, Guest& guest) {
   const ClockExchange* const exchange = exchange_of(now, guest);
   const auto sent = exchange != nullptr ? std::optional(exchange->answered) : std::nullopt;
-  for (const Seat& seat : guest.seats) {
-    ServedChannel& channel = devices_[seat.device].channels[seat.channel];
+  for (const Slot& slot : guest.slots) {
+    ServedChannel& channel = devices_[slot.device].channels[slot.channel];
     if (channel.holder == guest.id()) channel.lateness.heard(now, sent, guest.session.stats().lost);
   }
   adapt(now, guest);
@@ -487,8 +487,8 @@ void NetworkLoop::take_refused(Guest& guest) {
 }
 
 void NetworkLoop::blame(const Guest& guest, Lateness::Cause cause, std::uint64_t count) {
-  for (const Seat& seat : guest.seats) {
-    ServedChannel& channel = devices_[seat.device].channels[seat.channel];
+  for (const Slot& slot : guest.slots) {
+    ServedChannel& channel = devices_[slot.device].channels[slot.channel];
     if (channel.holder == guest.id()) channel.lateness.refused(cause, count);
   }
 }

@@ -273,14 +273,14 @@ LocalTime watch(std::deque<Guest>& guests, int also, LocalTime now, LocalTime en
 
 /// Arguments of a session. An empty `device` selects the one in `options`.
 template <typename Callback>
-struct Seat {
+struct Slot {
   const Options* options;
   std::string device;
   Callback callback;
 };
 
 template <typename Callback>
-int run_with(const Options& options, const std::vector<Seat<Callback>>& seats, const Beside& beside = {}) {
+int run_with(const Options& options, const std::vector<Slot<Callback>>& slots, const Beside& beside = {}) {
   try {
     const UnblockedOutput output;
     const StopSignals signals;
@@ -293,7 +293,7 @@ int run_with(const Options& options, const std::vector<Seat<Callback>>& seats, c
     const LocalTime end = options.duration > Duration::zero() ? start + options.duration : LocalTime::max();
     std::deque<Guest> guests;
     std::vector<UdpTransport*> transports;
-    for (const auto& [own, device, callback] : seats) {
+    for (const auto& [own, device, callback] : slots) {
       transports.push_back(&guests.emplace_back(*own, device, callback, start).transport());
     }
     LocalTime now = start;
@@ -370,9 +370,9 @@ int run(const Options& options, const std::map<std::string, Physics>& physics) {
     std::cerr << options.client.name << ": on_silence can only be used with one device\n";
     return 1;
   }
-  std::vector<Seat<Physics>> seats;
-  for (const auto& [device, callback] : physics) seats.push_back({&options, device, callback});
-  return run_with(options, seats);
+  std::vector<Slot<Physics>> slots;
+  for (const auto& [device, callback] : physics) slots.push_back({&options, device, callback});
+  return run_with(options, slots);
 }
 
 int run(const Options& options, const std::vector<HandAt>& hands, const Together& engine) {
@@ -383,11 +383,11 @@ int run(const Options& options, const std::vector<HandAt>& hands, const Together
   }
   AllHands all{engine, std::vector<std::optional<DeviceState>>(hands.size())};
   std::deque<Options> own;
-  std::vector<Seat<Physics>> seats;
+  std::vector<Slot<Physics>> slots;
   for (std::size_t i = 0; i < hands.size(); ++i) {
     Options& of_hand = own.emplace_back(options);
     if (hands[i].server) of_hand.server = *hands[i].server;
-    seats.push_back({&of_hand, hands[i].device, [&all, i](const DeviceState& hand) {
+    slots.push_back({&of_hand, hands[i].device, [&all, i](const DeviceState& hand) {
                        all.hands[i] = hand;
                        all.fresh = true;
                        Touch later;
@@ -395,7 +395,7 @@ int run(const Options& options, const std::vector<HandAt>& hands, const Together
                        return later;
                      }});
   }
-  return run_with(options, seats, {.all_hands = &all});
+  return run_with(options, slots, {.all_hands = &all});
 }
 
 int run(const Options& options, Elsewhere& engine) {

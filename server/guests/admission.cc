@@ -52,21 +52,21 @@ Refusal not_there(const std::string& what, const std::string& name, const std::v
   return {Code::kInvalid, reason + did_you_mean(name, names)};
 }
 
-bool is_controller(const Seat& seat) { return seat.role == Role::kController; }
+bool is_controller(const Slot& slot) { return slot.role == Role::kController; }
 
 }  // namespace
 
-std::variant<std::vector<Seat>, Refusal> Admission::seats_of(const Hello& hello,
+std::variant<std::vector<Slot>, Refusal> Admission::slots_of(const Hello& hello,
                                                              const std::vector<ServedDevice::Config>& devices) {
-  if (hello.claims.empty()) return std::vector<Seat>{{.device = 0, .channel = 0, .role = hello.role}};
-  std::vector<Seat> seats;
+  if (hello.claims.empty()) return std::vector<Slot>{{.device = 0, .channel = 0, .role = hello.role}};
+  std::vector<Slot> slots;
   Role highest = Role::kObserver;
   for (const Claim& claim : hello.claims) {
     const auto device = place_of(devices, claim.device);
     if (!device) return not_there("device", claim.device, devices);
-    if (!seats.empty() && bank_of(*device) != bank_of(seats.front().device)) {
+    if (!slots.empty() && bank_of(*device) != bank_of(slots.front().device)) {
       const auto name = [&](std::size_t place) { return "\"" + name_of(devices[place]) + "\""; };
-      const std::size_t first = seats.front().device - number_of(seats.front().device);
+      const std::size_t first = slots.front().device - number_of(slots.front().device);
       const std::size_t last = std::min<std::size_t>(first + limits::kMaxDevices, devices.size()) - 1;
       return Refusal{Code::kInvalid, "all devices of a session must be in the same bank: expected " + name(first) +
                                          " to " + name(last) + ", and not " + name(*device)};
@@ -74,51 +74,51 @@ std::variant<std::vector<Seat>, Refusal> Admission::seats_of(const Hello& hello,
     const auto& channels = devices[*device].about.channels;
     const auto channel = claim.role == Role::kController ? place_of(channels, claim.channel) : 0;
     if (!channel) return not_there("channel", claim.channel, channels);
-    const bool twice = std::any_of(seats.begin(), seats.end(), [&](const Seat& seat) {
-      return seat.device == *device && seat.channel == *channel && seat.role == claim.role;
+    const bool twice = std::any_of(slots.begin(), slots.end(), [&](const Slot& slot) {
+      return slot.device == *device && slot.channel == *channel && slot.role == claim.role;
     });
     if (twice) return Refusal{Code::kInvalid, "the same channel is claimed twice"};
     highest = std::max(highest, claim.role);
-    seats.push_back({.device = *device, .channel = *channel, .role = claim.role, .by_name = true});
+    slots.push_back({.device = *device, .channel = *channel, .role = claim.role, .by_name = true});
   }
   if (highest != hello.role)
     return Refusal{Code::kInvalid, "the role of the Hello is not the highest role of its claims"};
-  return seats;
+  return slots;
 }
 
-bool Admission::takes_the_place_of(const Guest& present, const Address& from, const ClientKey* key,
-                                   const std::vector<Seat>& seats) {
+bool Admission::replaces(const Guest& present, const Address& from, const ClientKey* key,
+                         const std::vector<Slot>& slots) {
   if (key != present.key) return false;
   if (present.address == from) return true;
-  return key != nullptr && std::any_of(seats.begin(), seats.end(), [&](const Seat& seat) {
-           return is_controller(seat) && sits_on(present, seat.device, seat.channel);
+  return key != nullptr && std::any_of(slots.begin(), slots.end(), [&](const Slot& slot) {
+           return is_controller(slot) && holds_slot(present, slot.device, slot.channel);
          });
 }
 
 std::optional<Refusal> Admission::reason_to_refuse(const Address& from, const ClientKey* key,
-                                                   const std::vector<Seat>& seats,
+                                                   const std::vector<Slot>& slots,
                                                    const std::vector<ServedDevice>& devices,
                                                    const std::vector<Guest>& guests) const {
   const bool let_in = config_.keys == 0 || (config_.needs_no_key != nullptr && config_.needs_no_key(from));
   if (key == nullptr && !let_in) {
     return Refusal{Code::kDenied, "this server only accepts clients with a key: use --key FILE"};
   }
-  const bool controls = std::any_of(seats.begin(), seats.end(), is_controller);
+  const bool controls = std::any_of(slots.begin(), slots.end(), is_controller);
   if (!may(key, controls ? Role::kController : Role::kObserver)) {
     return Refusal{Code::kDenied, "the key \"" + key->name + "\" only permits observers"};
   }
-  for (const Seat& seat : seats) {
-    const ServedDevice& device = devices[seat.device];
-    const bool can_wait = seat.by_name && device.about.channels[seat.channel].lease > Duration::zero();
-    const Guest* const holder = guest_of(guests, device.channels[seat.channel].holder);
-    if (!is_controller(seat) || holder == nullptr || can_wait) continue;
-    if (takes_the_place_of(*holder, from, key, seats)) continue;
+  for (const Slot& slot : slots) {
+    const ServedDevice& device = devices[slot.device];
+    const bool can_wait = slot.by_name && device.about.channels[slot.channel].lease > Duration::zero();
+    const Guest* const holder = guest_of(guests, device.channels[slot.channel].holder);
+    if (!is_controller(slot) || holder == nullptr || can_wait) continue;
+    if (replaces(*holder, from, key, slots)) continue;
     return Refusal{Code::kBusy, "the device is controlled by \"" + holder->name + "\" at " +
                                     to_string(holder->address) + "; it only accepts observers"};
   }
   const auto count = [&](auto counts) {
     return static_cast<std::size_t>(std::count_if(guests.begin(), guests.end(), [&](const Guest& guest) {
-      return !guest.gone && counts(guest) && !takes_the_place_of(guest, from, key, seats);
+      return !guest.gone && counts(guest) && !replaces(guest, from, key, slots);
     }));
   };
   const auto observes = [](const Guest& guest) { return guest.role == Role::kObserver; };
@@ -141,32 +141,32 @@ std::optional<Refusal> Admission::reason_to_refuse(const Address& from, const Cl
   return std::nullopt;
 }
 
-Welcome Admission::welcome_for(const ServerHandshake::Guest& guest, const Address& from, const std::vector<Seat>& seats,
+Welcome Admission::welcome_for(const ServerHandshake::Guest& guest, const Address& from, const std::vector<Slot>& slots,
                                const std::vector<ServedDevice>& devices, const std::vector<Guest>& guests) {
   Welcome welcome;
   welcome.version = guest.version;
   welcome.features = in_common(guest.hello.features, guest.hello.role);
   welcome.role = guest.hello.role;
-  const DeviceDescription& first = devices[seats.front().device].about;
+  const DeviceDescription& first = devices[slots.front().device].about;
   welcome.device_name = first.model;
   welcome.max_force = first.max_force;
   welcome.position_resolution = first.position_resolution;
   welcome.loop_hz = first.loop_hz;
-  for (const Seat& seat : seats) {
-    const Guest* const holder = guest_of(guests, devices[seat.device].channels[seat.channel].holder);
-    const bool free = holder == nullptr || takes_the_place_of(*holder, from, guest.key, seats);
-    const Role role = free ? seat.role : Role::kObserver;
-    if (seat.by_name) welcome.grants.push_back({number_of(seat.device), seat.channel, role});
+  for (const Slot& slot : slots) {
+    const Guest* const holder = guest_of(guests, devices[slot.device].channels[slot.channel].holder);
+    const bool free = holder == nullptr || replaces(*holder, from, guest.key, slots);
+    const Role role = free ? slot.role : Role::kObserver;
+    if (slot.by_name) welcome.grants.push_back({number_of(slot.device), slot.channel, role});
   }
   return welcome;
 }
 
-std::vector<View> Admission::views_of(const std::vector<Seat>& seats) {
+std::vector<View> Admission::views_of(const std::vector<Slot>& slots) {
   std::vector<View> views;
-  for (const Seat& seat : seats) {
+  for (const Slot& slot : slots) {
     const bool seen =
-        std::any_of(views.begin(), views.end(), [&](const View& view) { return view.device == seat.device; });
-    if (!seen) views.push_back({.device = seat.device});
+        std::any_of(views.begin(), views.end(), [&](const View& view) { return view.device == slot.device; });
+    if (!seen) views.push_back({.device = slot.device});
   }
   return views;
 }

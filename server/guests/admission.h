@@ -17,7 +17,7 @@ struct Refusal {
   std::string reason;
 };
 
-/// Determines whether a client is admitted, and which seats it gets (SESSION.md, "Opening"). It does not change state.
+/// Determines whether a client is admitted, and which slots it gets (SESSION.md, "Opening"). It does not change state.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class Admission {
@@ -31,25 +31,24 @@ class Admission {
 
   explicit Admission(const Config& config) : config_(config) {}
 
-  /// Returns the seats that are claimed by a Hello. This is refused if a device or channel does not exist, if there are
+  /// Returns the slots that are claimed by a Hello. This is refused if a device or channel does not exist, if there are
   /// duplicates, if the devices are in different banks, or if the role is not the highest role of the claims.
-  static std::variant<std::vector<Seat>, Refusal> seats_of(const Hello& hello,
+  static std::variant<std::vector<Slot>, Refusal> slots_of(const Hello& hello,
                                                            const std::vector<ServedDevice::Config>& devices);
 
-  /// Returns nothing if a client with this address and key can have these seats. `key` is null if there is none.
-  std::optional<Refusal> reason_to_refuse(const Address& from, const ClientKey* key, const std::vector<Seat>& seats,
+  /// Returns nothing if a client with this address and key can have these slots. `key` is null if there is none.
+  std::optional<Refusal> reason_to_refuse(const Address& from, const ClientKey* key, const std::vector<Slot>& slots,
                                           const std::vector<ServedDevice>& devices,
                                           const std::vector<Guest>& guests) const;
 
   /// Returns true if the new client is considered to be a restart of `present`. This is the case if the address and the
   /// key are the same, or if the key is the same and `present` is a controller of the same channel.
-  static bool takes_the_place_of(const Guest& present, const Address& from, const ClientKey* key,
-                                 const std::vector<Seat>& seats);
+  static bool replaces(const Guest& present, const Address& from, const ClientKey* key, const std::vector<Slot>& slots);
 
-  static Welcome welcome_for(const ServerHandshake::Guest& guest, const Address& from, const std::vector<Seat>& seats,
+  static Welcome welcome_for(const ServerHandshake::Guest& guest, const Address& from, const std::vector<Slot>& slots,
                              const std::vector<ServedDevice>& devices, const std::vector<Guest>& guests);
 
-  static std::vector<View> views_of(const std::vector<Seat>& seats);
+  static std::vector<View> views_of(const std::vector<Slot>& slots);
 
  private:
   Config config_;

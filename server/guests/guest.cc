@@ -34,15 +34,15 @@ auto* find_guest(Guests& guests, std::uint32_t id) {
 
 }  // namespace
 
-bool sits_on(const Guest& guest, std::uint32_t device, std::uint32_t channel) {
-  return std::any_of(guest.seats.begin(), guest.seats.end(), [&](const Seat& seat) {
-    return seat.device == device && seat.channel == channel && seat.role == Role::kController;
+bool holds_slot(const Guest& guest, std::uint32_t device, std::uint32_t channel) {
+  return std::any_of(guest.slots.begin(), guest.slots.end(), [&](const Slot& slot) {
+    return slot.device == device && slot.channel == channel && slot.role == Role::kController;
   });
 }
 
 bool controls(const Guest& guest, std::uint32_t device) {
-  return std::any_of(guest.seats.begin(), guest.seats.end(),
-                     [&](const Seat& seat) { return seat.device == device && seat.role == Role::kController; });
+  return std::any_of(guest.slots.begin(), guest.slots.end(),
+                     [&](const Slot& slot) { return slot.device == device && slot.role == Role::kController; });
 }
 
 View* view_of(Guest& guest, std::uint32_t device) {

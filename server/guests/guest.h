@@ -55,7 +55,7 @@ struct Shard {
 };
 
 /// A channel that was claimed by a controller, or a device that was claimed by an observer.
-struct Seat {
+struct Slot {
   std::uint32_t device = 0;
   std::uint32_t channel = 0;
   Role role = Role::kObserver;
@@ -83,7 +83,7 @@ struct Guest {
   Role role;
   Features features;
   std::vector<std::string> ways;  ///< from the Hello, if kFeatureWays is enabled
-  std::vector<Seat> seats;        ///< `role` may have been changed by the Welcome
+  std::vector<Slot> slots;        ///< `role` may have been changed by the Welcome
   std::vector<View> views;        ///< not empty; all devices are in the same bank
   std::vector<std::byte> answer;  ///< the reply to the Hello, which may have to be repeated
   Session session;
@@ -95,7 +95,7 @@ struct Guest {
   RefusedForces refused{};        ///< since the session was opened
   RefusedForces refused_told{};   ///< at the time of the last report
   bool unusable = false;          ///< as last logged
-  std::optional<Seat> coupled{};  ///< set if it is the peer of a coupling
+  std::optional<Slot> coupled{};  ///< set if it is the peer of a coupling
   bool gone = false;              ///< removed at the end of the turn
 
   std::uint32_t id() const noexcept { return session.connection_id(); }
@@ -114,7 +114,7 @@ struct Guest {
   }
 };
 
-bool sits_on(const Guest& guest, std::uint32_t device, std::uint32_t channel);
+bool holds_slot(const Guest& guest, std::uint32_t device, std::uint32_t channel);
 
 bool controls(const Guest& guest, std::uint32_t device);
 

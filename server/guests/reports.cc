@@ -80,12 +80,12 @@ Reports::Told Reports::turn(LocalTime now, std::vector<ServedDevice>& devices, s
 
 void Reports::tell_of_engine(LocalTime now, const Guest& engine, const LinkMeter::Report& link,
                              std::vector<ServedDevice>& devices, std::vector<Guest>& guests) const {
-  for (const Seat& seat : engine.seats) {
-    ServedChannel& channel = devices[seat.device].channels[seat.channel];
-    if (seat.role != Role::kController || channel.holder != engine.id()) continue;
+  for (const Slot& slot : engine.slots) {
+    ServedChannel& channel = devices[slot.device].channels[slot.channel];
+    if (slot.role != Role::kController || channel.holder != engine.id()) continue;
     PeerReport report;
-    report.device = number_of(seat.device);
-    report.channel = seat.channel;
+    report.device = number_of(slot.device);
+    report.channel = slot.channel;
     report.name = engine.name;
     report.state_one_in = engine.adaptation ? engine.adaptation->one_in() : 1;
     report.forces_refused = engine.adaptation && engine.adaptation->unusable();
@@ -93,8 +93,8 @@ void Reports::tell_of_engine(LocalTime now, const Guest& engine, const LinkMeter
     report.link.number = ++channel.reports;
     const ServedChannel::Doubt doubt = std::exchange(channel.doubt, {});
     report.error = doubt.error;
-    report.way = devices[seat.device].mail->ways.name_of(doubt.way);
-    tell_observers(seat.device, report, guests);
+    report.way = devices[slot.device].mail->ways.name_of(doubt.way);
+    tell_observers(slot.device, report, guests);
   }
 }
 

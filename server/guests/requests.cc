@@ -110,7 +110,7 @@ Outcome couple(LocalTime /*now*/, const Asker& asker, const Couple& theirs) {
   std::string difference = first_difference(theirs, *device.coupling);
   if (!difference.empty()) return {.code = Code::kInvalid, .detail = std::move(difference)};
   if (!renew_peer(device, *wanted)) return {.code = Code::kBusy};
-  asker.guest.coupled = Seat{.device = theirs.device, .channel = theirs.channel, .role = Role::kController};
+  asker.guest.coupled = Slot{.device = theirs.device, .channel = theirs.channel, .role = Role::kController};
   return {.warning = "coupled with \"" + asker.guest.name + "\""};
 }
 
@@ -237,7 +237,7 @@ bool may(const Guest& guest, const Request& request) {
   if constexpr (kFrom == From::kControllers) {
     return controls(guest, wanted.device);
   } else if constexpr (kFrom == From::kClaimants) {
-    return sits_on(guest, wanted.device, wanted.channel);
+    return holds_slot(guest, wanted.device, wanted.channel);
   } else {
     static_cast<void>(guest);
     static_cast<void>(wanted);
