@@ -240,7 +240,7 @@ void NetworkLoop::admit(LocalTime now, const Address& from, const ServerHandshak
                 features,
                 features.has<kFeatureWays>() ? guest.hello.ways : std::vector<std::string>(),
                 slots,
-                Admission::views_of(slots),
+                Admission::subscriptions_of(slots),
                 {bytes.begin(), bytes.end()},
                 answered.keys ? Session(session, *answered.keys, now) : Session(session, now),
                 now};
@@ -368,9 +368,9 @@ void NetworkLoop::publish(LocalTime now) {
     for (ServedChannel& channel : devices_[place].channels) channel.lateness.took_state(now);
   }
   for (Guest& guest : guests_) {
-    for (View& view : guest.views) {
-      const DeviceState* const state = states_[view.device].fresh;
-      if (state != nullptr && tell_state(guest, view, *state)) ++stats_.predicted;
+    for (Subscription& subscription : guest.subscriptions) {
+      const DeviceState* const state = states_[subscription.device].fresh;
+      if (state != nullptr && tell_state(guest, subscription, *state)) ++stats_.predicted;
     }
     send_all(now, guest);
   }
@@ -577,8 +577,8 @@ NetworkLoop::SessionChange NetworkLoop::change_of(const Guest& guest, bool came,
                        .role = guest.role,
                        .address = guest.address,
                        .why = why};
-  if (!guest.views.empty()) {
-    const ServedDevice& device = devices_[guest.views.front().device];
+  if (!guest.subscriptions.empty()) {
+    const ServedDevice& device = devices_[guest.subscriptions.front().device];
     change.device = device.about.name;
     change.tick = device.sampled.newest();
   }

@@ -161,14 +161,14 @@ Welcome Admission::welcome_for(const ServerHandshake::Guest& guest, const Addres
   return welcome;
 }
 
-std::vector<View> Admission::views_of(const std::vector<Slot>& slots) {
-  std::vector<View> views;
+std::vector<Subscription> Admission::subscriptions_of(const std::vector<Slot>& slots) {
+  std::vector<Subscription> subscriptions;
   for (const Slot& slot : slots) {
-    const bool seen =
-        std::any_of(views.begin(), views.end(), [&](const View& view) { return view.device == slot.device; });
-    if (!seen) views.push_back({.device = slot.device});
+    const bool seen = std::any_of(subscriptions.begin(), subscriptions.end(),
+                                  [&](const Subscription& subscription) { return subscription.device == slot.device; });
+    if (!seen) subscriptions.push_back({.device = slot.device});
   }
-  return views;
+  return subscriptions;
 }
 
 }  // namespace tendon

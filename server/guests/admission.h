@@ -48,7 +48,7 @@ class Admission {
   static Welcome welcome_for(const ServerHandshake::Guest& guest, const Address& from, const std::vector<Slot>& slots,
                              const std::vector<ServedDevice>& devices, const std::vector<Guest>& guests);
 
-  static std::vector<View> views_of(const std::vector<Slot>& slots);
+  static std::vector<Subscription> subscriptions_of(const std::vector<Slot>& slots);
 
  private:
   Config config_;

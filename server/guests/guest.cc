@@ -45,10 +45,10 @@ bool controls(const Guest& guest, std::uint32_t device) {
                      [&](const Slot& slot) { return slot.device == device && slot.role == Role::kController; });
 }
 
-View* view_of(Guest& guest, std::uint32_t device) {
-  const auto view =
-      std::find_if(guest.views.begin(), guest.views.end(), [&](const View& seen) { return seen.device == device; });
-  return view == guest.views.end() ? nullptr : &*view;
+Subscription* subscription_to(Guest& guest, std::uint32_t device) {
+  const auto subscription = std::find_if(guest.subscriptions.begin(), guest.subscriptions.end(),
+                                         [&](const Subscription& seen) { return seen.device == device; });
+  return subscription == guest.subscriptions.end() ? nullptr : &*subscription;
 }
 
 Guest* guest_of(std::vector<Guest>& guests, std::uint32_t id) { return find_guest(guests, id); }

@@ -62,7 +62,7 @@ struct Slot {
   bool by_name = false;  ///< it can wait for the lease
 };
 
-struct View {
+struct Subscription {
   std::uint32_t device = 0;
   std::uint64_t state_every = 1;  ///< in haptic steps
   std::uint64_t last_state = 0;   ///< tick
@@ -82,10 +82,10 @@ struct Guest {
   std::string name;
   Role role;
   Features features;
-  std::vector<std::string> ways;  ///< from the Hello, if kFeatureWays is enabled
-  std::vector<Slot> slots;        ///< `role` may have been changed by the Welcome
-  std::vector<View> views;        ///< not empty; all devices are in the same bank
-  std::vector<std::byte> answer;  ///< the reply to the Hello, which may have to be repeated
+  std::vector<std::string> ways;            ///< from the Hello, if kFeatureWays is enabled
+  std::vector<Slot> slots;                  ///< `role` may have been changed by the Welcome
+  std::vector<Subscription> subscriptions;  ///< not empty; all devices are in the same bank
+  std::vector<std::byte> answer;            ///< the reply to the Hello, which may have to be repeated
   Session session;
   LocalTime arrived;
   std::optional<RateAdaptation> adaptation{};
@@ -107,7 +107,7 @@ struct Guest {
   bool sees_ports() const noexcept { return has<kFeatureTeleoperation>() && role == Role::kObserver; }
   /// Converts the number of a device in a session to an index. If the last bank is not full, the device may not exist.
   std::uint32_t device_of(std::uint32_t number) const noexcept {
-    return bank_of(views.front().device) * limits::kMaxDevices + number;
+    return bank_of(subscriptions.front().device) * limits::kMaxDevices + number;
   }
   void uncouple(std::uint32_t device, std::uint32_t channel) noexcept {
     if (coupled && coupled->device == device && coupled->channel == channel) coupled.reset();
@@ -118,7 +118,7 @@ bool holds_slot(const Guest& guest, std::uint32_t device, std::uint32_t channel)
 
 bool controls(const Guest& guest, std::uint32_t device);
 
-View* view_of(Guest& guest, std::uint32_t device);
+Subscription* subscription_to(Guest& guest, std::uint32_t device);
 
 Guest* guest_of(std::vector<Guest>& guests, std::uint32_t id);
 const Guest* guest_of(const std::vector<Guest>& guests, std::uint32_t id);

@@ -65,15 +65,15 @@ void PortExchange::show(LocalTime now, std::uint32_t place, std::uint32_t coupli
   PortFrame& theirs = device.peer_ports[coupling];
   tell_scales(device.coupling->role == PortRole::kLeader ? mine : theirs, *device.coupling);
   for (Guest& guest : guests_) {
-    View* const view = guest.sees_ports() && !guest.gone ? view_of(guest, place) : nullptr;
-    if (view == nullptr || now < view->ports[coupling].due) continue;
+    Subscription* const subscription = guest.sees_ports() && !guest.gone ? subscription_to(guest, place) : nullptr;
+    if (subscription == nullptr || now < subscription->ports[coupling].due) continue;
     const std::uint64_t every =
-        std::max<std::uint64_t>(view->state_every, guest.adaptation ? guest.adaptation->one_in() : 1);
+        std::max<std::uint64_t>(subscription->state_every, guest.adaptation ? guest.adaptation->one_in() : 1);
     const Duration period =
         static_cast<std::int64_t>(every) * Duration(std::chrono::seconds(1)) / std::max(device.about.loop_hz, 1U);
-    view->ports[coupling].due = now + std::max(kShowEvery, period);
+    subscription->ports[coupling].due = now + std::max(kShowEvery, period);
     guest.session.send(mine);
-    if (std::exchange(view->ports[coupling].peer_waits, false)) guest.session.send(theirs);
+    if (std::exchange(subscription->ports[coupling].peer_waits, false)) guest.session.send(theirs);
   }
 }
 
@@ -92,9 +92,9 @@ void PortExchange::arrived(LocalTime now, std::uint32_t place, std::uint32_t cou
   ServedDevice& device = devices_[place];
   device.mail->port_in[coupling].put({port, now, device.peers[coupling]});
   const auto waits = [&](Guest& guest) {
-    View* const view = guest.sees_ports() ? view_of(guest, place) : nullptr;
-    if (view != nullptr) view->ports[coupling].peer_waits = true;
-    return view != nullptr;
+    Subscription* const subscription = guest.sees_ports() ? subscription_to(guest, place) : nullptr;
+    if (subscription != nullptr) subscription->ports[coupling].peer_waits = true;
+    return subscription != nullptr;
   };
   if (std::count_if(guests_.begin(), guests_.end(), waits) == 0) return;
   PortFrame& frame = device.peer_ports[coupling];

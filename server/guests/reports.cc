@@ -19,7 +19,7 @@ RefusedForces since(const RefusedForces& before, const RefusedForces& now) {
 template <class Report>
 void tell_observers(std::uint32_t device, const Report& report, std::vector<Guest>& guests) {
   for (Guest& guest : guests) {
-    if (guest.has<kFeatureDiagnostics>() && view_of(guest, device) != nullptr) guest.session.send(report);
+    if (guest.has<kFeatureDiagnostics>() && subscription_to(guest, device) != nullptr) guest.session.send(report);
   }
 }
 

@@ -19,19 +19,19 @@ namespace {
 
 Outcome set_state_rate(LocalTime /*now*/, const Asker& asker, const SetStateRate& rate) {
   if (rate.hz == 0) return {.code = Code::kInvalid, .detail = "expected a state rate above 0 Hz"};
-  View* const view = view_of(asker.guest, rate.device);
-  if (view == nullptr) return {.code = Code::kInvalid, .detail = "the session has not claimed this device"};
+  Subscription* const subscription = subscription_to(asker.guest, rate.device);
+  if (subscription == nullptr) return {.code = Code::kInvalid, .detail = "the session has not claimed this device"};
   const auto loop_hz = static_cast<double>(asker.devices[rate.device].about.loop_hz);
-  view->state_every = static_cast<std::uint64_t>(std::max(1.0, std::round(loop_hz / rate.hz)));
+  subscription->state_every = static_cast<std::uint64_t>(std::max(1.0, std::round(loop_hz / rate.hz)));
   return {};
 }
 
 Outcome set_state_deadband(LocalTime /*now*/, const Asker& asker, const SetStateDeadband& wanted) {
   std::string objection = StateDeadband::objection(wanted);
   if (!objection.empty()) return {.code = Code::kInvalid, .detail = std::move(objection)};
-  for (View& view : asker.guest.views) {
-    view.deadband.reset();
-    if (wanted.max_silence > Duration::zero()) view.deadband.emplace(wanted);
+  for (Subscription& subscription : asker.guest.subscriptions) {
+    subscription.deadband.reset();
+    if (wanted.max_silence > Duration::zero()) subscription.deadband.emplace(wanted);
   }
   return {};
 }

@@ -39,13 +39,13 @@ void leave_out_handle(DeviceState& state) {
 
 }  // namespace
 
-bool tell_state(Guest& guest, View& view, const DeviceState& state) {
-  if (guest.coupled && guest.coupled->device == view.device) return false;
-  if (guest.has<kFeatureHandle>()) view.pressed |= state.buttons;
+bool tell_state(Guest& guest, Subscription& subscription, const DeviceState& state) {
+  if (guest.coupled && guest.coupled->device == subscription.device) return false;
+  if (guest.has<kFeatureHandle>()) subscription.pressed |= state.buttons;
   const std::uint64_t one_in = guest.adaptation ? guest.adaptation->one_in() : 1;
-  if (state.tick - view.last_state < std::max(view.state_every, one_in)) return false;
+  if (state.tick - subscription.last_state < std::max(subscription.state_every, one_in)) return false;
   DeviceState told = state;
-  told.device = number_of(view.device);
+  told.device = number_of(subscription.device);
   leave_out_what_no_frame_carries(told);
   if (!guest.has<kFeatureDiagnostics>()) {
     told.force_wanted.reset();
@@ -53,15 +53,15 @@ bool tell_state(Guest& guest, View& view, const DeviceState& state) {
   }
   if (!guest.has<kFeatureHandle>()) leave_out_handle(told);
   if (!guest.has<kFeatureJoints>()) told.joints.reset();
-  told.buttons = view.pressed;
+  told.buttons = subscription.pressed;
   // The guest uses these rounded values for its prediction.
   if (guest.has<kFeatureStateColumns>() && fits_columns(told)) round_to_columns(told);
-  if (view.deadband && !view.deadband->passes(told)) {
-    view.pressed = 0;  // do not hide the next release
+  if (subscription.deadband && !subscription.deadband->passes(told)) {
+    subscription.pressed = 0;  // do not hide the next release
     return true;
   }
-  view.last_state = state.tick;
-  view.pressed = 0;
+  subscription.last_state = state.tick;
+  subscription.pressed = 0;
   guest.session.send(told);
   return false;
 }

@@ -9,6 +9,6 @@ namespace tendon {
 /// Sends a state to the guest unless the previous state is too recent for its rate, or the guest is the peer of a
 /// coupling. Fields that were not requested or do not fit into a frame are removed. Returns true if the guest can
 /// predict the state, in which case it is not sent (StateDeadband).
-bool tell_state(Guest& guest, View& view, const DeviceState& state);
+bool tell_state(Guest& guest, Subscription& subscription, const DeviceState& state);
 
 }  // namespace tendon
