@@ -205,19 +205,20 @@ ServerHandshake::Reply ServerHandshake::receive(LocalTime now, const Address& fr
       !crypto::equal(cookie(key_number - 1, from, hello->random), hello->cookie)) {
     ++stats_.retries;
     const RetryDatagram retry{.suite = hello->suite, .random = hello->random, .cookie = fresh};
-    return {.size = encode(retry, answer), .guest = {}};
+    return {.size = encode(retry, answer), .client = {}};
   }
   if (!limit_.admit(now, from)) {
     ++stats_.limited;
     return {};
   }
-  Reply reply{.size = 0,
-              .guest = Guest{.hello = {}, .random = hello->random, .version = 0, .suite = {}, .key = {}, .noise = {}}};
-  if (!read(*hello, *reply.guest)) reply.guest.reset();
+  Reply reply{
+      .size = 0,
+      .client = Client{.hello = {}, .random = hello->random, .version = 0, .suite = {}, .key = {}, .noise = {}}};
+  if (!read(*hello, *reply.client)) reply.client.reset();
   return reply;
 }
 
-bool ServerHandshake::read(const HelloDatagram& datagram, Guest& guest) {
+bool ServerHandshake::read(const HelloDatagram& datagram, Client& client) {
   std::span<const std::byte> body = datagram.body;
   if (datagram.suite == Suite::kNoise) {
     KeyId id;
@@ -231,68 +232,68 @@ bool ServerHandshake::read(const HelloDatagram& datagram, Guest& guest) {
       ++stats_.unknown_key;
       return false;
     }
-    guest.key = &found->second;
-    guest.noise = NoiseResponder::read(guest.key->key, prologue(id, guest.random), body.subspan(id.size()));
-    if (!guest.noise) {
+    client.key = &found->second;
+    client.noise = NoiseResponder::read(client.key->key, prologue(id, client.random), body.subspan(id.size()));
+    if (!client.noise) {
       ++stats_.forged;
       return false;
     }
-    body = guest.noise->payload();
+    body = client.noise->payload();
   }
   auto hello = read_hello(body);
   if (!hello) {
     ++stats_.malformed;
     return false;
   }
-  guest.hello = std::move(*hello);
-  const std::uint32_t highest = std::min(guest.hello.version_max, version_max_);
-  guest.version = highest >= std::max(guest.hello.version_min, version_min_) ? highest : 0;
-  guest.suite = suite_for(guest);
+  client.hello = std::move(*hello);
+  const std::uint32_t highest = std::min(client.hello.version_max, version_max_);
+  client.version = highest >= std::max(client.hello.version_min, version_min_) ? highest : 0;
+  client.suite = suite_for(client);
   return true;
 }
 
-std::optional<Suite> ServerHandshake::suite_for(const Guest& guest) const noexcept {
-  if (!guest.noise) return Suite::kPlain;
+std::optional<Suite> ServerHandshake::suite_for(const Client& client) const noexcept {
+  if (!client.noise) return Suite::kPlain;
   for (const NamedSuite& one : kSealedSuites) {
-    const bool theirs = one.suite == Suite::kNoise || names_aes(guest.hello.features);
+    const bool theirs = one.suite == Suite::kNoise || names_aes(client.hello.features);
     if (theirs && contains(suites_, one.suite)) return one.suite;
   }
   return std::nullopt;
 }
 
-ServerHandshake::Answered ServerHandshake::answer(const Guest& guest, std::uint32_t connection_id, const Answer& body,
+ServerHandshake::Answered ServerHandshake::answer(const Client& client, std::uint32_t connection_id, const Answer& body,
                                                   std::span<std::byte, kMaxDatagram> buffer) {
   std::vector<std::byte> bytes = write_body(body);
-  AnswerDatagram datagram{.suite = guest.noise ? Suite::kNoise : Suite::kPlain,
+  AnswerDatagram datagram{.suite = client.noise ? Suite::kNoise : Suite::kPlain,
                           .connection_id = connection_id,
-                          .random = guest.random,
+                          .random = client.random,
                           .body = bytes};
-  if (!guest.noise) return {.size = encode(datagram, buffer), .keys = {}};
-  const auto reply = guest.noise->reply(ephemerals_.next(), bytes);
+  if (!client.noise) return {.size = encode(datagram, buffer), .keys = {}};
+  const auto reply = client.noise->reply(ephemerals_.next(), bytes);
   if (!reply) {
     ++stats_.forged;
     return {};
   }
   datagram.body = reply->message;
   Answered answered{.size = encode(datagram, buffer), .keys = {}};
-  if (guest.suite) {
-    const NoiseSplit split = split_of(*guest.suite, reply->split);
-    answered.keys = {split.responder_to_initiator, split.initiator_to_responder, *guest.suite};
+  if (client.suite) {
+    const NoiseSplit split = split_of(*client.suite, reply->split);
+    answered.keys = {split.responder_to_initiator, split.initiator_to_responder, *client.suite};
   }
   return answered;
 }
 
-ServerHandshake::Answered ServerHandshake::welcome(const Guest& guest, std::uint32_t connection_id,
+ServerHandshake::Answered ServerHandshake::welcome(const Client& client, std::uint32_t connection_id,
                                                    const Welcome& welcome, std::span<std::byte, kMaxDatagram> buffer) {
   Welcome whole = welcome;
   // first, so that it is never truncated
-  if (guest.suite == Suite::kAesGcm) whole.features.emplace(whole.features.begin(), kFeatureAesGcm);
-  return answer(guest, connection_id, whole, buffer);
+  if (client.suite == Suite::kAesGcm) whole.features.emplace(whole.features.begin(), kFeatureAesGcm);
+  return answer(client, connection_id, whole, buffer);
 }
 
-ServerHandshake::Answered ServerHandshake::refuse(const Guest& guest, const Refused& refused,
+ServerHandshake::Answered ServerHandshake::refuse(const Client& client, const Refused& refused,
                                                   std::span<std::byte, kMaxDatagram> buffer) {
-  return answer(guest, 0, refused, buffer);
+  return answer(client, 0, refused, buffer);
 }
 
 }  // namespace tendon

@@ -108,7 +108,7 @@ class ServerHandshake {
     std::uint32_t number = 0;
   };
   /// A Hello whose sender has proved that it owns its address and, in suite 1, its key.
-  struct Guest {
+  struct Client {
     Hello hello;
     ClientRandom random;                  ///< the same if the Hello was resent
     std::uint32_t version;                ///< highest common version; 0: must be refused
@@ -118,13 +118,13 @@ class ServerHandshake {
   };
   struct Reply {
     std::size_t size = 0;  ///< of `answer`; 0: do not reply
-    std::optional<Guest> guest;
+    std::optional<Client> client;
   };
   struct Answered {
     std::size_t size = 0;             ///< 0: do not reply
-    std::optional<SessionKeys> keys;  ///< only for guests with a key
+    std::optional<SessionKeys> keys;  ///< only for clients with a key
   };
-  /// Reasons for which a Hello did not lead to a Guest.
+  /// Reasons for which a Hello did not lead to a Client.
   struct Stats {
     std::uint64_t retries = 0;  ///< no valid cookie: a Retry was sent
     std::uint64_t malformed = 0;
@@ -140,28 +140,28 @@ class ServerHandshake {
   /// same key, or this processor does not support one of the suites. Throws std::runtime_error if libsodium cannot be
   /// initialized.
   explicit ServerHandshake(const Config& config);
-  // A Guest points into `keys_`.
+  // A Client points into `keys_`.
   ServerHandshake(const ServerHandshake&) = delete;
   ServerHandshake& operator=(const ServerHandshake&) = delete;
 
-  /// Handles a Hello. Writes a Retry into `answer` or returns a guest.
+  /// Handles a Hello. Writes a Retry into `answer` or returns a client.
   Reply receive(LocalTime now, const Address& from, std::span<const std::byte> datagram,
                 std::span<std::byte, kMaxDatagram> answer);
 
   /// Writes an Answer, which is always shorter than a Hello. With a key, each call uses new session keys, so the bytes
   /// must be kept and sent again if the Hello is resent. welcome() requires a `suite` and adds kFeatureAesGcm in suite
   /// 2.
-  Answered welcome(const Guest& guest, std::uint32_t connection_id, const Welcome& welcome,
+  Answered welcome(const Client& client, std::uint32_t connection_id, const Welcome& welcome,
                    std::span<std::byte, kMaxDatagram> buffer);
-  Answered refuse(const Guest& guest, const Refused& refused, std::span<std::byte, kMaxDatagram> buffer);
+  Answered refuse(const Client& client, const Refused& refused, std::span<std::byte, kMaxDatagram> buffer);
 
   const Stats& stats() const noexcept { return stats_; }
 
  private:
   Cookie cookie(std::int64_t key_number, const Address& from, const ClientRandom& random) const noexcept;
-  bool read(const HelloDatagram& datagram, Guest& guest);
-  std::optional<Suite> suite_for(const Guest& guest) const noexcept;
-  Answered answer(const Guest& guest, std::uint32_t connection_id, const Answer& body,
+  bool read(const HelloDatagram& datagram, Client& client);
+  std::optional<Suite> suite_for(const Client& client) const noexcept;
+  Answered answer(const Client& client, std::uint32_t connection_id, const Answer& body,
                   std::span<std::byte, kMaxDatagram> buffer);
 
   std::uint32_t version_min_;

@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "core/base/frames.h"
-#include "server/guests/couple.h"
+#include "server/clients/couple.h"
 
 namespace tendon {
 

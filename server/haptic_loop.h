@@ -10,7 +10,7 @@
 #include "core/haptic_controller.h"
 #include "devices/device.h"
 #include "devices/safety/heartbeat.h"
-#include "server/guests/health.h"
+#include "server/clients/health.h"
 #include "server/mailboxes.h"
 
 namespace tendon {

@@ -7,9 +7,9 @@
 #include <utility>
 
 #include "protocol/wire/header.h"
-#include "server/guests/requests.h"
-#include "server/guests/states.h"
-#include "server/guests/unknown_keys.h"
+#include "server/clients/requests.h"
+#include "server/clients/states.h"
+#include "server/clients/unknown_keys.h"
 
 namespace tendon {
 
@@ -32,8 +32,8 @@ void note_unknown_key(std::vector<NetworkLoop::Notice>& notices, const Address& 
 }
 
 /// Returns null if the current datagram contains no echo of ours.
-const ClockExchange* exchange_of(LocalTime now, const Guest& guest) {
-  const auto& exchange = guest.session.newest_exchange();
+const ClockExchange* exchange_of(LocalTime now, const ServedClient& client) {
+  const auto& exchange = client.session.newest_exchange();
   return exchange && exchange->answered_at == now ? &*exchange : nullptr;
 }
 
@@ -52,7 +52,7 @@ NetworkLoop::NetworkLoop(const Config& config, Link& link, LocalTime now)
       next_connection_id_(config.first_connection_id / config.shard.of * config.shard.of + config.shard.number) {
   half_open_.reserve(config.max_half_open);
   const auto out = [this](LocalTime at, const Address& to, std::span<const std::byte> datagram) {
-    send(at, kGuest, to, datagram);
+    send(at, kClient, to, datagram);
   };
   for (std::uint32_t i = 0; i < devices_.size(); ++i) {
     states_.push_back({&devices_[i].mail->state});
@@ -67,20 +67,20 @@ LocalTime NetworkLoop::turn(LocalTime now) {
   publish(now);
   const bool more = drain(now);
   report(now);
-  for (Guest& guest : guests_) {
-    if (guest.session.open() && guest.session.next_tick() > now) continue;  // usually nothing is due
-    if (!guest.gone) guest.session.tick(now);
-    take_events(now, guest);
-    send_all(now, guest);
+  for (ServedClient& client : clients_) {
+    if (client.session.open() && client.session.next_tick() > now) continue;  // usually nothing is due
+    if (!client.gone) client.session.tick(now);
+    take_events(now, client);
+    send_all(now, client);
   }
-  std::erase_if(guests_, [](const Guest& guest) { return guest.gone; });
-  stats_.half_open_forgotten +=
-      std::erase_if(half_open_, [&](const Guest& guest) { return now - guest.arrived >= config_.half_open_timeout; });
+  std::erase_if(clients_, [](const ServedClient& client) { return client.gone; });
+  stats_.half_open_forgotten += std::erase_if(
+      half_open_, [&](const ServedClient& client) { return now - client.arrived >= config_.half_open_timeout; });
 
   LocalTime next = ports_.turn(now);
   for (Peer::Notice& said : ports_.take_notices()) notice(said.warning, std::move(said.text));
   if (more) return now;
-  for (const Guest& guest : guests_) next = std::min(next, guest.session.next_tick());
+  for (const ServedClient& client : clients_) next = std::min(next, client.session.next_tick());
   return next;
 }
 
@@ -108,31 +108,31 @@ void NetworkLoop::receive(LocalTime now, const Address& from, std::span<const st
   };
   const auto header = decode_header(datagram);
   if (header && header->type == DatagramType::kHello) return greet(now, from, datagram);
-  if (ports_.receive(now, from, datagram)) return tap_from(kGuest);
+  if (ports_.receive(now, from, datagram)) return tap_from(kClient);
   if (!header || header->type != DatagramType::kData) {
     ++stats_.malformed;
     return tap_from(kUnauthenticated);
   }
-  const auto is_meant = [&](const Guest& guest) {
-    return !guest.gone && guest.id() == header->connection_id && (guest.key != nullptr || guest.address == from);
+  const auto is_meant = [&](const ServedClient& client) {
+    return !client.gone && client.id() == header->connection_id && (client.key != nullptr || client.address == from);
   };
-  if (const auto guest = std::find_if(guests_.begin(), guests_.end(), is_meant); guest != guests_.end()) {
-    const std::uint64_t accepted = guest->session.stats().datagrams_received;
-    const bool newest = guest->session.receive(now, datagram);
-    tap_from(guest->session.stats().datagrams_received > accepted ? kGuest : kUnauthenticated);
-    if (newest && guest->address != from) {
-      guest->address = from;
+  if (const auto client = std::find_if(clients_.begin(), clients_.end(), is_meant); client != clients_.end()) {
+    const std::uint64_t accepted = client->session.stats().datagrams_received;
+    const bool newest = client->session.receive(now, datagram);
+    tap_from(client->session.stats().datagrams_received > accepted ? kClient : kUnauthenticated);
+    if (newest && client->address != from) {
+      client->address = from;
       ++stats_.roamed;
     }
-    if (newest) hear(now, *guest);
-    take_refused(*guest);
-    take_events(now, *guest);  // before `measure`, which can wait
-    if (newest) measure(now, *guest);
+    if (newest) hear(now, *client);
+    take_refused(*client);
+    take_events(now, *client);  // before `measure`, which can wait
+    if (newest) measure(now, *client);
   } else if (const auto waiting = std::find_if(half_open_.begin(), half_open_.end(), is_meant);
              waiting != half_open_.end()) {
     if (!waiting->session.receive(now, datagram)) return tap_from(kUnauthenticated);
-    tap_from(kGuest);
-    Guest arrived = std::move(*waiting);
+    tap_from(kClient);
+    ServedClient arrived = std::move(*waiting);
     half_open_.erase(waiting);
     arrived.address = from;
     open(now, std::move(arrived));
@@ -147,45 +147,45 @@ void NetworkLoop::greet(LocalTime now, const Address& from, std::span<const std:
   const std::uint64_t unknown_keys = handshake_.stats().unknown_key;
   const ServerHandshake::Reply reply = handshake_.receive(now, from, datagram, answer);
   if (handshake_.stats().unknown_key > unknown_keys) note_unknown_key(notices_, from);
-  const DatagramFilter::Sender sender = reply.guest ? sender_of(*reply.guest, from) : kUnauthenticated;
+  const DatagramFilter::Sender sender = reply.client ? sender_of(*reply.client, from) : kUnauthenticated;
   tap(now, DatagramRecord::Direction::kIn, sender, from, datagram, datagram.size());
-  if (reply.guest) return admit(now, from, *reply.guest, datagram);
+  if (reply.client) return admit(now, from, *reply.client, datagram);
   if (reply.size > 0) send(now, sender, from, std::span(answer).first(reply.size));
 }
 
 void NetworkLoop::receive_foreign(LocalTime now, const Address& from, std::span<const std::byte> hello) {
   std::array<std::byte, kMaxDatagram> answer;
   const ServerHandshake::Reply reply = handshake_.receive(now, from, hello, answer);
-  if (reply.guest) admit(now, from, *reply.guest, hello);  // otherwise its cookie has expired
+  if (reply.client) admit(now, from, *reply.client, hello);  // otherwise its cookie has expired
 }
 
 /// If keys are configured, a client without a key counts as unauthenticated, unless it does not need one.
-DatagramFilter::Sender NetworkLoop::sender_of(const ServerHandshake::Guest& guest, const Address& from) const {
+DatagramFilter::Sender NetworkLoop::sender_of(const ServerHandshake::Client& client, const Address& from) const {
   const bool let_in = config_.keys.empty() || (config_.needs_no_key != nullptr && config_.needs_no_key(from));
-  return guest.key != nullptr || let_in ? kGuest : kUnauthenticated;
+  return client.key != nullptr || let_in ? kClient : kUnauthenticated;
 }
 
 /// Repeats the answer if the first one was lost. In suite 1 the request may come from any address, because only the
 /// holder of the ephemeral key can use the answer.
-bool NetworkLoop::answer_again(LocalTime now, const Address& from, const ServerHandshake::Guest& guest) {
-  for (const auto* list : {&guests_, &half_open_}) {
-    for (const Guest& present : *list) {
-      if (present.random != guest.random || present.key != guest.key || present.gone) continue;
+bool NetworkLoop::answer_again(LocalTime now, const Address& from, const ServerHandshake::Client& client) {
+  for (const auto* list : {&clients_, &half_open_}) {
+    for (const ServedClient& present : *list) {
+      if (present.random != client.random || present.key != client.key || present.gone) continue;
       if (present.key == nullptr && present.address != from) continue;
-      send(now, sender_of(guest, from), from, present.answer);
+      send(now, sender_of(client, from), from, present.answer);
       return true;
     }
   }
   return false;
 }
 
-void NetworkLoop::refuse(LocalTime now, const Address& from, const ServerHandshake::Guest& guest, Refusal refusal) {
+void NetworkLoop::refuse(LocalTime now, const Address& from, const ServerHandshake::Client& client, Refusal refusal) {
   std::array<std::byte, kMaxDatagram> answer;
   ++stats_.refused;
-  notice(true, "refused \"" + guest.hello.name + "\" at " + to_string(from) + ": " + refusal.reason);
+  notice(true, "refused \"" + client.hello.name + "\" at " + to_string(from) + ": " + refusal.reason);
   const Refused refused{refusal.code, std::move(refusal.reason), kProtocolVersion, kProtocolVersion};
-  const auto size = handshake_.refuse(guest, refused, answer).size;
-  send(now, sender_of(guest, from), from, std::span(answer).first(size));
+  const auto size = handshake_.refuse(client, refused, answer).size;
+  send(now, sender_of(client, from), from, std::span(answer).first(size));
 }
 
 /// The value 0 is reserved.
@@ -194,16 +194,16 @@ std::uint32_t NetworkLoop::take_connection_id() {
   return std::exchange(next_connection_id_, next_connection_id_ + config_.shard.of);
 }
 
-void NetworkLoop::admit(LocalTime now, const Address& from, const ServerHandshake::Guest& guest,
+void NetworkLoop::admit(LocalTime now, const Address& from, const ServerHandshake::Client& client,
                         std::span<const std::byte> hello) {
-  if (answer_again(now, from, guest)) return;
-  if (guest.version == 0) return refuse(now, from, guest, {Code::kUnsupported, "no common protocol version"});
-  if (!guest.suite) {
-    return refuse(now, from, guest,
+  if (answer_again(now, from, client)) return;
+  if (client.version == 0) return refuse(now, from, client, {Code::kUnsupported, "no common protocol version"});
+  if (!client.suite) {
+    return refuse(now, from, client,
                   {Code::kUnsupported, "no common cipher suite: this server only accepts " + names_of(config_.suites)});
   }
-  auto claimed = Admission::slots_of(guest.hello, config_.devices);
-  if (auto* const cannot_be = std::get_if<Refusal>(&claimed)) return refuse(now, from, guest, std::move(*cannot_be));
+  auto claimed = Admission::slots_of(client.hello, config_.devices);
+  if (auto* const cannot_be = std::get_if<Refusal>(&claimed)) return refuse(now, from, client, std::move(*cannot_be));
   auto& slots = std::get<std::vector<Slot>>(claimed);
   const std::uint32_t owner = config_.shard.owner_of(slots.front().device, config_.devices.size());
   if (owner != config_.shard.number) {
@@ -211,39 +211,39 @@ void NetworkLoop::admit(LocalTime now, const Address& from, const ServerHandshak
     return;
   }
   for (Slot& slot : slots) slot.device -= static_cast<std::uint32_t>(first_device_);
-  if (auto refusal = admission_.reason_to_refuse(from, guest.key, slots, devices_, guests_)) {
-    return refuse(now, from, guest, std::move(*refusal));
+  if (auto refusal = admission_.reason_to_refuse(from, client.key, slots, devices_, clients_)) {
+    return refuse(now, from, client, std::move(*refusal));
   }
 
-  const Role role = guest.hello.role;
+  const Role role = client.hello.role;
   Session::Config session;
   session.connection_id = take_connection_id();
   session.timeout = role == Role::kController ? config_.controller_timeout : config_.observer_timeout;
   session.rekey = config_.rekey;
   session.life = config_.session_life;
-  Welcome welcome = Admission::welcome_for(guest, from, slots, devices_, guests_);
+  Welcome welcome = Admission::welcome_for(client, from, slots, devices_, clients_);
   const Features features(welcome.features);
   session.states_in_columns = features.has<kFeatureStateColumns>();
   welcome.timeout = session.timeout;
   welcome.server = config_.server_name;
   std::array<std::byte, kMaxDatagram> answer;
-  const ServerHandshake::Answered answered = handshake_.welcome(guest, session.connection_id, welcome, answer);
+  const ServerHandshake::Answered answered = handshake_.welcome(client, session.connection_id, welcome, answer);
   if (answered.size == 0) return;
   const auto bytes = std::span(answer).first(answered.size);
-  send(now, sender_of(guest, from), from, bytes);
+  send(now, sender_of(client, from), from, bytes);
 
-  Guest arrived{from,
-                guest.random,
-                guest.key,
-                guest.hello.name,
-                role,
-                features,
-                features.has<kFeatureWays>() ? guest.hello.ways : std::vector<std::string>(),
-                slots,
-                Admission::subscriptions_of(slots),
-                {bytes.begin(), bytes.end()},
-                answered.keys ? Session(session, *answered.keys, now) : Session(session, now),
-                now};
+  ServedClient arrived{from,
+                       client.random,
+                       client.key,
+                       client.hello.name,
+                       role,
+                       features,
+                       features.has<kFeatureWays>() ? client.hello.ways : std::vector<std::string>(),
+                       slots,
+                       Admission::subscriptions_of(slots),
+                       {bytes.begin(), bytes.end()},
+                       answered.keys ? Session(session, *answered.keys, now) : Session(session, now),
+                       now};
   if (half_open_.size() >= config_.max_half_open) {
     half_open_.erase(half_open_.begin());
     ++stats_.half_open_forgotten;
@@ -251,17 +251,17 @@ void NetworkLoop::admit(LocalTime now, const Address& from, const ServerHandshak
   half_open_.push_back(std::move(arrived));
 }
 
-void NetworkLoop::open(LocalTime now, Guest guest) {
+void NetworkLoop::open(LocalTime now, ServedClient client) {
   // Another client may have taken the slots in the meantime.
-  if (const auto refusal = admission_.reason_to_refuse(guest.address, guest.key, guest.slots, devices_, guests_)) {
+  if (const auto refusal = admission_.reason_to_refuse(client.address, client.key, client.slots, devices_, clients_)) {
     ++stats_.refused;
-    notice(true, "refused \"" + guest.name + "\" at " + to_string(guest.address) + ": " + refusal->reason);
-    guest.session.close(refusal->code, refusal->reason);
-    return send_all(now, guest);
+    notice(true, "refused \"" + client.name + "\" at " + to_string(client.address) + ": " + refusal->reason);
+    client.session.close(refusal->code, refusal->reason);
+    return send_all(now, client);
   }
-  for (Guest& present : guests_) {
-    if (present.gone || !Admission::replaces(present, guest.address, guest.key, guest.slots)) continue;
-    if (present.address == guest.address) {
+  for (ServedClient& present : clients_) {
+    if (present.gone || !Admission::replaces(present, client.address, client.key, client.slots)) continue;
+    if (present.address == client.address) {
       leave(present, "the client has restarted");
     } else {
       present.session.close(Code::kReplaced, "a program with the same key has replaced this session");
@@ -270,22 +270,22 @@ void NetworkLoop::open(LocalTime now, Guest guest) {
       leave(present, "replaced by a program with the same key");
     }
   }
-  std::erase_if(guests_, [](const Guest& present) { return present.gone; });
+  std::erase_if(clients_, [](const ServedClient& present) { return present.gone; });
   ++stats_.welcomed;
   notice(false,
-         "welcomed " + std::string(guest.role == Role::kController ? "controller" : "observer") + " \"" + guest.name +
-             "\" at " + to_string(guest.address) +
-             (guest.key != nullptr
-                  ? " with the key \"" + guest.key->name + "\", encrypted by " + names_of({guest.session.suite()})
+         "welcomed " + std::string(client.role == Role::kController ? "controller" : "observer") + " \"" + client.name +
+             "\" at " + to_string(client.address) +
+             (client.key != nullptr
+                  ? " with the key \"" + client.key->name + "\", encrypted by " + names_of({client.session.suite()})
                   : ""),
-         change_of(guest, true, ""));
-  if (guest.role == Role::kController) guest.meter.emplace(now);
-  if (config_.adapt_state_rate) guest.adaptation.emplace(RateAdaptation::Config{}, now);
-  guests_.push_back(std::move(guest));
-  Guest& arrived = guests_.back();
+         change_of(client, true, ""));
+  if (client.role == Role::kController) client.meter.emplace(now);
+  if (config_.adapt_state_rate) client.adaptation.emplace(RateAdaptation::Config{}, now);
+  clients_.push_back(std::move(client));
+  ServedClient& arrived = clients_.back();
   for (const Slot& slot : arrived.slots) {
     if (slot.role != Role::kController) continue;
-    const Guest* const holder = guest_of(guests_, leases_.holder(slot.device, slot.channel));
+    const ServedClient* const holder = client_of(clients_, leases_.holder(slot.device, slot.channel));
     if (holder == nullptr) {
       leases_.hold(now, slot.device, slot.channel, arrived);
     } else if (arrived.has<kFeatureChannels>()) {
@@ -294,12 +294,12 @@ void NetworkLoop::open(LocalTime now, Guest guest) {
   }
 }
 
-bool NetworkLoop::may_take_over(const Guest& guest) const {
-  const std::string& name = guest.key != nullptr ? guest.key->name : guest.name;
+bool NetworkLoop::may_take_over(const ServedClient& client) const {
+  const std::string& name = client.key != nullptr ? client.key->name : client.name;
   return std::find(config_.takeover.begin(), config_.takeover.end(), name) != config_.takeover.end();
 }
 
-void NetworkLoop::dispossess(LocalTime now, Guest& loser, const Guest& winner, const TakeLease& lost) {
+void NetworkLoop::dispossess(LocalTime now, ServedClient& loser, const ServedClient& winner, const TakeLease& lost) {
   const DeviceDescription& about = devices_[lost.device].about;
   notice(false, "\"" + winner.name + "\" takes " + about.name + "/" + about.channels[lost.channel].name + " from \"" +
                     loser.name + "\"");
@@ -313,44 +313,44 @@ void NetworkLoop::dispossess(LocalTime now, Guest& loser, const Guest& winner, c
   leave(loser, "replaced by \"" + winner.name + "\"");
 }
 
-void NetworkLoop::adapt(LocalTime now, Guest& guest) {
-  const LinkStats& link = guest.session.stats();
-  if (!guest.adaptation || link.round_trip == Duration::zero()) return;
-  const std::uint32_t before = guest.adaptation->one_in();
-  guest.adaptation->observe(now, link.round_trip, link.seen_outgoing, link.lost_outgoing);
-  const std::uint32_t one_in = guest.adaptation->one_in();
+void NetworkLoop::adapt(LocalTime now, ServedClient& client) {
+  const LinkStats& link = client.session.stats();
+  if (!client.adaptation || link.round_trip == Duration::zero()) return;
+  const std::uint32_t before = client.adaptation->one_in();
+  client.adaptation->observe(now, link.round_trip, link.seen_outgoing, link.lost_outgoing);
+  const std::uint32_t one_in = client.adaptation->one_in();
   if (one_in != before) {
-    notice(one_in > before, "\"" + guest.name + "\" receives one state in " + std::to_string(one_in) +
+    notice(one_in > before, "\"" + client.name + "\" receives one state in " + std::to_string(one_in) +
                                 (one_in > before ? ": the network to it is congested" : " again"));
   }
-  if (std::exchange(guest.unusable, guest.adaptation->unusable()) != guest.unusable) {
-    notice(guest.unusable,
-           "the connection to \"" + guest.name +
-               (guest.unusable ? "\" loses too many datagrams: its forces are ignored" : "\" is usable again"));
+  if (std::exchange(client.unusable, client.adaptation->unusable()) != client.unusable) {
+    notice(client.unusable,
+           "the connection to \"" + client.name +
+               (client.unusable ? "\" loses too many datagrams: its forces are ignored" : "\" is usable again"));
   }
 }
 
 /// Passes the timing of the datagram on before the forces in it are judged.
-void NetworkLoop::hear(LocalTime now, Guest& guest) {
-  const ClockExchange* const exchange = exchange_of(now, guest);
+void NetworkLoop::hear(LocalTime now, ServedClient& client) {
+  const ClockExchange* const exchange = exchange_of(now, client);
   const auto sent = exchange != nullptr ? std::optional(exchange->answered) : std::nullopt;
-  for (const Slot& slot : guest.slots) {
+  for (const Slot& slot : client.slots) {
     ServedChannel& channel = devices_[slot.device].channels[slot.channel];
-    if (channel.holder == guest.id()) channel.lateness.heard(now, sent, guest.session.stats().lost);
+    if (channel.holder == client.id()) channel.lateness.heard(now, sent, client.session.stats().lost);
   }
-  adapt(now, guest);
+  adapt(now, client);
 }
 
-void NetworkLoop::measure(LocalTime now, Guest& guest) {
-  if (!guest.meter) return;
-  guest.meter->heard(now);
-  const ClockExchange* const exchange = exchange_of(now, guest);
+void NetworkLoop::measure(LocalTime now, ServedClient& client) {
+  if (!client.meter) return;
+  client.meter->heard(now);
+  const ClockExchange* const exchange = exchange_of(now, client);
   if (exchange == nullptr) return;
-  if (const auto clock = guest.session.peer_clock()) guest.meter->observe(*exchange, *clock);
+  if (const auto clock = client.session.peer_clock()) client.meter->observe(*exchange, *clock);
 }
 
 void NetworkLoop::report(LocalTime now) {
-  Reports::Told told = reports_.turn(now, devices_, guests_);
+  Reports::Told told = reports_.turn(now, devices_, clients_);
   stats_.late_ours += told.late_ours;
   stats_.late_network += told.late_network;
   stats_.late_engine += told.late_engine;
@@ -367,45 +367,45 @@ void NetworkLoop::publish(LocalTime now) {
     devices_[place].sampled.observe(fresh->tick, LocalTime(fresh->sampled.time_since_epoch()), now);
     for (ServedChannel& channel : devices_[place].channels) channel.lateness.took_state(now);
   }
-  for (Guest& guest : guests_) {
-    for (Subscription& subscription : guest.subscriptions) {
+  for (ServedClient& client : clients_) {
+    for (Subscription& subscription : client.subscriptions) {
       const DeviceState* const state = states_[subscription.device].fresh;
-      if (state != nullptr && tell_state(guest, subscription, *state)) ++stats_.predicted;
+      if (state != nullptr && tell_state(client, subscription, *state)) ++stats_.predicted;
     }
-    send_all(now, guest);
+    send_all(now, client);
   }
 }
 
-void NetworkLoop::take_events(LocalTime now, Guest& guest) {
-  while (const Session::Event* const event = guest.session.next_event()) {
+void NetworkLoop::take_events(LocalTime now, ServedClient& client) {
+  while (const Session::Event* const event = client.session.next_event()) {
     if (const auto* force = std::get_if<Session::ForceArrived>(event)) {
-      take_force(now, guest, force->command);
+      take_force(now, client, force->command);
     } else if (const auto* port = std::get_if<Session::PortArrived>(event)) {
-      if (!ports_.take(now, guest, port->port)) ++stats_.denied;
+      if (!ports_.take(now, client, port->port)) ++stats_.denied;
     } else if (const auto* asked = std::get_if<Session::RequestArrived>(event)) {
-      answer(now, guest, asked->id, asked->request);
+      answer(now, client, asked->id, asked->request);
     } else if (const auto* closed = std::get_if<Session::Closed>(event)) {
       if (closed->code == Code::kTimedOut) ++stats_.timed_out;
       const bool is_polite = closed->code == Code::kOk;
       const std::size_t before = notices_.size();
-      leave(guest, closed->reason);
+      leave(client, closed->reason);
       if (is_polite && notices_.size() > before) notices_.back().warning = false;
     }
   }
 }
 
-void NetworkLoop::send_all(LocalTime now, Guest& guest) {
+void NetworkLoop::send_all(LocalTime now, ServedClient& client) {
   std::array<std::byte, kMaxDatagram> buffer;
-  while (const std::size_t size = guest.session.next_datagram(now, buffer)) {
-    send(now, kGuest, guest.address, std::span(buffer).first(size));
+  while (const std::size_t size = client.session.next_datagram(now, buffer)) {
+    send(now, kClient, client.address, std::span(buffer).first(size));
   }
 }
 
 /// Stores the reported error and solver path of a force. Returns the number of the path.
-std::uint8_t NetworkLoop::note(const ForceCommand& command, const Guest& guest, ServedDevice& device) {
+std::uint8_t NetworkLoop::note(const ForceCommand& command, const ServedClient& client, ServedDevice& device) {
   ServedChannel& channel = device.channels[command.channel];
-  const bool named = command.way > 0 && command.way <= guest.ways.size();
-  const std::uint8_t way = named ? device.mail->ways.number_of(guest.ways[command.way - 1]) : std::uint8_t{0};
+  const bool named = command.way > 0 && command.way <= client.ways.size();
+  const std::uint8_t way = named ? device.mail->ways.number_of(client.ways[command.way - 1]) : std::uint8_t{0};
   channel.doubt.observe(command.error, way);
   channel.worst_error = std::max(channel.worst_error, command.error);
   if (way > 0) {
@@ -415,10 +415,10 @@ std::uint8_t NetworkLoop::note(const ForceCommand& command, const Guest& guest, 
   return way;
 }
 
-void NetworkLoop::take_force(LocalTime now, Guest& guest, const ForceCommand& command) {
-  const std::uint32_t place = guest.device_of(command.device);
+void NetworkLoop::take_force(LocalTime now, ServedClient& client, const ForceCommand& command) {
+  const std::uint32_t place = client.device_of(command.device);
   const bool there = place < devices_.size() && command.channel < devices_[place].channels.size();
-  if (!there || leases_.holder(place, command.channel) != guest.id()) {
+  if (!there || leases_.holder(place, command.channel) != client.id()) {
     ++stats_.denied;
     return;
   }
@@ -427,25 +427,25 @@ void NetworkLoop::take_force(LocalTime now, Guest& guest, const ForceCommand& co
   const auto answered = device.sampled.find(command.based_on_tick);
   if (!answered) {
     ++stats_.unanswerable;
-    ++guest.refused.unknown_tick;
+    ++client.refused.unknown_tick;
     channel.lateness.refused(Lateness::Cause::kUnknownTick, 1);
     return;
   }
-  if (guest.adaptation && guest.adaptation->unusable()) {
+  if (client.adaptation && client.adaptation->unusable()) {
     ++stats_.unusable;
     return;
   }
   leases_.renew(now, place, command.channel);
   const double bound = device.about.max_force;  // N; 0 if unknown
   if (bound > 0 && command.force.squaredNorm() > bound * bound) channel.lateness.cut();
-  const LinkStats& link = guest.session.stats();
+  const LinkStats& link = client.session.stats();
   const std::uint64_t lost = link.lost + link.lost_outgoing;
   channel.lateness.observe({.sampled = answered->at,
                             .sent = answered->sent,
                             .received = now,
                             .round_trip = link.round_trip,
                             .valid_for = command.valid_for,
-                            .lost = lost > std::exchange(guest.lost, lost)});
+                            .lost = lost > std::exchange(client.lost, lost)});
   RemoteForce& force = device.mail->forces[command.channel].back();  // contains an old value
   force.sequence = command.sequence;
   force.answers_tick = command.based_on_tick;
@@ -462,23 +462,23 @@ void NetworkLoop::take_force(LocalTime now, Guest& guest, const ForceCommand& co
   force.source = channel.holder;
   force.topology_changed = command.topology_changed;
   force.error = command.error;
-  force.way = note(command, guest, device);
+  force.way = note(command, client, device);
   // If the client does not support this feature, it does not know the limits of the handle.
-  if (!guest.has<kFeatureHandle>() && (command.torque || command.grip_force)) ++stats_.denied;
-  force.torque = guest.has<kFeatureHandle>() ? command.torque : std::nullopt;
-  force.grip_force = guest.has<kFeatureHandle>() ? command.grip_force : std::nullopt;
+  if (!client.has<kFeatureHandle>() && (command.torque || command.grip_force)) ++stats_.denied;
+  force.torque = client.has<kFeatureHandle>() ? command.torque : std::nullopt;
+  force.grip_force = client.has<kFeatureHandle>() ? command.grip_force : std::nullopt;
   device.mail->forces[command.channel].put();
   ++channel.forces;
   ++stats_.forces;
 }
 
 /// Counts the forces that the session has refused. The channel is not known, so the force is counted for all channels
-/// of the guest.
-void NetworkLoop::take_refused(Guest& guest) {
-  const RefusedForces& all = guest.session.stats().refused_forces;
+/// of the client.
+void NetworkLoop::take_refused(ServedClient& client) {
+  const RefusedForces& all = client.session.stats().refused_forces;
   const auto take = [&](std::uint64_t RefusedForces::*count, Lateness::Cause cause) {
-    if (const std::uint64_t before = std::exchange(guest.refused.*count, all.*count); before != all.*count) {
-      blame(guest, cause, all.*count - before);
+    if (const std::uint64_t before = std::exchange(client.refused.*count, all.*count); before != all.*count) {
+      blame(client, cause, all.*count - before);
     }
   };
   take(&RefusedForces::not_finite, Lateness::Cause::kNotFinite);
@@ -486,57 +486,61 @@ void NetworkLoop::take_refused(Guest& guest) {
   take(&RefusedForces::old_sequence, Lateness::Cause::kOldSequence);
 }
 
-void NetworkLoop::blame(const Guest& guest, Lateness::Cause cause, std::uint64_t count) {
-  for (const Slot& slot : guest.slots) {
+void NetworkLoop::blame(const ServedClient& client, Lateness::Cause cause, std::uint64_t count) {
+  for (const Slot& slot : client.slots) {
     ServedChannel& channel = devices_[slot.device].channels[slot.channel];
-    if (channel.holder == guest.id()) channel.lateness.refused(cause, count);
+    if (channel.holder == client.id()) channel.lateness.refused(cause, count);
   }
 }
 
-void NetworkLoop::answer(LocalTime now, Guest& guest, std::uint32_t id, Request request) {
-  const auto find_device = [&guest](auto& wanted) {
-    if constexpr (requires { wanted.device; }) wanted.device = guest.device_of(wanted.device);
+void NetworkLoop::answer(LocalTime now, ServedClient& client, std::uint32_t id, Request request) {
+  const auto find_device = [&client](auto& wanted) {
+    if constexpr (requires { wanted.device; }) wanted.device = client.device_of(wanted.device);
   };
   std::visit(find_device, request);
-  const Asker asker{
-      .guest = guest, .may_take_over = may_take_over(guest), .devices = devices_, .guests = guests_, .leases = leases_};
+  const Asker asker{.client = client,
+                    .may_take_over = may_take_over(client),
+                    .devices = devices_,
+                    .clients = clients_,
+                    .leases = leases_};
   Outcome outcome = tendon::answer(now, asker, request);
   if (outcome.code == Code::kDenied) ++stats_.denied;
   if (!outcome.warning.empty()) notice(true, std::move(outcome.warning));
-  if (Guest* const loser = guest_of(guests_, outcome.loser)) {
-    dispossess(now, *loser, guest, std::get<TakeLease>(request));
+  if (ServedClient* const loser = client_of(clients_, outcome.loser)) {
+    dispossess(now, *loser, client, std::get<TakeLease>(request));
   }
-  if (outcome.device) return guest.session.answer(id, std::move(*outcome.device));
-  if (outcome.handle) return guest.session.answer(id, std::move(*outcome.handle));
-  guest.session.answer(id, outcome.code, std::move(outcome.detail), outcome.wait);
+  if (outcome.device) return client.session.answer(id, std::move(*outcome.device));
+  if (outcome.handle) return client.session.answer(id, std::move(*outcome.handle));
+  client.session.answer(id, outcome.code, std::move(outcome.detail), outcome.wait);
 }
 
-void NetworkLoop::leave(Guest& guest, const std::string& how) {
-  guest.gone = true;
-  notice(guest.role == Role::kController, "\"" + guest.name + "\" at " + to_string(guest.address) + " has left: " + how,
-         change_of(guest, false, how));
-  leases_.give_all(guest.id());
-  stats_.add(guest);
+void NetworkLoop::leave(ServedClient& client, const std::string& how) {
+  client.gone = true;
+  notice(client.role == Role::kController,
+         "\"" + client.name + "\" at " + to_string(client.address) + " has left: " + how,
+         change_of(client, false, how));
+  leases_.give_all(client.id());
+  stats_.add(client);
 }
 
 void NetworkLoop::close(LocalTime now) {
   ports_.close(now);
   const std::string why = "the server is shutting down";
-  for (Guest& guest : guests_) {
-    guest.session.close(Code::kShutdown, why);
-    send_all(now, guest);
-    stats_.add(guest);
-    notice(false, "\"" + guest.name + "\" is disconnected: " + why, change_of(guest, false, why));
+  for (ServedClient& client : clients_) {
+    client.session.close(Code::kShutdown, why);
+    send_all(now, client);
+    stats_.add(client);
+    notice(false, "\"" + client.name + "\" is disconnected: " + why, change_of(client, false, why));
   }
-  guests_.clear();
+  clients_.clear();
   half_open_.clear();
 }
 
 NetworkStats NetworkLoop::stats() const {
   NetworkStats stats = stats_;
   stats.hellos = handshake_.stats();
-  for (const ServedDevice& device : devices_) stats.add(device, guests_);
-  for (const Guest& guest : guests_) stats.add(guest);
+  for (const ServedDevice& device : devices_) stats.add(device, clients_);
+  for (const ServedClient& client : clients_) stats.add(client);
   return stats;
 }
 
@@ -570,15 +574,15 @@ void NetworkLoop::tap(LocalTime now, DatagramRecord::Direction direction, Datagr
   mail.datagrams.push();
 }
 
-NetworkLoop::SessionChange NetworkLoop::change_of(const Guest& guest, bool came, const std::string& why) const {
-  SessionChange change{.connection = guest.id(),
+NetworkLoop::SessionChange NetworkLoop::change_of(const ServedClient& client, bool came, const std::string& why) const {
+  SessionChange change{.connection = client.id(),
                        .came = came,
-                       .client = guest.name,
-                       .role = guest.role,
-                       .address = guest.address,
+                       .client = client.name,
+                       .role = client.role,
+                       .address = client.address,
                        .why = why};
-  if (!guest.subscriptions.empty()) {
-    const ServedDevice& device = devices_[guest.subscriptions.front().device];
+  if (!client.subscriptions.empty()) {
+    const ServedDevice& device = devices_[client.subscriptions.front().device];
     change.device = device.about.name;
     change.tick = device.sampled.newest();
   }

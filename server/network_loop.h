@@ -16,18 +16,18 @@
 #include "protocol/link.h"
 #include "protocol/messages.h"
 #include "protocol/session.h"
-#include "server/guests/admission.h"
-#include "server/guests/guest.h"
-#include "server/guests/leases.h"
-#include "server/guests/port_exchange.h"
-#include "server/guests/reports.h"
+#include "server/clients/admission.h"
+#include "server/clients/leases.h"
+#include "server/clients/port_exchange.h"
+#include "server/clients/reports.h"
+#include "server/clients/served_client.h"
 #include "server/mailboxes.h"
 #include "server/network_stats.h"
 #include "server/recording/datagram_filter.h"
 
 namespace tendon {
 
-/// Admits clients ("guests"), passes their forces to the haptic loops, and sends them the states of the devices.
+/// Admits clients, passes their forces to the haptic loops, and sends them the states of the devices.
 ///
 /// The function `turn` should be called by a single thread if a datagram has arrived, if a haptic loop has made a step,
 /// or if the time returned by the previous call has been reached.
@@ -39,8 +39,8 @@ namespace tendon {
 /// link, and there is no other shared state. All Hellos are received by one of the loops. If a Hello is intended for
 /// another loop, it must be forwarded by the owner of the loops (take_foreign, receive_foreign).
 ///
-/// The logic is implemented in separate files in guests/. See admission.h for new sessions, leases.h for the holders of
-/// channels, requests.h for the requests of clients, lateness.h for the causes of late forces, and reports.h for
+/// The logic is implemented in separate files in clients/. See admission.h for new sessions, leases.h for the holders
+/// of channels, requests.h for the requests of clients, lateness.h for the causes of late forces, and reports.h for
 /// periodic reports. This class is only responsible for the datagrams.
 ///
 /// Thread-safe: no. Realtime-safe: no.
@@ -133,31 +133,32 @@ class NetworkLoop {
   bool drain(LocalTime& now);  ///< `now` is updated
   void receive(LocalTime now, const Address& from, std::span<const std::byte> datagram);
   void greet(LocalTime now, const Address& from, std::span<const std::byte> datagram);
-  void admit(LocalTime now, const Address& from, const ServerHandshake::Guest& guest, std::span<const std::byte> hello);
+  void admit(LocalTime now, const Address& from, const ServerHandshake::Client& client,
+             std::span<const std::byte> hello);
   std::uint32_t take_connection_id();
-  bool answer_again(LocalTime now, const Address& from, const ServerHandshake::Guest& guest);
-  void refuse(LocalTime now, const Address& from, const ServerHandshake::Guest& guest, Refusal refusal);
-  void open(LocalTime now, Guest guest);
-  void take_events(LocalTime now, Guest& guest);
-  void take_force(LocalTime now, Guest& guest, const ForceCommand& command);
-  std::uint8_t note(const ForceCommand& command, const Guest& guest, ServedDevice& device);
-  void take_refused(Guest& guest);
-  void blame(const Guest& guest, Lateness::Cause cause, std::uint64_t count);
-  void answer(LocalTime now, Guest& guest, std::uint32_t id, Request request);
-  void dispossess(LocalTime now, Guest& loser, const Guest& winner, const TakeLease& lost);
-  bool may_take_over(const Guest& guest) const;
-  void leave(Guest& guest, const std::string& how);
-  void send_all(LocalTime now, Guest& guest);
+  bool answer_again(LocalTime now, const Address& from, const ServerHandshake::Client& client);
+  void refuse(LocalTime now, const Address& from, const ServerHandshake::Client& client, Refusal refusal);
+  void open(LocalTime now, ServedClient client);
+  void take_events(LocalTime now, ServedClient& client);
+  void take_force(LocalTime now, ServedClient& client, const ForceCommand& command);
+  std::uint8_t note(const ForceCommand& command, const ServedClient& client, ServedDevice& device);
+  void take_refused(ServedClient& client);
+  void blame(const ServedClient& client, Lateness::Cause cause, std::uint64_t count);
+  void answer(LocalTime now, ServedClient& client, std::uint32_t id, Request request);
+  void dispossess(LocalTime now, ServedClient& loser, const ServedClient& winner, const TakeLease& lost);
+  bool may_take_over(const ServedClient& client) const;
+  void leave(ServedClient& client, const std::string& how);
+  void send_all(LocalTime now, ServedClient& client);
   void publish(LocalTime now);
-  void hear(LocalTime now, Guest& guest);
-  void measure(LocalTime now, Guest& guest);
-  void adapt(LocalTime now, Guest& guest);
+  void hear(LocalTime now, ServedClient& client);
+  void measure(LocalTime now, ServedClient& client);
+  void adapt(LocalTime now, ServedClient& client);
   void report(LocalTime now);
-  DatagramFilter::Sender sender_of(const ServerHandshake::Guest& guest, const Address& from) const;
+  DatagramFilter::Sender sender_of(const ServerHandshake::Client& client, const Address& from) const;
   void send(LocalTime now, DatagramFilter::Sender partner, const Address& to, std::span<const std::byte> datagram);
   void tap(LocalTime now, DatagramRecord::Direction direction, DatagramFilter::Sender partner, const Address& peer,
            std::span<const std::byte> datagram, std::size_t size);
-  SessionChange change_of(const Guest& guest, bool came, const std::string& why) const;
+  SessionChange change_of(const ServedClient& client, bool came, const std::string& why) const;
   void notice(bool warning, std::string text, std::optional<SessionChange> session = std::nullopt);
 
   /// This is stored in a separate array because it is used in every turn (cache locality).
@@ -176,9 +177,9 @@ class NetworkLoop {
   Admission admission_;
   Leases leases_{devices_};
   Reports reports_;
-  std::vector<Guest> guests_;
-  PortExchange ports_{devices_, guests_, leases_};
-  std::vector<Guest> half_open_;  ///< oldest first
+  std::vector<ServedClient> clients_;
+  PortExchange ports_{devices_, clients_, leases_};
+  std::vector<ServedClient> half_open_;  ///< oldest first
   std::uint32_t next_connection_id_;
 
   Stats stats_;

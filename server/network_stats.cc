@@ -55,18 +55,18 @@ NetworkStats& NetworkStats::operator+=(const NetworkStats& more) {
   return *this;
 }
 
-void NetworkStats::add(const Guest& guest) {
-  const LinkStats& link = guest.session.stats();
+void NetworkStats::add(const ServedClient& client) {
+  const LinkStats& link = client.session.stats();
   add_dropped(dropped, link, link.refused_forces);
-  if (guest.role != Role::kController) return;
+  if (client.role != Role::kController) return;
   controller = link;
-  controller_clock = guest.session.peer_clock();
+  controller_clock = client.session.peer_clock();
 }
 
-void NetworkStats::add(const ServedDevice& device, const std::vector<Guest>& guests) {
+void NetworkStats::add(const ServedDevice& device, const std::vector<ServedClient>& clients) {
   for (std::size_t i = 0; i < device.channels.size(); ++i) {
     const ServedChannel& channel = device.channels[i];
-    const Guest* const holder = guest_of(guests, channel.holder);
+    const ServedClient* const holder = client_of(clients, channel.holder);
     channels.push_back({.device = device.about.name,
                         .channel = device.about.channels[i].name,
                         .holder = holder != nullptr ? holder->name : std::string(),

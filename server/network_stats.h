@@ -10,7 +10,7 @@
 #include "core/estimation/clock_offset_estimator.h"
 #include "protocol/handshake.h"
 #include "protocol/session.h"
-#include "server/guests/guest.h"
+#include "server/clients/served_client.h"
 
 namespace tendon {
 
@@ -39,8 +39,8 @@ struct NetworkStats {
   std::uint64_t welcomed = 0;
   std::uint64_t refused = 0;
   std::uint64_t timed_out = 0;
-  std::uint64_t replaced = 0;  ///< by a guest with the same key
-  std::uint64_t roamed = 0;    ///< a guest changed its address
+  std::uint64_t replaced = 0;  ///< by a client with the same key
+  std::uint64_t roamed = 0;    ///< a client changed its address
   std::uint64_t half_open_forgotten = 0;
   std::uint64_t malformed = 0;           ///< the size or the header is invalid
   std::uint64_t unknown_connection = 0;  ///< Data with an unknown connection id or the wrong address
@@ -64,9 +64,9 @@ struct NetworkStats {
 
   NetworkStats& operator+=(const NetworkStats& more);
 
-  /// Adds the drop counters of a session. If the guest is a controller, sets `controller` to its link.
-  void add(const Guest& guest);
-  void add(const ServedDevice& device, const std::vector<Guest>& guests);
+  /// Adds the drop counters of a session. If the client is a controller, sets `controller` to its link.
+  void add(const ServedClient& client);
+  void add(const ServedDevice& device, const std::vector<ServedClient>& clients);
 };
 
 }  // namespace tendon

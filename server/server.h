@@ -18,7 +18,7 @@
 #include "devices/safety/safe_device.h"
 #include "protocol/busy_link.h"
 #include "server/assembly.h"
-#include "server/guests/unknown_keys.h"
+#include "server/clients/unknown_keys.h"
 #include "server/haptic_loop.h"
 #include "server/machine/announcer.h"
 #include "server/machine/doorbell.h"

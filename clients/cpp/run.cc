@@ -35,19 +35,19 @@ void say_json(const Json& json) { std::cout << json << std::endl; }
 
 bool is_final(Code code) { return code != Code::kBusy && code != Code::kShutdown; }
 
-class Guest {
+class RunningClient {
  public:
   /// Messages contain the name `device` unless it is empty.
   template <typename Callback>
-  Guest(const Options& options, const std::string& device, Callback callback, LocalTime start)
+  RunningClient(const Options& options, const std::string& device, Callback callback, LocalTime start)
       : options_(options),
         device_(device),
         who_(options.client.name + (device.empty() ? "" : " at " + device)),
         transport_(options.server, options.client.key.has_value()),
         client_(options.busy ? static_cast<Link&>(busy_) : transport_, transport_.server(), config(options, device),
                 std::move(callback), start) {}
-  Guest(const Guest&) = delete;
-  Guest& operator=(const Guest&) = delete;
+  RunningClient(const RunningClient&) = delete;
+  RunningClient& operator=(const RunningClient&) = delete;
 
   /// Performs the work due at `now` and prints changes. Returns the time of the next turn, or empty if the client has
   /// stopped permanently.
@@ -86,7 +86,7 @@ class Guest {
   PeerTime reported_{};
 };
 
-ForceClient::Config Guest::config(const Options& options, const std::string& device) const {
+ForceClient::Config RunningClient::config(const Options& options, const std::string& device) const {
   ForceClient::Config config = options.client;
   if (!device.empty()) config.device = device;
   if (config.device.empty()) config.device = transport_.device();
@@ -94,7 +94,7 @@ ForceClient::Config Guest::config(const Options& options, const std::string& dev
   return config;
 }
 
-std::string Guest::sentence() const {
+std::string RunningClient::sentence() const {
   const ForceClient::Stats stats = client_.stats();
   const std::string server = options_.server.at(transport_.server());
   switch (stats.phase) {
@@ -116,7 +116,7 @@ std::string Guest::sentence() const {
   return {};
 }
 
-Json Guest::to_json(const LinkReport& report) const {
+Json RunningClient::to_json(const LinkReport& report) const {
   Json json = named();
   json.update(Json{{"number", report.number},
                    {"forces", report.forces},
@@ -151,7 +151,7 @@ bool waits(ForceClient::Phase phase) {
 }
 
 /// The address of the server may have changed. If the current address did not answer, the next one is tried.
-void Guest::look_up_again() {
+void RunningClient::look_up_again() {
   try {
     transport_.look_up_again(client_.phase() == ForceClient::Phase::kUnanswered);
     client_.move_to(transport_.server());
@@ -161,7 +161,7 @@ void Guest::look_up_again() {
   }
 }
 
-std::optional<LocalTime> Guest::turn(LocalTime now) {
+std::optional<LocalTime> RunningClient::turn(LocalTime now) {
   const LocalTime next = client_.turn(now);
   const std::string text = sentence();
   if (!text.empty() && text != said_) say(said_ = text);
@@ -184,7 +184,7 @@ std::optional<LocalTime> Guest::turn(LocalTime now) {
   return next;
 }
 
-bool Guest::end(LocalTime now, Duration duration) {
+bool RunningClient::end(LocalTime now, Duration duration) {
   leave(now);
   using ull = unsigned long long;
   const ForceClient::Stats stats = client_.stats();
@@ -231,40 +231,40 @@ struct Beside {
 };
 
 /// Passes the newest state to the engine and sends its answers. Returns the time of the next turn.
-LocalTime turn_elsewhere(const Beside& beside, Guest& guest, LocalTime now) {
+LocalTime turn_elsewhere(const Beside& beside, RunningClient& client, LocalTime now) {
   if (beside.seen->has_value()) {
-    beside.elsewhere->see(now, {.hand = **beside.seen, .session = guest.sessions()});
+    beside.elsewhere->see(now, {.hand = **beside.seen, .session = client.sessions()});
     beside.seen->reset();
   }
   bool answered = false;
   while (const auto reply = beside.elsewhere->turn(now)) {
-    guest.answer(now, *reply);
+    client.answer(now, *reply);
     answered = true;
   }
   return answered ? now : beside.elsewhere->next_turn();
 }
 
 /// Passes all states to the engine if at least one is new, and sends the answers. Returns the time of the next turn.
-LocalTime turn_together(AllHands& all, std::deque<Guest>& guests, LocalTime now) {
-  for (std::size_t i = 0; i < guests.size(); ++i) {
-    if (guests[i].open() || !all.hands[i]) continue;
+LocalTime turn_together(AllHands& all, std::deque<RunningClient>& clients, LocalTime now) {
+  for (std::size_t i = 0; i < clients.size(); ++i) {
+    if (clients[i].open() || !all.hands[i]) continue;
     all.hands[i].reset();
     all.fresh = true;  // the object must respond to the released hand
   }
   if (!std::exchange(all.fresh, false)) return LocalTime::max();
   const std::vector<Touch> touches = all.engine(all.hands);
-  for (std::size_t i = 0; i < guests.size(); ++i) {
+  for (std::size_t i = 0; i < clients.size(); ++i) {
     if (!all.hands[i]) continue;
-    guests[i].answer(now, {.to = {.hand = *all.hands[i], .session = guests[i].sessions()}, .touch = touches.at(i)});
+    clients[i].answer(now, {.to = {.hand = *all.hands[i], .session = clients[i].sessions()}, .touch = touches.at(i)});
   }
   return now;
 }
 
 /// Busy-waits until a client's socket or `also` (−1: none) is readable, or until `end`. Returns the current time.
-LocalTime watch(std::deque<Guest>& guests, int also, LocalTime now, LocalTime end) {
+LocalTime watch(std::deque<RunningClient>& clients, int also, LocalTime now, LocalTime end) {
   while (now < end) {
-    for (Guest& guest : guests) {
-      if (guest.look(now)) return now;
+    for (RunningClient& client : clients) {
+      if (client.look(now)) return now;
     }
     if (also >= 0 && UdpTransport::wait_for_any({}, Duration::zero(), also)) return now;
   }
@@ -291,30 +291,30 @@ int run_with(const Options& options, const std::vector<Slot<Callback>>& slots, c
     }
     const LocalTime start = read_clock();
     const LocalTime end = options.duration > Duration::zero() ? start + options.duration : LocalTime::max();
-    std::deque<Guest> guests;
+    std::deque<RunningClient> clients;
     std::vector<UdpTransport*> transports;
     for (const auto& [own, device, callback] : slots) {
-      transports.push_back(&guests.emplace_back(*own, device, callback, start).transport());
+      transports.push_back(&clients.emplace_back(*own, device, callback, start).transport());
     }
     LocalTime now = start;
     bool* const heard = beside.heard;
     LocalTime quiet = heard != nullptr ? start + options.silence : LocalTime::max();
     while (now < end && !signals.asked()) {
       LocalTime next = end;
-      for (Guest& guest : guests) {
-        const std::optional<LocalTime> due = guest.turn(now);
+      for (RunningClient& client : clients) {
+        const std::optional<LocalTime> due = client.turn(now);
         if (!due) {
-          for (Guest& other : guests) other.leave(now);
+          for (RunningClient& other : clients) other.leave(now);
           return 1;
         }
         next = std::min(next, *due);
       }
-      if (beside.elsewhere != nullptr) next = std::min(next, turn_elsewhere(beside, guests.front(), now));
+      if (beside.elsewhere != nullptr) next = std::min(next, turn_elsewhere(beside, clients.front(), now));
       if (beside.all_hands != nullptr) {
         try {
-          next = std::min(next, turn_together(*beside.all_hands, guests, now));
+          next = std::min(next, turn_together(*beside.all_hands, clients, now));
         } catch (...) {
-          for (Guest& guest : guests) guest.leave(now);
+          for (RunningClient& client : clients) client.leave(now);
           throw;
         }
       }
@@ -329,14 +329,14 @@ int run_with(const Options& options, const std::vector<Slot<Callback>>& slots, c
       const Duration wait = std::min(next - now, kLongestWait);
       const int also = beside.elsewhere != nullptr ? beside.elsewhere->descriptor() : -1;
       if (options.busy) {
-        now = watch(guests, also, now, now + wait);
+        now = watch(clients, also, now, now + wait);
       } else {
         UdpTransport::wait_for_any(transports, wait, also);
         now = read_clock();
       }
     }
     bool all = true;
-    for (Guest& guest : guests) all = guest.end(now, now - start) && all;
+    for (RunningClient& client : clients) all = client.end(now, now - start) && all;
     return all ? 0 : 1;
   } catch (const std::exception& error) {
     std::cerr << options.client.name << ": " << error.what() << '\n';

@@ -24,7 +24,7 @@ class DatagramFilter {
     std::uint32_t unauthenticated_per_s = 16;
     std::uint64_t bytes_per_s = 4'000'000;  ///< on the wire, including these
   };
-  enum class Sender : std::uint8_t { kGuest, kUnauthenticated };
+  enum class Sender : std::uint8_t { kClient, kUnauthenticated };
   enum class Verdict : std::uint8_t {
     kRecord,
     kUnauthenticated,

@@ -14,7 +14,7 @@
 #include <utility>
 
 #include "protocol/limits.h"
-#include "server/guests/guest.h"
+#include "server/clients/served_client.h"
 #include "server/machine/regular_file.h"
 #include "server/scene/keys.h"
 #include "server/scene/reader.h"

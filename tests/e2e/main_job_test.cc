@@ -144,7 +144,7 @@ TEST(MainJob, AKilledServerLeavesARecordingThatReadsUpToItsLastSecond) {
   EXPECT_FALSE(recording.arrived.empty());
 }
 
-TEST(MainJob, ASignalEndsTheServerCleanlyAndItsGuestsAreTold) {
+TEST(MainJob, ASignalEndsTheServerCleanlyAndItsClientsAreTold) {
   for (const int signal : {SIGTERM, SIGINT, SIGHUP}) {
     SCOPED_TRACE(signal);
     const ScratchFolder folder;

@@ -85,7 +85,7 @@ TEST(Security, ThePermissionToWriteToTheSocketsFileIsAKey) {
   EXPECT_FALSE(std::filesystem::exists(lab.folder() / "near.sock"));
 }
 
-TEST(Security, AGuestOfASocketsFileFindsTheServerAgainThatIsStartedAnew) {
+TEST(Security, AClientOfASocketsFileFindsTheServerAgainThatIsStartedAnew) {
   const ScratchFolder folder;
   const std::string scene = write(folder.path() / "near.toml",
                                   "[device]\nkind = \"simulated\"\nprofile = \"falcon\"\n"

@@ -11,7 +11,7 @@
 #include "tests/e2e/stage/stage.h"
 #include "tests/server/scratch_folder.h"
 
-// A hand that leads the device of another server, in separate processes. tests/server/guests/couple_test.cc and
+// A hand that leads the device of another server, in separate processes. tests/server/clients/couple_test.cc and
 // leaders_test.cc cover each method, whole handles and several leaders in virtual time.
 
 namespace tendon::e2e::teleoperation_test {

@@ -61,16 +61,16 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     fuzz::require(reply.size <= said);
     std::size_t length = reply.size;
     std::optional<SessionKeys> its;
-    if (reply.guest) {
+    if (reply.client) {
       // In suite 1 only the holder of the key can get here. Every byte except the cookie is authenticated.
-      if (reply.guest->key != nullptr) fuzz::require(reply.guest->hello.name == "a");
+      if (reply.client->key != nullptr) fuzz::require(reply.client->hello.name == "a");
       Welcome welcome;
       welcome.version = 1;
       welcome.loop_hz = 1000;
       welcome.timeout = std::chrono::seconds(1);
-      fuzz::require(reply.guest->suite.has_value() || (&door == &strict && which == 1));
-      const ServerHandshake::Answered answered =
-          reply.guest->suite ? door.welcome(*reply.guest, 1, welcome, answer) : door.refuse(*reply.guest, {}, answer);
+      fuzz::require(reply.client->suite.has_value() || (&door == &strict && which == 1));
+      const ServerHandshake::Answered answered = reply.client->suite ? door.welcome(*reply.client, 1, welcome, answer)
+                                                                     : door.refuse(*reply.client, {}, answer);
       its = answered.keys;
       length = answered.size;
       fuzz::require(length < said);

@@ -67,7 +67,7 @@ TEST_F(Handshake, HelloRetryHelloWelcomeOpensIt) {
   const Bytes first = hello_of(a_);
   EXPECT_EQ(first.size(), kMaxDatagram);
   const auto retry = knock(first);
-  EXPECT_FALSE(retry.guest.has_value());  // A has not yet returned the cookie
+  EXPECT_FALSE(retry.client.has_value());  // A has not yet returned the cookie
   ASSERT_GT(retry.size, 0U);
 
   a_.receive(now_, answer(retry.size));
@@ -75,12 +75,12 @@ TEST_F(Handshake, HelloRetryHelloWelcomeOpensIt) {
   ASSERT_EQ(second.size(), kMaxDatagram);
   const auto reply = knock(second);
   EXPECT_EQ(reply.size, 0U);
-  ASSERT_TRUE(reply.guest.has_value());
-  EXPECT_EQ(reply.guest->hello.name, "wall");
-  EXPECT_EQ(reply.guest->hello.role, Role::kController);
-  EXPECT_EQ(reply.guest->version, 1U);
+  ASSERT_TRUE(reply.client.has_value());
+  EXPECT_EQ(reply.client->hello.name, "wall");
+  EXPECT_EQ(reply.client->hello.role, Role::kController);
+  EXPECT_EQ(reply.client->version, 1U);
 
-  const std::size_t size = z_->welcome(*reply.guest, 77, examples::welcome(), answer_).size;
+  const std::size_t size = z_->welcome(*reply.client, 77, examples::welcome(), answer_).size;
   EXPECT_LT(size, second.size());
   a_.receive(now_, answer(size));
   ASSERT_TRUE(a_.outcome().has_value());
@@ -103,28 +103,28 @@ TEST_F(Handshake, ARefusalSaysWhy) {
 
 TEST_F(Handshake, EveryBitOfTheCookieCounts) {
   const Bytes good = hello_with_cookie();
-  ASSERT_TRUE(knock(good).guest.has_value());
+  ASSERT_TRUE(knock(good).client.has_value());
   for (std::size_t bit = 0; bit < 128; ++bit) {
     Bytes bad = good;
     bad[kHeaderSize + 16 + bit / 8] ^= static_cast<std::byte>(1U << (bit % 8));
     const auto reply = knock(bad);
-    EXPECT_FALSE(reply.guest.has_value()) << bit;
+    EXPECT_FALSE(reply.client.has_value()) << bit;
     EXPECT_EQ(reply.size, 48U) << bit;
   }
 }
 
 TEST_F(Handshake, ACookieIsForOneAddressOnePortOneAttemptAndEachDoorOfOneServer) {
   const Bytes good = hello_with_cookie();
-  EXPECT_FALSE(z_->receive(now_, address(2, 4000), good, answer_).guest.has_value());
-  EXPECT_FALSE(z_->receive(now_, address(1, 4001), good, answer_).guest.has_value());
+  EXPECT_FALSE(z_->receive(now_, address(2, 4000), good, answer_).client.has_value());
+  EXPECT_FALSE(z_->receive(now_, address(1, 4001), good, answer_).client.has_value());
   Bytes other_attempt = good;
   other_attempt[kHeaderSize] ^= std::byte{1};  // part of the client's random
-  EXPECT_FALSE(knock(other_attempt).guest.has_value());
+  EXPECT_FALSE(knock(other_attempt).client.has_value());
   ServerHandshake::Config config = door_config();
   config.number = 1;
-  EXPECT_TRUE(ServerHandshake(config).receive(now_, from_, good, answer_).guest.has_value());
+  EXPECT_TRUE(ServerHandshake(config).receive(now_, from_, good, answer_).client.has_value());
   config.secret[31] = std::byte{0};
-  EXPECT_FALSE(ServerHandshake(config).receive(now_, from_, good, answer_).guest.has_value()) << "another server";
+  EXPECT_FALSE(ServerHandshake(config).receive(now_, from_, good, answer_).client.has_value()) << "another server";
 }
 
 TEST_F(Handshake, ACookieLivesOneKeyLifetimeAndNoLongerThanTwo) {
@@ -132,9 +132,9 @@ TEST_F(Handshake, ACookieLivesOneKeyLifetimeAndNoLongerThanTwo) {
     now_ = LocalTime{start};
     const Bytes hello = hello_with_cookie();
     now_ = LocalTime{start + seconds(120)};
-    EXPECT_TRUE(knock(hello).guest.has_value()) << start.count();
+    EXPECT_TRUE(knock(hello).client.has_value()) << start.count();
     now_ = LocalTime{start + seconds(240)};
-    EXPECT_FALSE(knock(hello).guest.has_value()) << start.count();
+    EXPECT_FALSE(knock(hello).client.has_value()) << start.count();
   }
 }
 
@@ -148,16 +148,16 @@ TEST_F(Handshake, ACookieThatExpiredIsReplacedByANewRetry) {
   late.receive(now_, answer(again.size));
   now_ = late.next_tick();
   late.tick(now_);
-  EXPECT_TRUE(knock(hello_of(late)).guest.has_value());
+  EXPECT_TRUE(knock(hello_of(late)).client.has_value());
 }
 
-TEST_F(Handshake, AHelloSentAgainIsTheSameGuest) {
+TEST_F(Handshake, AHelloSentAgainIsTheSameClient) {
   const Bytes hello = hello_with_cookie();
   const auto first = knock(hello);
   now_ += milliseconds(100);
   const auto second = knock(hello);
-  ASSERT_TRUE(first.guest && second.guest);
-  EXPECT_EQ(first.guest->random, second.guest->random);
+  ASSERT_TRUE(first.client && second.client);
+  EXPECT_EQ(first.client->random, second.client->random);
 }
 
 TEST_F(Handshake, TheHighestCommonVersionIsChosen) {
@@ -176,8 +176,8 @@ TEST_F(Handshake, TheHighestCommonVersionIsChosen) {
     ClientHandshake client(config, now_);
     client.receive(now_, answer(knock(hello_of(client)).size));
     const auto reply = knock(hello_of(client));
-    ASSERT_TRUE(reply.guest.has_value());
-    EXPECT_EQ(reply.guest->version, c.common);
+    ASSERT_TRUE(reply.client.has_value());
+    EXPECT_EQ(reply.client->version, c.common);
   }
 }
 
@@ -238,7 +238,7 @@ TEST_F(Handshake, TheDoorIsSilentForAnythingThatIsNoHello) {
   const auto silent = [&](const Bytes& datagram, const std::string& what) {
     const auto reply = knock(datagram);
     EXPECT_EQ(reply.size, 0U) << what;
-    EXPECT_FALSE(reply.guest.has_value()) << what;
+    EXPECT_FALSE(reply.client.has_value()) << what;
     EXPECT_EQ(z_->stats().malformed, ++expected) << what;
   };
   for (std::size_t size = 0; size < hello.size(); ++size) {
@@ -264,11 +264,11 @@ TEST_F(Handshake, NoReplyIsEverLongerThanTheDatagramItAnswers) {
 }
 
 TEST_F(Handshake, ARefusalFitsADatagramHoweverMuchItHasToSay) {
-  const auto guest = knock(hello_with_cookie()).guest;
-  ASSERT_TRUE(guest.has_value());
+  const auto client = knock(hello_with_cookie()).client;
+  ASSERT_TRUE(client.has_value());
   Refused refused = examples::refused();
   refused.detail.assign(5000, 'x');
-  EXPECT_LT(z_->refuse(*guest, refused, answer_).size, kMaxDatagram);
+  EXPECT_LT(z_->refuse(*client, refused, answer_).size, kMaxDatagram);
 }
 
 TEST_F(Handshake, ImpossibleSettingsAreRefusedAtOnce) {

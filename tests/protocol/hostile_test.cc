@@ -83,7 +83,7 @@ bool take_everywhere(const Bytes& datagram) {
   ServerHandshake door({});
   const auto reply = door.receive(LocalTime{}, parse_address("127.0.0.1:4000"), datagram, buffer);
   EXPECT_LE(reply.size, datagram.size());
-  EXPECT_EQ(door.stats().malformed == 1, reply.size == 0 && !reply.guest);
+  EXPECT_EQ(door.stats().malformed == 1, reply.size == 0 && !reply.client);
   return Target().take(datagram);
 }
 

@@ -127,10 +127,10 @@ class Pair {
   }
 
   const Address server_ = parse_address("127.0.0.1:47100");
-  const Address guest_ = parse_address("127.0.0.1:50000");
+  const Address client_address_ = parse_address("127.0.0.1:50000");
   Clock clock_;
   Half to_server_, to_client_;
-  MemoryLink server_link_{to_server_, to_client_, clock_, guest_};
+  MemoryLink server_link_{to_server_, to_client_, clock_, client_address_};
   MemoryLink client_link_{to_client_, to_server_, clock_, server_};
   BusyLink server_busy_{server_link_};
   BusyLink client_busy_{client_link_};

@@ -101,34 +101,34 @@ void Server::hello(LocalTime now, const Address& from, std::span<const std::byte
     if (size > 0) link_.send(from, std::span<const std::byte>(buffer).first(size));
   };
   send(reply.size);
-  if (!reply.guest) return;
-  if (attempt_ != reply.guest->random) {
-    attempt_ = reply.guest->random;
+  if (!reply.client) return;
+  if (attempt_ != reply.client->random) {
+    attempt_ = reply.client->random;
     attempts.push_back(now);
-    hellos.push_back(reply.guest->hello);
+    hellos.push_back(reply.client->hello);
     if (!refusal) {
       ++welcomes;
       Session::Config config;
       config.connection_id = ++connection_id_;
       session_.emplace(config, now);
-      guest_ = from;
+      client_ = from;
       next_state_ = now;
     }
   }
   if (refusal) {
-    send(handshake_.refuse(*reply.guest, *refusal, buffer).size);
+    send(handshake_.refuse(*reply.client, *refusal, buffer).size);
     return;
   }
   Welcome welcome;
   welcome.version = kProtocolVersion;
-  if (features) welcome.features = reply.guest->hello.features;
-  welcome.role = reply.guest->hello.role;
+  if (features) welcome.features = reply.client->hello.features;
+  welcome.role = reply.client->hello.role;
   welcome.device_name = "hand at Z";
   welcome.max_force = 10;
   welcome.loop_hz = kLoopHz;
   welcome.timeout = std::chrono::seconds(2);
   welcome.server = "Z";
-  send(handshake_.welcome(*reply.guest, connection_id_, welcome, buffer).size);
+  send(handshake_.welcome(*reply.client, connection_id_, welcome, buffer).size);
 }
 
 void Server::flush(LocalTime now) {
@@ -136,7 +136,7 @@ void Server::flush(LocalTime now) {
   while (session_) {
     const std::size_t size = session_->next_datagram(now, buffer);
     if (size == 0) break;
-    link_.send(guest_, std::span<const std::byte>(buffer).first(size));
+    link_.send(client_, std::span<const std::byte>(buffer).first(size));
   }
 }
 

@@ -121,7 +121,7 @@ class Server {
   Link& link_;
   ServerHandshake handshake_;
   std::optional<Session> session_;
-  Address guest_;
+  Address client_;
   std::optional<std::array<std::byte, 16>> attempt_;
   std::vector<std::byte> answer_;
   std::uint32_t connection_id_ = 0;

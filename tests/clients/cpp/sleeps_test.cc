@@ -70,7 +70,7 @@ Options wall_at(const Server& server) {
 
 Vec3 push(const DeviceState& hand) { return -100 * hand.position; }
 
-TEST(Sleeps, AGuestSleepsOnceForEachStateThatItAnswers) {
+TEST(Sleeps, AClientSleepsOnceForEachStateThatItAnswers) {
   Server server;
   const Options options = wall_at(server);
   const std::uint64_t before = sleeps();
@@ -82,7 +82,7 @@ TEST(Sleeps, AGuestSleepsOnceForEachStateThatItAnswers) {
   EXPECT_LE(slept, forces + kOthers) << "a sleep between a state and its force would double them";
 }
 
-TEST(Sleeps, ABusyGuestNeverSleepsAndStillEndsInTime) {
+TEST(Sleeps, ABusyClientNeverSleepsAndStillEndsInTime) {
   Server server;
   Options options = wall_at(server);
   options.busy = true;
@@ -93,7 +93,7 @@ TEST(Sleeps, ABusyGuestNeverSleepsAndStillEndsInTime) {
   EXPECT_LE(slept, 10U) << "none for a state: these are of the start and the end";
 }
 
-TEST(Sleeps, ABusyGuestHasItsTimersServed) {
+TEST(Sleeps, ABusyClientHasItsTimersServed) {
   Options options;
   options.client.name = "wall";
   options.server = "127.0.0.1:9";

@@ -39,14 +39,14 @@ class Z {
   /// Returns the size of the next datagram and remembers its sender.
   ssize_t receive() {
     std::array<char, kMaxDatagram> buffer{};
-    socklen_t size = sizeof guest_;
-    return ::recvfrom(fd_, buffer.data(), buffer.size(), MSG_DONTWAIT, as_sockaddr(guest_), &size);
+    socklen_t size = sizeof client_;
+    return ::recvfrom(fd_, buffer.data(), buffer.size(), MSG_DONTWAIT, as_sockaddr(client_), &size);
   }
   void reply(std::size_t size) {
     const std::vector<char> bytes(size, 'z');
-    ::sendto(fd_, bytes.data(), bytes.size(), 0, as_sockaddr(guest_), sizeof guest_);
+    ::sendto(fd_, bytes.data(), bytes.size(), 0, as_sockaddr(client_), sizeof client_);
   }
-  const sockaddr_in& guest() const { return guest_; }
+  const sockaddr_in& client() const { return client_; }
 
  private:
   static sockaddr_in loopback(std::uint16_t port) {
@@ -60,7 +60,7 @@ class Z {
 
   int fd_;
   std::uint16_t port_ = 0;
-  sockaddr_in guest_{};
+  sockaddr_in client_{};
 };
 
 constexpr std::array<std::byte, 8> kWords{};
@@ -146,12 +146,12 @@ TEST(UdpTransport, StaysWithItsAddressAndPortWhileTheNameHasIt) {
   Z z;
   UdpTransport a(z.address());
   greet(a, z);
-  const auto port = z.guest().sin_port;
+  const auto port = z.client().sin_port;
   a.look_up_again(false);
   a.look_up_again(true);
   EXPECT_EQ(a.server(), z.address());
   greet(a, z);
-  EXPECT_EQ(z.guest().sin_port, port);
+  EXPECT_EQ(z.client().sin_port, port);
 }
 
 TEST(UdpTransport, WaitsForAnyOfSeveral) {
@@ -174,7 +174,7 @@ TEST(UdpTransport, HearsNobodyButItsServer) {
   greet(a, z);
   UdpTransport b(stranger.address());
   greet(b, stranger);
-  const_cast<sockaddr_in&>(stranger.guest()) = z.guest();
+  const_cast<sockaddr_in&>(stranger.client()) = z.client();
   stranger.reply(20);
   EXPECT_EQ(received(a), 0U);
 }

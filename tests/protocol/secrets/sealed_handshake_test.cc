@@ -71,10 +71,10 @@ class SealedHandshake : public ::testing::Test {
 TEST_F(SealedHandshake, EndsWithTheSameKeysAtBothEnds) {
   const auto reply = knock(hello_with_cookie(a_));
   EXPECT_EQ(reply.size, 0U);
-  ASSERT_TRUE(reply.guest.has_value());
-  EXPECT_EQ(reply.guest->hello.name, "wall");
-  EXPECT_EQ(reply.guest->key->name, "wall");
-  const auto answered = z_.welcome(*reply.guest, 77, examples::welcome(), answer_);
+  ASSERT_TRUE(reply.client.has_value());
+  EXPECT_EQ(reply.client->hello.name, "wall");
+  EXPECT_EQ(reply.client->key->name, "wall");
+  const auto answered = z_.welcome(*reply.client, 77, examples::welcome(), answer_);
   a_.receive(now_, first(answer_, answered.size));
   ASSERT_TRUE(a_.outcome().has_value());
   const auto& accepted = std::get<ClientHandshake::Accepted>(*a_.outcome());
@@ -88,7 +88,7 @@ TEST_F(SealedHandshake, EndsWithTheSameKeysAtBothEnds) {
 TEST_F(SealedHandshake, NoWordOfIt) {
   const Bytes hello = hello_with_cookie(a_);
   const auto reply = knock(hello);
-  const Bytes answer = first(answer_, z_.welcome(*reply.guest, 77, examples::welcome(), answer_).size);
+  const Bytes answer = first(answer_, z_.welcome(*reply.client, 77, examples::welcome(), answer_).size);
   const auto holds = [](const Bytes& bytes, std::string_view word) {
     const auto raw = std::as_bytes(std::span(word));
     return std::search(bytes.begin(), bytes.end(), raw.begin(), raw.end()) != bytes.end();
@@ -101,7 +101,7 @@ TEST_F(SealedHandshake, TwoSessionsOfOneKeyHaveNoKeyInCommon) {
   std::optional<SessionKeys> before;
   for (int i = 0; i < 2; ++i) {
     const auto reply = knock(hello_with_cookie());
-    const auto answered = z_.welcome(*reply.guest, 77, examples::welcome(), answer_);
+    const auto answered = z_.welcome(*reply.client, 77, examples::welcome(), answer_);
     if (before) {
       EXPECT_NE(before->send.bytes(), answered.keys->send.bytes());
       EXPECT_NE(before->receive.bytes(), answered.keys->receive.bytes());
@@ -126,7 +126,7 @@ TEST_F(SealedHandshake, AnUnknownKeyAForgedMessageAndPlaintextHearNothing) {
   const Bytes good = hello_with_cookie();
   const auto silent = [&](const Bytes& datagram) {
     const auto reply = knock(datagram);
-    return reply.size == 0 && !reply.guest;
+    return reply.size == 0 && !reply.client;
   };
   Bytes unknown = good;
   unknown[50] ^= std::byte{1};
@@ -145,7 +145,7 @@ TEST_F(SealedHandshake, AnUnknownKeyAForgedMessageAndPlaintextHearNothing) {
   EXPECT_EQ(z_.stats().malformed, 1U);
   EXPECT_TRUE(silent(examples::hello_datagram(examples::hello())));
   EXPECT_EQ(z_.stats().plain, 1U);
-  EXPECT_TRUE(knock(good).guest.has_value());
+  EXPECT_TRUE(knock(good).client.has_value());
 }
 
 TEST_F(SealedHandshake, NothingSpokenInTheClearMovesAClientWithAKey) {
@@ -165,7 +165,7 @@ TEST_F(SealedHandshake, NothingSpokenInTheClearMovesAClientWithAKey) {
 
 TEST_F(SealedHandshake, ATamperedAnswerIsIgnoredAndTheTrueOneStillCounts) {
   const auto reply = knock(hello_with_cookie(a_));
-  const Bytes good = first(answer_, z_.refuse(*reply.guest, examples::refused(), answer_).size);
+  const Bytes good = first(answer_, z_.refuse(*reply.client, examples::refused(), answer_).size);
   for (std::size_t at = 16; at < good.size(); ++at) {
     Bytes bad = good;
     bad[at] ^= std::byte{1};
@@ -180,7 +180,7 @@ TEST_F(SealedHandshake, AReplayedHelloIsWorthNothingFromAnotherAddress) {
   const Bytes hello = hello_with_cookie();
   from_ = parse_address("192.0.2.2:4000");
   const auto reply = knock(hello);
-  EXPECT_FALSE(reply.guest.has_value());
+  EXPECT_FALSE(reply.client.has_value());
   EXPECT_EQ(reply.size, 48U);
 }
 
@@ -189,7 +189,7 @@ TEST_F(SealedHandshake, TooManyHellosOfOneSourceAreDroppedNotThoseOfAnother) {
   for (int i = 0; i < 100; ++i) knock(hello);
   EXPECT_EQ(z_.stats().limited, 100U - HelloLimit::kBurst);
   from_ = parse_address("192.0.2.2:4000");
-  EXPECT_TRUE(knock(hello_with_cookie()).guest.has_value());
+  EXPECT_TRUE(knock(hello_with_cookie()).client.has_value());
 }
 
 TEST_F(SealedHandshake, SpoofedHellosChangeNothingButACounter) {
@@ -207,14 +207,14 @@ TEST_F(SealedHandshake, SpoofedHellosChangeNothingButACounter) {
     from.port = static_cast<std::uint16_t>(bits >> 32U);
     spoofed[16] = static_cast<std::byte>(bits >> 48U);
     const auto reply = z_.receive(now_, from, spoofed, answer_);
-    ASSERT_TRUE(reply.size == 48 && !reply.guest);
+    ASSERT_TRUE(reply.size == 48 && !reply.client);
   }
   EXPECT_EQ(mallinfo2().uordblks, memory);
   EXPECT_EQ(z_.stats().retries, before + hellos);
   EXPECT_EQ(z_.stats().limited + z_.stats().unknown_key + z_.stats().forged + z_.stats().malformed, 0U);
   // A client that really has one of these addresses is admitted.
   from_ = from;
-  EXPECT_TRUE(knock(hello_with_cookie()).guest.has_value());
+  EXPECT_TRUE(knock(hello_with_cookie()).client.has_value());
 }
 
 TEST_F(SealedHandshake, NoReplyIsEverLongerThanWhatItAnswers) {
@@ -229,15 +229,15 @@ TEST_F(SealedHandshake, NoReplyIsEverLongerThanWhatItAnswers) {
     now_ += milliseconds(50);
     const auto reply = knock(bad);
     ASSERT_LE(reply.size, bad.size());
-    if (!reply.guest) continue;
+    if (!reply.client) continue;
     Welcome fullest = examples::welcome();
     fullest.device_name.assign(1000, 'x');
     fullest.server.assign(1000, 'x');
     fullest.features.assign(100, std::string(100, 'f'));
     Refused longest = examples::refused();
     longest.detail.assign(1000, 'x');
-    ASSERT_LT(z_.welcome(*reply.guest, 1, fullest, answer_).size, bad.size());
-    ASSERT_LT(z_.refuse(*reply.guest, longest, answer_).size, bad.size());
+    ASSERT_LT(z_.welcome(*reply.client, 1, fullest, answer_).size, bad.size());
+    ASSERT_LT(z_.refuse(*reply.client, longest, answer_).size, bad.size());
   }
 }
 
@@ -272,11 +272,11 @@ class TwoSuites : public SealedHandshake {
     Bytes hello = said();
     on_the_way(hello);
     const auto reply = z.receive(now_, from_, hello, answer_);
-    if (!reply.guest) return {};
-    const auto answered = reply.guest->suite ? z.welcome(*reply.guest, 77, welcome, answer_)
-                                             : z.refuse(*reply.guest, examples::refused(), answer_);
+    if (!reply.client) return {};
+    const auto answered = reply.client->suite ? z.welcome(*reply.client, 77, welcome, answer_)
+                                              : z.refuse(*reply.client, examples::refused(), answer_);
     client.receive(now_, first(answer_, answered.size));
-    Met met{.chosen = reply.guest->suite, .here = {}, .there = answered.keys, .refused = {}, .features = {}};
+    Met met{.chosen = reply.client->suite, .here = {}, .there = answered.keys, .refused = {}, .features = {}};
     if (!client.outcome()) return met;
     if (const auto* accepted = std::get_if<ClientHandshake::Accepted>(&*client.outcome())) {
       met.here = accepted->keys;
@@ -379,9 +379,9 @@ TEST_F(TwoSuites, InTheClearThereIsNothingToChoose) {
   from_ = parse_address("127.0.0.1:4000");
   client.receive(now_, first(answer_, z.receive(now_, from_, said_by(client), answer_).size));
   const auto reply = z.receive(now_, from_, said_by(client), answer_);
-  ASSERT_TRUE(reply.guest.has_value());
-  EXPECT_EQ(reply.guest->suite, Suite::kPlain);
-  const auto answered = z.welcome(*reply.guest, 77, examples::welcome(), answer_);
+  ASSERT_TRUE(reply.client.has_value());
+  EXPECT_EQ(reply.client->suite, Suite::kPlain);
+  const auto answered = z.welcome(*reply.client, 77, examples::welcome(), answer_);
   client.receive(now_, first(answer_, answered.size));
   const auto& accepted = std::get<ClientHandshake::Accepted>(client.outcome().value());
   EXPECT_FALSE(accepted.keys);

@@ -144,7 +144,7 @@ const Names kClockReaders = {
 // ---- Reading --------------------------------------------------------------------------------------------------------
 
 /// "clients/cpp/" for "clients/cpp/run.cc".
-std::string_view guest_folder(std::string_view path) {
+std::string_view client_folder(std::string_view path) {
   const auto end = path.find('/', path.find('/') + 1);
   return end == std::string_view::npos ? std::string_view() : path.substr(0, end + 1);
 }
@@ -178,7 +178,8 @@ std::optional<std::string> broken_by_project_include(const std::string& path, co
   if (here == "tests" || one_of(include.name, kForAllRooms)) {
     return std::nullopt;
   }
-  if (here == "clients" && (include.name.starts_with(guest_folder(path)) || include.name.starts_with("clients/cpp/"))) {
+  if (here == "clients" &&
+      (include.name.starts_with(client_folder(path)) || include.name.starts_with("clients/cpp/"))) {
     return std::nullopt;
   }
   const auto room = std::ranges::find(rooms(), here, &Room::name);
@@ -186,7 +187,7 @@ std::optional<std::string> broken_by_project_include(const std::string& path, co
     return std::nullopt;
   }
   return join({here, " may include ", list(room->may_include),
-               here == "clients" ? ", clients/cpp and the guest's own folder" : "", ", not ", include.name});
+               here == "clients" ? ", clients/cpp and the client's own folder" : "", ", not ", include.name});
 }
 
 std::optional<std::string> broken_by_library_include(const std::string& path, const Include& include) {
@@ -274,13 +275,12 @@ const std::vector<Forbidden>& forbidden_words() {
                      "usage::parse() parses command lines: CLI11 takes an empty text for 0",
                      [](std::string_view path) { return path != "clients/cpp/usage.cc"; }});
     // Finds statements that print a text field of tendon.proto.
-    words.push_back(
-        {{"cout", "cerr"},
-         std::regex(
-             R"(\bstd::(cout|cerr)\b(?!.*\bvisible\().*)"
-             R"((\b(hello|welcome|peer|guest)\w*(\.|->)name\b|[.>](words|reason|detail|fault|degraded|device_name|holder|model)\b))"),
-         "a peer's words are printed through visible(): they could forge a line or move the cursor",
-         everywhere});
+    words.push_back({{"cout", "cerr"},
+                     std::regex(R"(\bstd::(cout|cerr)\b(?!.*\bvisible\().*)"
+                                R"(((\b(hello|welcome|peer)\w*|[^.\w]client\w*)(\.|->)name\b)"
+                                R"(|[.>](words|reason|detail|fault|degraded|device_name|holder|model)\b))"),
+                     "a peer's words are printed through visible(): they could forge a line or move the cursor",
+                     everywhere});
     words.push_back({{"namespace"},
                      std::regex(R"(\busing\s+namespace\b)"),
                      "no using namespace in a header: it reaches everyone who includes it",

@@ -58,7 +58,7 @@ TEST(Rooms, TheServerSeesProtocolCoreAndDevices) {
       Places{});
 }
 
-TEST(Rooms, AGuestSeesProtocolAndItsOwnFolder) {
+TEST(Rooms, AClientSeesProtocolAndItsOwnFolder) {
   EXPECT_EQ(places("clients/cpp/a.cc", kLicence + "#include \"clients/cpp/z.h\"\n#include \"protocol/z.h\"\n"),
             Places{});
   EXPECT_EQ(places("clients/cpp/a.cc", kLicence + "#include \"core/z.h\"\n#include \"clients/softbody/z.h\"\n"),
@@ -167,7 +167,7 @@ TEST(Rooms, OneFileParsesCommandLines) {
 }
 
 TEST(Rooms, APeersWordsArePrintedThroughVisible) {
-  for (const std::string words : {"hello.name", "guest->name", "welcome_.name", "stats.reason", "report->words"}) {
+  for (const std::string words : {"hello.name", "client->name", "welcome_.name", "stats.reason", "report->words"}) {
     EXPECT_EQ(places("server/a.cc", kLicence + "std::cerr << \"it said \" << " + words + ";\n"),
               Places{"server/a.cc:2"});
     EXPECT_EQ(places("server/a.cc", kLicence + "std::cerr << visible(" + words + ");\n"), Places{});

@@ -186,15 +186,15 @@ TEST_P(UdpLinkTest, SeveralOnOneAddressEachGetTheDataOfTheirConnections) {
   ASSERT_EQ(links.size(), 4U);
   for (const auto& link : links) EXPECT_EQ(link->local_address(), links[0]->local_address());
   // The kernel would distribute datagrams by sender. All of many senders must reach the right link.
-  std::vector<std::unique_ptr<UdpLink>> guests;
-  for (int i = 0; i < 8; ++i) guests.push_back(std::make_unique<UdpLink>(GetParam()));
+  std::vector<std::unique_ptr<UdpLink>> clients;
+  for (int i = 0; i < 8; ++i) clients.push_back(std::make_unique<UdpLink>(GetParam()));
   for (const std::uint32_t id : {4U, 5U, 6U, 7U, 0x12345602U, 0xFFFFFFFFU}) {
-    for (const auto& guest : guests) {
-      guest->send(links[0]->local_address(), of_connection(id));
+    for (const auto& client : clients) {
+      client->send(links[0]->local_address(), of_connection(id));
       for (std::size_t place = 0; place < links.size(); ++place) {
         EXPECT_EQ(links[place]->receive(from, buffer), place == id % 4 ? kHeaderSize : 0U) << id << " at " << place;
         if (place == id % 4) {
-          EXPECT_EQ(from, guest->local_address());
+          EXPECT_EQ(from, client->local_address());
         }
       }
     }

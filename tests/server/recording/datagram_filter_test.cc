@@ -25,12 +25,12 @@ TEST(DatagramFilter, RecordsTheFirstFewStrangersOfEachSecond) {
   }
 }
 
-TEST(DatagramFilter, AFloodOfAGuestIsRecordedUpToTheBudgetOfEachSecond) {
+TEST(DatagramFilter, AFloodOfAClientIsRecordedUpToTheBudgetOfEachSecond) {
   DatagramFilter filter({.bytes_per_s = 10'000});
   for (const int second : {0, 1}) {
     std::array<int, 3> count{};
     for (int i = 0; i < 1000; ++i) {
-      ++count[static_cast<std::size_t>(filter.judge(ms(1000 * second + i), kGuest, 300))];
+      ++count[static_cast<std::size_t>(filter.judge(ms(1000 * second + i), kClient, 300))];
     }
     EXPECT_EQ(count[static_cast<std::size_t>(Verdict::kRecord)], 33) << "33 × 300 bytes are 9900";
     EXPECT_EQ(count[static_cast<std::size_t>(Verdict::kOverBudget)], 967);
@@ -39,9 +39,9 @@ TEST(DatagramFilter, AFloodOfAGuestIsRecordedUpToTheBudgetOfEachSecond) {
 
 TEST(DatagramFilter, ADatagramLargerThanTheWholeBudgetIsLeftOut) {
   DatagramFilter filter({.bytes_per_s = 1000});
-  EXPECT_EQ(filter.judge(ms(0), kGuest, 1001), Verdict::kOverBudget);
-  EXPECT_EQ(filter.judge(ms(0), kGuest, 1000), Verdict::kRecord);
-  EXPECT_EQ(filter.judge(ms(0), kGuest, 1), Verdict::kOverBudget);
+  EXPECT_EQ(filter.judge(ms(0), kClient, 1001), Verdict::kOverBudget);
+  EXPECT_EQ(filter.judge(ms(0), kClient, 1000), Verdict::kRecord);
+  EXPECT_EQ(filter.judge(ms(0), kClient, 1), Verdict::kOverBudget);
 }
 
 }  // namespace

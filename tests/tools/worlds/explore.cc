@@ -48,7 +48,8 @@ void add(World& world, const DrawnClient& client, LocalTime began, Watch watch) 
     case DrawnClient::Kind::kRogue: {
       Rogue::Config config = client.rogue;
       config.quits += began.time_since_epoch();
-      world.add_guest([&](Link& link, const Address& server) { return std::make_unique<Rogue>(link, server, config); });
+      world.add_custom_client(
+          [&](Link& link, const Address& server) { return std::make_unique<Rogue>(link, server, config); });
       break;
     }
   }

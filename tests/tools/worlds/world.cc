@@ -96,9 +96,9 @@ std::size_t World::add_observer(const ForceClient::Config& config, Watch watch, 
   return clients_.size() - 1;
 }
 
-std::size_t World::add_guest(const std::function<std::unique_ptr<Guest>(Link&, const Address&)>& make) {
+std::size_t World::add_custom_client(const std::function<std::unique_ptr<CustomClient>(Link&, const Address&)>& make) {
   Client& client = place({});
-  client.guest = make(*client.link, server_address_);
+  client.custom = make(*client.link, server_address_);
   return clients_.size() - 1;
 }
 
@@ -121,7 +121,7 @@ void World::restart_observer(std::size_t handle, const ForceClient::Config& conf
 
 void World::kill(std::size_t handle) {
   clients_[handle].client.reset();
-  clients_[handle].guest.reset();
+  clients_[handle].custom.reset();
   clients_[handle].due = LocalTime::max();
 }
 
@@ -171,7 +171,7 @@ void World::turn_log() {
 void World::turn_client(std::size_t handle) {
   Client& client = clients_[handle];
   const LocalTime reading = client.clock.reading(now_);
-  const LocalTime due = client.client ? client.client->turn(reading) : client.guest->turn(reading);
+  const LocalTime due = client.client ? client.client->turn(reading) : client.custom->turn(reading);
   // `never` is not a time and must not be converted.
   client.due = due == LocalTime::max() ? due : client.clock.truth(due, now_ + Duration(1));
   if (watch_turns_) watch_turns_({handle, due <= reading});
@@ -199,7 +199,7 @@ void World::run_for(Duration duration) {
     if (network_.take_news_of_server() || network_due_ <= now_) turn_server();
     for (std::size_t i = 0; i < clients_.size(); ++i) {
       const bool news = network_.take_news_of(static_cast<std::uint32_t>(i));
-      if ((clients_[i].client || clients_[i].guest) && (news || clients_[i].due <= now_)) turn_client(i);
+      if ((clients_[i].client || clients_[i].custom) && (news || clients_[i].due <= now_)) turn_client(i);
     }
     // The log loop adds no wake-ups: a wake-up would deliver forged datagrams to the server.
     if (log_due_ <= now_) turn_log();

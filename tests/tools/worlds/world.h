@@ -26,9 +26,9 @@ namespace tendon::simulation {
 inline constexpr std::uint16_t kFirstClientPort = 50000;
 
 /// A simulated peer other than our own clients.
-class Guest {
+class CustomClient {
  public:
-  virtual ~Guest() = default;
+  virtual ~CustomClient() = default;
   /// Runs everything that is due at `now` and returns when it must be called again. Both times are in the clock of the
   /// peer.
   virtual LocalTime turn(LocalTime now) = 0;
@@ -76,7 +76,8 @@ class World {
   std::size_t add_controller(const ForceClient::Config& config, Physics physics,
                              const injector::DriftingClock& clock = {});
   std::size_t add_observer(const ForceClient::Config& config, Watch watch, const injector::DriftingClock& clock = {});
-  std::size_t add_guest(const std::function<std::unique_ptr<Guest>(Link& link, const Address& server)>& make);
+  std::size_t add_custom_client(
+      const std::function<std::unique_ptr<CustomClient>(Link& link, const Address& server)>& make);
   /// Replaces a client that has stopped by a new one with the same address and clock.
   void restart_controller(std::size_t handle, const ForceClient::Config& config, Physics physics);
   void restart_observer(std::size_t handle, const ForceClient::Config& config, Watch watch);
@@ -117,7 +118,7 @@ class World {
     Link* link = nullptr;
     injector::DriftingClock clock;
     std::unique_ptr<ForceClient> client;  ///< null once killed
-    std::unique_ptr<Guest> guest;
+    std::unique_ptr<CustomClient> custom;
     LocalTime due{};
   };
   Client& place(const injector::DriftingClock& clock);

@@ -1,0 +1,14 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "protocol/messages.h"
+#include "server/clients/served_client.h"
+
+namespace tendon {
+
+/// Sends a state to the client unless the previous state is too recent for its rate, or the client is the peer of a
+/// coupling. Fields that were not requested or do not fit into a frame are removed. Returns true if the client can
+/// predict the state, in which case it is not sent (StateDeadband).
+bool tell_state(ServedClient& client, Subscription& subscription, const DeviceState& state);
+
+}  // namespace tendon
