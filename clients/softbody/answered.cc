@@ -14,7 +14,7 @@ struct AnswerCount {
 
 std::vector<AnswerCount> counts_of(const Answered& answered) {
   std::vector<AnswerCount> counts;
-  for (const Ladder::Step& step : answered.rungs) {
+  for (const FallbackModel::Step& step : answered.levels) {
     const std::string name(step.size.name);
     counts.push_back({name, step.answers, "answers were " + name});
   }

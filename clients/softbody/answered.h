@@ -5,13 +5,13 @@
 #include <string>
 #include <vector>
 
-#include "clients/softbody/near/ladder.h"
+#include "clients/softbody/near/fallback_model.h"
 
 namespace tendon::softbody {
 
 /// The statistics of a kNear body. They are empty for other bodies.
 struct Answered {
-  std::vector<Ladder::Step> rungs;
+  std::vector<FallbackModel::Step> levels;
   std::optional<NearModel::Size> near;
 };
 

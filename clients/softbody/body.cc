@@ -60,7 +60,7 @@ struct Made {
   QuasiStaticModel* newton = nullptr;
   StiffeningModel* stiffening = nullptr;
   NearModel* near = nullptr;
-  const Ladder* ladder = nullptr;
+  const FallbackModel* fallbacks = nullptr;
 };
 
 Patch middle_patch(const TouchSurface& surface, const Vec3& middle) {
@@ -135,16 +135,17 @@ Learned learn_of(const BodyConfig& config, const Solid& solid, const TouchSurfac
                tell);
 }
 
-std::vector<std::unique_ptr<Rung>> rungs_of(const BodyConfig& config, const Solid& solid, const TouchSurface& surface) {
-  std::vector<std::unique_ptr<Rung>> rungs;
+std::vector<std::unique_ptr<FallbackLevel>> levels_of(const BodyConfig& config, const Solid& solid,
+                                                      const TouchSurface& surface) {
+  std::vector<std::unique_ptr<FallbackLevel>> levels;
   const Learned learned = config.near.learned ? *config.near.learned : learn_of(config, solid, surface, {});
   if (config.near.tabulate && learned.answers) {
-    rungs.push_back(std::make_unique<TabulatedRung>(*learned.answers, config.tolerance));
+    levels.push_back(std::make_unique<TabulatedLevel>(*learned.answers, config.tolerance));
   }
   if (config.near.learn && learned.shapes) {
-    rungs.push_back(std::make_unique<LearnedRung>(solid, surface, *learned.shapes, config.tolerance));
+    levels.push_back(std::make_unique<LearnedLevel>(solid, surface, *learned.shapes, config.tolerance));
   }
-  return rungs;
+  return levels;
 }
 
 /// If there are `fields`, they build the near field.
@@ -171,9 +172,9 @@ Made model_of(const BodyConfig& config, const Solid& solid, const TouchSurface& 
     auto near = near_model_of(config, solid, surface, std::move(fields));
     made.near = near.get();
     if (config.near.learns()) {
-      auto ladder = std::make_unique<Ladder>(rungs_of(config, solid, surface), std::move(near));
-      made.ladder = ladder.get();
-      made.model = std::move(ladder);
+      auto fallbacks = std::make_unique<FallbackModel>(levels_of(config, solid, surface), std::move(near));
+      made.fallbacks = fallbacks.get();
+      made.model = std::move(fallbacks);
     } else {
       made.model = std::move(near);
     }
@@ -576,8 +577,8 @@ std::optional<NearModel::Size> Body::near_field() const {
   return parts_->made.near == nullptr ? std::nullopt : std::optional(parts_->made.near->size());
 }
 
-std::vector<Ladder::Step> Body::ladder() const {
-  return parts_->made.ladder == nullptr ? std::vector<Ladder::Step>() : parts_->made.ladder->steps();
+std::vector<FallbackModel::Step> Body::fallbacks() const {
+  return parts_->made.fallbacks == nullptr ? std::vector<FallbackModel::Step>() : parts_->made.fallbacks->steps();
 }
 
 Body::Size Body::size_of(const BodyConfig& config, int& under_patch) {

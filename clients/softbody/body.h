@@ -24,7 +24,7 @@
 #include "clients/softbody/models/quasi_static.h"
 #include "clients/softbody/models/stiffening.h"
 #include "clients/softbody/models/surface_table.h"
-#include "clients/softbody/near/ladder.h"
+#include "clients/softbody/near/fallback_model.h"
 #include "clients/softbody/near/learn.h"
 #include "clients/softbody/near/near_model.h"
 #include "clients/softbody/tool.h"
@@ -241,7 +241,7 @@ class Body {
   Size size() const;
   /// Empty if the model is not kNear.
   std::optional<NearModel::Size> near_field() const;
-  std::vector<Ladder::Step> ladder() const;
+  std::vector<FallbackModel::Step> fallbacks() const;
   /// `under_patch` is the number of nodes below the patch at `middle`. Throws the errors of the constructor.
   static Size size_of(const BodyConfig& config, int& under_patch);
 

@@ -172,8 +172,8 @@ Explanation explain(const Scene& scene, const std::function<double()>& processor
     out.parts.back().adds = Explanation::Cost{};
     bodies.push_back(without(config, effect.kind));
   }
-  const std::size_t first_rung = bodies.size();
-  for (const Ladder::Step& step : body.ladder()) {
+  const std::size_t first_level = bodies.size();
+  for (const FallbackModel::Step& step : body.fallbacks()) {
     out.learned.push_back({.size = step.size});
     bodies.push_back(config);
     (config.near.tabulate ? config.near.tabulate : config.near.learn) = false;
@@ -197,7 +197,7 @@ Explanation explain(const Scene& scene, const std::function<double()>& processor
     const Explanation::Cost& less = least[next++];
     part.adds = {out.all.answer_s - less.answer_s, out.all.bytes - less.bytes};
   }
-  for (std::size_t i = 0; i < out.learned.size(); ++i) out.learned[i].answer_s = least[first_rung + i].answer_s;
+  for (std::size_t i = 0; i < out.learned.size(); ++i) out.learned[i].answer_s = least[first_level + i].answer_s;
   if (!out.learned.empty()) out.near_answer_s = least.back().answer_s;
   return out;
 }
@@ -237,12 +237,14 @@ std::string in_words(const Scene& scene, const Explanation& explanation) {
          << 1e3 * facts.cell << " mm, " << static_cast<double>(facts.bytes) / 1e6 << " MB, computed in "
          << milliseconds(made_s, 0) << " of processor time; accuracy of the surface " << 1e3 * facts.error << " mm\n";
   }
-  for (const auto& [rung, answer_s] : explanation.learned) {
-    text << "answers, where accurate enough: " << rung.name << ", within "
-         << milliseconds(answer_s, explanation.resolution_s) << "; in " << rung.cells << " of " << rung.of_cells
-         << " cells, error up to " << std::setprecision(2) << 100 * rung.error << std::setprecision(6) << " %; ";
-    if (rung.shapes > 0) text << rung.shapes << " shapes, summed over " << rung.elements << " elements; ";
-    text << static_cast<double>(rung.bytes) / 1e6 << " MB\n";
+  for (const auto& [fallback_level, answer_s] : explanation.learned) {
+    text << "answers, where accurate enough: " << fallback_level.name << ", within "
+         << milliseconds(answer_s, explanation.resolution_s) << "; in " << fallback_level.cells << " of "
+         << fallback_level.of_cells << " cells, error up to " << std::setprecision(2) << 100 * fallback_level.error
+         << std::setprecision(6) << " %; ";
+    if (fallback_level.shapes > 0)
+      text << fallback_level.shapes << " shapes, summed over " << fallback_level.elements << " elements; ";
+    text << static_cast<double>(fallback_level.bytes) / 1e6 << " MB\n";
   }
   if (!explanation.learned.empty()) {
     text << "answers elsewhere: near field, within " << milliseconds(explanation.near_answer_s, 0) << '\n';
@@ -322,15 +324,15 @@ std::string in_json(const Scene& scene, const Explanation& explanation) {
                     {"bytes", tool->facts.bytes},   {"error_m", tool->facts.error},
                     {"made_s", tool->made_s}};
   }
-  for (const auto& [rung, answer_s] : explanation.learned) {
-    json["learned"].push_back({{"name", rung.name},
+  for (const auto& [fallback_level, answer_s] : explanation.learned) {
+    json["learned"].push_back({{"name", fallback_level.name},
                                {"answer_s", answer_s},
-                               {"cells", rung.cells},
-                               {"of_cells", rung.of_cells},
-                               {"error", rung.error},
-                               {"shapes", rung.shapes},
-                               {"elements", rung.elements},
-                               {"bytes", rung.bytes}});
+                               {"cells", fallback_level.cells},
+                               {"of_cells", fallback_level.of_cells},
+                               {"error", fallback_level.error},
+                               {"shapes", fallback_level.shapes},
+                               {"elements", fallback_level.elements},
+                               {"bytes", fallback_level.bytes}});
   }
   if (!explanation.learned.empty()) json["near"]["answer_s"] = explanation.near_answer_s;
   return json.dump(-1, ' ', false, Json::error_handler_t::replace) + '\n';

@@ -44,9 +44,9 @@ struct Explanation {
     std::size_t bytes = 0;
   };
   std::optional<Beside> beside;
-  /// The cost of an answer for each rung of the Ladder.
+  /// The cost of an answer for each level of the FallbackModel.
   struct Learned {
-    Rung::Size size;
+    FallbackLevel::Size size;
     double answer_s = 0;
   };
   std::vector<Learned> learned;

@@ -38,7 +38,7 @@ class PlacedBody {
   void prepare_by(Background background) { body_.prepare_by(std::move(background)); }
 
   std::optional<NearModel::Size> near_field() const { return body_.near_field(); }
-  std::vector<Ladder::Step> ladder() const { return body_.ladder(); }
+  std::vector<FallbackModel::Step> fallbacks() const { return body_.fallbacks(); }
   double linear_up_to() const { return body_.linear_up_to(); }
   double deepest() const noexcept { return deepest_; }  ///< m, greatest tool depth so far
 

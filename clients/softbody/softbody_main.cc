@@ -206,7 +206,7 @@ int main(int argc, char** argv) {
       options.client.ways.assign(softbody::kWayNames.begin(), softbody::kWayNames.end());
     }
     const int exit_code = answer(scene, options, body);
-    const softbody::Answered answered{body.ladder(), thread ? body.near_field() : std::nullopt};
+    const softbody::Answered answered{body.fallbacks(), thread ? body.near_field() : std::nullopt};
     if (options.json) {
       std::cout << in_json(answered);
     } else if (const std::string words = in_words(answered); !words.empty()) {

@@ -71,7 +71,7 @@ Coupling::Coupling(const Config& config)
       spring_(spring_of(config, frame_)),
       purse_(purse_of(config, frame_)),
       law_(coupling_law_of(config, frame_)),
-      ladder_(config.peer_period) {
+      loss_stages_(config.peer_period) {
   if (config.absolute) {
     expect_above_zero(config.absolute->within, "absolute.within");
     expect_not_negative(config.absolute->energy, "absolute.energy");
@@ -147,9 +147,9 @@ void Coupling::receive(const PortState& peer, LocalTime now) noexcept {
   if (grip_) grip_->receive(peer);
   if (anew) {
     peer_anew_ = true;
-    ladder_.forget(now);
+    loss_stages_.forget(now);
   }
-  ladder_.receive(now, !anew && phase_ != PortPhase::kLost && phase_ != PortPhase::kAlone);
+  loss_stages_.receive(now, !anew && phase_ != PortPhase::kLost && phase_ != PortPhase::kAlone);
   newest_ = peer;
 }
 
@@ -168,7 +168,7 @@ void Coupling::observe(const Interval<3>& interval, double payable) noexcept {
   given_ = line->withdraw;
 }
 
-bool Coupling::gives() const noexcept { return live() && !rung_.silent && newest_.phase == PortPhase::kEngaged; }
+bool Coupling::gives() const noexcept { return live() && !loss_stage_.silent && newest_.phase == PortPhase::kEngaged; }
 
 Purse::Settlement Coupling::settle(double payable, double loss, Duration elapsed) noexcept {
   loss_ = loss;

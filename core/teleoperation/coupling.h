@@ -12,7 +12,7 @@
 #include "core/teleoperation/methods/any_coupling_law.h"
 #include "core/teleoperation/phases/alignment.h"
 #include "core/teleoperation/phases/force_ramp.h"
-#include "core/teleoperation/phases/loss_ladder.h"
+#include "core/teleoperation/phases/loss_stages.h"
 #include "core/teleoperation/phases/phase_machine.h"
 
 namespace tendon {
@@ -56,7 +56,7 @@ namespace tendon {
 /// the new s_x, so that its mapped position does not change. The force changes within ForceRamp::kFade. The methods
 /// waves and passivity cannot change their scales (keeps_scales), and a coupling of grippers cannot do so either.
 ///
-/// **Loss of the peer** (LossLadder). If the peer is silent, the force decreases. If the peer is gone, the phase is
+/// **Loss of the peer** (LossStages). If the peer is silent, the force decreases. If the peer is gone, the phase is
 /// `lost` and the force is 0. A link with a delay of more than max_delay counts as lost. A robot (`holds_place`)
 /// holds its last position with a spring of K and B along all axes if it is ready and not live. The ramp blends this
 /// spring with the law. After a loss, the round trip is measured again, so that the spring of the next act does not
@@ -216,8 +216,8 @@ class Coupling {
   Duration elapsed_{};
 
   PortState newest_;  ///< of the peer; sequence 0: no state
-  LossLadder ladder_;
-  LossLadder::Rung rung_;
+  LossStages loss_stages_;
+  LossStages::Stage loss_stage_;
   bool peer_anew_ = false;  ///< the epoch has changed in this period
   std::uint64_t refused_ = 0;
 

@@ -13,7 +13,7 @@ namespace tendon {
 /// Returns true if the law computes the force.
 bool Coupling::driven() const noexcept {
   const bool holds = config_.holds_place && std::visit([](const auto& law) { return law.kHoldsSilent; }, law_);
-  return live() && (!rung_.silent || holds);
+  return live() && (!loss_stage_.silent || holds);
 }
 
 bool Coupling::rests_at_zero() const noexcept {
@@ -68,7 +68,7 @@ LawPeriod Coupling::law_period() const noexcept {
           .u = u_,
           .live = live(),
           .clutched = phase_ == PortPhase::kClutched,
-          .fresh = rung_.fresh,
+          .fresh = loss_stage_.fresh,
           .serves = peer_serves(),
           .payable = payable_,
           .stiffness = spring_.stiffness()};

@@ -39,20 +39,20 @@ void Coupling::advance(LocalTime now, std::uint32_t buttons, bool ready) noexcep
   now_ = now;
   ready_ = ready;
   ++sequence_;
-  rung_ = ladder_.at(now, heard(), round_trip() / 2 > config_.max_delay);
+  loss_stage_ = loss_stages_.at(now, heard(), round_trip() / 2 > config_.max_delay);
   if (std::exchange(peer_anew_, false)) {
     seen_ = 0;
     if (!leads()) engagement_ = 0;
     disengage();
   }
   take(ready ? PhaseInput::kReady : PhaseInput::kNotReady);
-  if (rung_.gone) {
+  if (loss_stage_.gone) {
     if (in_act()) lost_sequence_ = sequence_;
     take(PhaseInput::kGone);
   }
   // If there was a fault after the loss, the peer may still not know about the loss.
   const bool told = lost_sequence_ == 0 || heard_since(lost_sequence_);
-  if (rung_.fresh && told) {
+  if (loss_stage_.fresh && told) {
     take(PhaseInput::kHeard);
     if (phase_ != PortPhase::kFault && std::exchange(lost_sequence_, 0) > 0) spring_.forget_round_trip();
   }
@@ -89,7 +89,7 @@ void Coupling::advance_follower() noexcept {
   if (in_act() && !peer_serves()) take(PhaseInput::kEnd);
   const bool acted = is_in_act(newest_.phase);
   const bool ours = newest_.answers_epoch == config_.spring.epoch;
-  if (phase_ == PortPhase::kCoupled && rung_.fresh && acted && ours && newest_.engagement > seen_) {
+  if (phase_ == PortPhase::kCoupled && loss_stage_.fresh && acted && ours && newest_.engagement > seen_) {
     take(PhaseInput::kAct);
     engagement_ = newest_.engagement;
     new_act_ = true;
@@ -100,7 +100,7 @@ void Coupling::advance_follower() noexcept {
 bool Coupling::engage() noexcept {
   if (!leads()) return false;
   if (in_act() || phase_ == PortPhase::kAligning) return true;
-  if (phase_ != PortPhase::kCoupled || !rung_.fresh || !ready_ || !peer_is_ready()) return false;
+  if (phase_ != PortPhase::kCoupled || !loss_stage_.fresh || !ready_ || !peer_is_ready()) return false;
   if (!config_.absolute) {
     act();
     return true;
@@ -140,7 +140,7 @@ void Coupling::renew() noexcept {
   seen_ = 0;
   if (!leads()) engagement_ = 0;
   peer_anew_ = false;
-  ladder_.forget(now_);
+  loss_stages_.forget(now_);
   std::visit([](auto& law) { law.forget(); }, law_);
   if (frame_.rescale_as_scene()) follow_scales();
 }

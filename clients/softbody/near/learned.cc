@@ -500,13 +500,14 @@ std::size_t LearnedBody::bytes() const noexcept {
              sizeof(double);
 }
 
-LearnedRung::LearnedRung(const Solid& solid, const TouchSurface& surface, const LearnedShapes& shapes, double tolerance)
+LearnedLevel::LearnedLevel(const Solid& solid, const TouchSurface& surface, const LearnedShapes& shapes,
+                           double tolerance)
     : body_(solid, surface, shapes),
       trust_(shapes.grid, shapes.errors),
       allowed_(trust_, (1 - kForNewton) * tolerance),
       tolerance_(tolerance) {}
 
-std::optional<Rung::Answer> LearnedRung::press(const Patch& patch, double depth) const {
+std::optional<FallbackLevel::Answer> LearnedLevel::press(const Patch& patch, double depth) const {
   const auto point = trust_.grid().find(patch.middle, depth);
   if (!point) return std::nullopt;
   const double share = allowed_.share(*point);
@@ -517,12 +518,12 @@ std::optional<Rung::Answer> LearnedRung::press(const Patch& patch, double depth)
   return Answer{*reaction, share};
 }
 
-double LearnedRung::room(const Vec2& middle, double depth) const {
+double LearnedLevel::room(const Vec2& middle, double depth) const {
   const auto point = trust_.grid().find(middle, depth);
   return point ? allowed_.room(*point) : 0;
 }
 
-Rung::Size LearnedRung::size() const {
+FallbackLevel::Size LearnedLevel::size() const {
   Size size{.name = name_of(Way::kLearned),
             .shapes = body_.shapes(),
             .elements = body_.elements(),

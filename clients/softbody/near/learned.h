@@ -4,8 +4,8 @@
 #include <vector>
 
 #include "clients/softbody/fem/kernel.h"
+#include "clients/softbody/near/fallback_level.h"
 #include "clients/softbody/near/press_grid.h"
-#include "clients/softbody/near/rung.h"
 
 namespace tendon::softbody {
 
@@ -68,10 +68,10 @@ class LearnedBody {
   MatrixXd inverses_;
 };
 
-class LearnedRung : public Rung {
+class LearnedLevel : public FallbackLevel {
  public:
   /// `tolerance` is the accepted relative error of the force.
-  LearnedRung(const Solid& solid, const TouchSurface& surface, const LearnedShapes& shapes, double tolerance);
+  LearnedLevel(const Solid& solid, const TouchSurface& surface, const LearnedShapes& shapes, double tolerance);
 
   std::optional<Answer> press(const Patch& patch, double depth) const override;
   double room(const Vec2& middle, double depth) const override;

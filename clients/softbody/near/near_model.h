@@ -77,8 +77,8 @@ class NearModel : public Model {
   void make_no_more_fields();
 
   Reaction press(const Patch& patch, Given given, double value) override;
-  /// Must be called if a rung has answered. `room` is 0 at the border of the rung, and 1 if the border is far. If there
-  /// is no background thread, a field is built while `room` is less than 1, so that it is complete at 0.
+  /// Must be called if a level has answered. `room` is 0 at the border of the level, and 1 if the border is far. If
+  /// there is no background thread, a field is built while `room` is less than 1, so that it is complete at 0.
   void follow(const Patch& patch, const Reaction& felt, double room);
   void cut(const Division& division, const EffectsConfig& effects) override;
   /// The first answers use the cut body without a field. They are scaled by the nonlinear part of the last force.

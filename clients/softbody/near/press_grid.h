@@ -95,7 +95,7 @@ using Tell = std::function<void(std::string_view)>;
 SolvedPresses solve_presses(const Solid& solid, const TouchSurface& surface, const PressGrid& grid, bool glides,
                             const Tell& tell);
 
-/// The relative error of a rung in each cell.
+/// The relative error of a level in each cell.
 ///
 /// Thread-safe: yes, after construction. Realtime-safe: only Allowed::share() and room().
 class Trust {

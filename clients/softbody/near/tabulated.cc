@@ -199,13 +199,13 @@ TabulatedEnergy energy_at(const TabulatedAnswers& table, const PressGrid::Point&
   return all;
 }
 
-TabulatedRung::TabulatedRung(TabulatedAnswers table, double tolerance)
+TabulatedLevel::TabulatedLevel(TabulatedAnswers table, double tolerance)
     : table_(std::move(table)),
       trust_(table_.grid, table_.errors),
       allowed_(trust_, tolerance),
       tolerance_(tolerance) {}
 
-std::optional<Rung::Answer> TabulatedRung::press(const Patch& patch, double depth) const {
+std::optional<FallbackLevel::Answer> TabulatedLevel::press(const Patch& patch, double depth) const {
   const auto point = table_.grid.find(patch.middle, depth);
   if (!point) return std::nullopt;
   const double share = allowed_.share(*point);
@@ -231,12 +231,12 @@ std::optional<Rung::Answer> TabulatedRung::press(const Patch& patch, double dept
   return Answer{reaction, share};
 }
 
-double TabulatedRung::room(const Vec2& middle, double depth) const {
+double TabulatedLevel::room(const Vec2& middle, double depth) const {
   const auto point = table_.grid.find(middle, depth);
   return point ? allowed_.room(*point) : 0;
 }
 
-Rung::Size TabulatedRung::size() const {
+FallbackLevel::Size TabulatedLevel::size() const {
   Size size{.name = name_of(Way::kTabulated),
             .bytes = (table_.numbers.size() + table_.errors.size()) * sizeof(double),
             .cells = allowed_.cells(),

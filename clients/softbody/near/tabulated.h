@@ -5,8 +5,8 @@
 #include <optional>
 #include <vector>
 
+#include "clients/softbody/near/fallback_level.h"
 #include "clients/softbody/near/press_grid.h"
-#include "clients/softbody/near/rung.h"
 
 namespace tendon::softbody {
 
@@ -40,10 +40,10 @@ struct TabulatedEnergy {
 };
 TabulatedEnergy energy_at(const TabulatedAnswers& table, const PressGrid::Point& point);
 
-class TabulatedRung : public Rung {
+class TabulatedLevel : public FallbackLevel {
  public:
   /// `tolerance` is the accepted relative error of the force.
-  TabulatedRung(TabulatedAnswers table, double tolerance);
+  TabulatedLevel(TabulatedAnswers table, double tolerance);
 
   std::optional<Answer> press(const Patch& patch, double depth) const override;
   double room(const Vec2& middle, double depth) const override;

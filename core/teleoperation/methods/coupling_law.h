@@ -18,7 +18,7 @@ struct LawPeriod {
   Vec3 u;                 ///< The displacement of this end in m.
   bool live = false;
   bool clutched = false;
-  bool fresh = false;    ///< See LossLadder.
+  bool fresh = false;    ///< See LossStages.
   bool serves = false;   ///< The peer is engaged in the same act.
   double payable = 0;    ///< The energy in the account in J.
   double stiffness = 0;  ///< The stiffness of the common spring in N/m.

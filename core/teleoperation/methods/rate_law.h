@@ -14,7 +14,7 @@ namespace tendon {
 /// The spring of the follower has the stiffness K_f and pulls the tool to the reference. The distance between them is
 /// at most max_force/K_f. f cannot move the handle out of the dead zone, so a contact does not move the follower. The
 /// reference does not move if the handle is in the dead zone, if the leader is not live, or if its state is not fresh
-/// (LossLadder). The hand does no work while it holds the handle. A follower with a limiter therefore only moves as
+/// (LossStages). The hand does no work while it holds the handle. A follower with a limiter therefore only moves as
 /// long as its account pays for the friction that exceeds the lower bounds of the limiter.
 class RateLaw : public CouplingLaw {
  public:

@@ -13,7 +13,7 @@ namespace tendon {
 enum class PhaseInput : std::uint8_t {
   kNotReady,  ///< The device is missing, disarmed, or has a fault.
   kReady,     ///< The device is ready.
-  kGone,      ///< The link is lost (LossLadder).
+  kGone,      ///< The link is lost (LossStages).
   kHeard,     ///< The peer is fresh and knows about the loss.
   kAlign,     ///< The operator of a leader with an absolute map engages.
   kAct,       ///< The operator engages, the alignment is done, or the follower receives a new act.

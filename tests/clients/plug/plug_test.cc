@@ -77,7 +77,7 @@ TEST(Plug, AForceIsOnTheWireInTheTurnInWhichItWasAskedFor) {
   });
 }
 
-TEST(Plug, AForceThatIsTooOldIsNotSentAgainAndTheLadderLetsGo) {
+TEST(Plug, AForceThatIsTooOldIsNotSentAgainAndTheStagesLetsGo) {
   World world("demo_parts.toml");
   Plug& plug = world.add_plug();
   world.run(100);

@@ -18,10 +18,10 @@ TEST(Answered, SaysTheSameCountsInWordsAndInJson) {
             "were computed by the other thread, 1 of them were too late\n");
 }
 
-TEST(Answered, WithoutAnotherThreadThereAreRungsAlone) {
-  const Answered rungs{{{.size = {.name = "learned"}, .answers = 0}}, {}};
-  EXPECT_EQ(in_json(rungs), "{\"answers\":{\"learned\":0}}\n");
-  EXPECT_EQ(in_words(rungs), "0 answers were learned\n");
+TEST(Answered, WithoutAnotherThreadThereAreLevelsAlone) {
+  const Answered levels{{{.size = {.name = "learned"}, .answers = 0}}, {}};
+  EXPECT_EQ(in_json(levels), "{\"answers\":{\"learned\":0}}\n");
+  EXPECT_EQ(in_words(levels), "0 answers were learned\n");
 }
 
 TEST(Answered, ABodyWithoutEitherHasNothingToSay) {

@@ -175,7 +175,7 @@ void learned(benchmark::State& state, Law law, bool tabulate) {
       wrong = std::max(wrong, std::abs(feel.force.z() / truth.touch(tool).force.z() - 1));
     }
   }
-  const Ladder::Step step = body.ladder().front();
+  const FallbackModel::Step step = body.fallbacks().front();
   std::ranges::sort(times);
   state.counters["answers"] = static_cast<double>(times.size());
   state.counters["by_it"] = step.answers;

@@ -46,7 +46,7 @@ struct Ladder {
   std::vector<PortPhase> phases;
 };
 
-TEST(Coupling, TheLadderOfAHandHasItsRungsWithinAPeriod) {
+TEST(Coupling, TheLadderOfAHandHasItsStagesWithinAPeriod) {
   const Ladder ladder;
   const auto& force = ladder.forces;
   EXPECT_NEAR(force[20] - force[19], 400 * 0.1e-3, 0.01) << "carried on with its velocity";
@@ -99,7 +99,7 @@ TEST(Coupling, TheLadderForgetsALongGapAfterTenSeconds) {
   EXPECT_EQ(phase(ports.follower), PortPhase::kLost) << "lately: that gap is forgotten";
 }
 
-TEST(Coupling, AStateBeforeTheLastRungRampsTheForceInAgain) {
+TEST(Coupling, AStateBeforeTheLastStageRampsTheForceInAgain) {
   PortSetup leader = port_of(PortRole::kLeader);
   PortSetup follower = port_of(PortRole::kFollower);
   leader.path = [](double t) { return Vec3(t < 0.5 ? 0 : 0.01, 0, 0); };

@@ -10,7 +10,7 @@
 #include "core/teleoperation/phases/alignment.h"
 #include "core/teleoperation/phases/clutch.h"
 #include "core/teleoperation/phases/force_ramp.h"
-#include "core/teleoperation/phases/loss_ladder.h"
+#include "core/teleoperation/phases/loss_stages.h"
 #include "core/teleoperation/phases/phase_machine.h"
 
 namespace tendon::coupling_phases_test {
@@ -69,33 +69,33 @@ TEST(PhaseMachine, ComesToAnActByAnActAlone) {
   }
 }
 
-TEST(LossLadder, TrustsAStateForLongerWhereGapsAreLong) {
-  LossLadder ladder(1ms);
+TEST(LossStages, TrustsAStateForLongerWhereGapsAreLong) {
+  LossStages stages(1ms);
   const LocalTime start(10s);
-  EXPECT_FALSE(ladder.at(start, false, false).fresh);
-  EXPECT_TRUE(ladder.at(start, false, false).gone);
-  ladder.receive(start, false);
-  EXPECT_EQ(ladder.patience(), 20ms);
-  EXPECT_TRUE(ladder.at(start + 20ms, true, false).fresh);
-  EXPECT_FALSE(ladder.at(start + 21ms, true, false).fresh);
-  EXPECT_FALSE(ladder.at(start + 40ms, true, false).silent);
-  EXPECT_TRUE(ladder.at(start + 41ms, true, false).silent);
-  EXPECT_FALSE(ladder.at(start + 270ms, true, false).gone);
-  EXPECT_TRUE(ladder.at(start + 271ms, true, false).gone);
-  ladder.receive(start + 30ms, true);
-  EXPECT_EQ(ladder.patience(), 60ms);
-  ladder.receive(start + 1s, true);
-  EXPECT_EQ(ladder.patience(), 200ms) << "a longer gap counts as 100 ms";
-  ladder.forget(start + 1s);
-  EXPECT_EQ(ladder.patience(), 20ms);
+  EXPECT_FALSE(stages.at(start, false, false).fresh);
+  EXPECT_TRUE(stages.at(start, false, false).gone);
+  stages.receive(start, false);
+  EXPECT_EQ(stages.patience(), 20ms);
+  EXPECT_TRUE(stages.at(start + 20ms, true, false).fresh);
+  EXPECT_FALSE(stages.at(start + 21ms, true, false).fresh);
+  EXPECT_FALSE(stages.at(start + 40ms, true, false).silent);
+  EXPECT_TRUE(stages.at(start + 41ms, true, false).silent);
+  EXPECT_FALSE(stages.at(start + 270ms, true, false).gone);
+  EXPECT_TRUE(stages.at(start + 271ms, true, false).gone);
+  stages.receive(start + 30ms, true);
+  EXPECT_EQ(stages.patience(), 60ms);
+  stages.receive(start + 1s, true);
+  EXPECT_EQ(stages.patience(), 200ms) << "a longer gap counts as 100 ms";
+  stages.forget(start + 1s);
+  EXPECT_EQ(stages.patience(), 20ms);
 }
 
-TEST(LossLadder, HasAllRungsAtOnceOnALinkThatIsTooLong) {
-  LossLadder ladder(1ms);
-  ladder.receive(LocalTime(1s), false);
-  const LossLadder::Rung rung = ladder.at(LocalTime(1s), true, true);
-  EXPECT_FALSE(rung.fresh);
-  EXPECT_TRUE(rung.silent && rung.gone);
+TEST(LossStages, HasAllStagesAtOnceOnALinkThatIsTooLong) {
+  LossStages stages(1ms);
+  stages.receive(LocalTime(1s), false);
+  const LossStages::Stage stage = stages.at(LocalTime(1s), true, true);
+  EXPECT_FALSE(stage.fresh);
+  EXPECT_TRUE(stage.silent && stage.gone);
 }
 
 TEST(Clutch, IsHeldOrToggled) {

@@ -293,7 +293,7 @@ TEST(Ros2, AReaderOfRosLocalhostOnlyThatAsksNobodyIsFound) {
 
 // ---- Forces ---------------------------------------------------------------------------------------------------------
 
-TEST(Ros2, AWrenchIsFeltAndItsEndLeavesTheHandToTheLadder) {
+TEST(Ros2, AWrenchIsFeltAndItsEndLeavesTheHandToTheStages) {
   Room room;
   Peer peer(room.folder, room.domain,
             {"--read", "wrench", "--wrench", "0,0.3,0,0.01,0,0", "--frame", "device_base", "--wrench-for-s", "2.5"});

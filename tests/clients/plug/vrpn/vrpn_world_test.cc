@@ -179,7 +179,7 @@ TEST(VrpnWorld, EveryStateIsOnePoseAndNoForceIsAskedForByOneThatWatches) {
   EXPECT_FALSE(stage.plug.pushes());
 }
 
-TEST(VrpnWorld, AFrozenProgramIsNotFeltAfterItsStaleTimeAndTheLadder) {
+TEST(VrpnWorld, AFrozenProgramIsNotFeltAfterItsStaleTimeAndTheStages) {
   Stage stage("left.toml", kStill);
   stage.push(400, Vec3(0, 1, 0));
   ASSERT_NEAR(stage.world.step.applied.y(), 1, 1e-6);

@@ -13,7 +13,7 @@
 #include <utility>
 #include <vector>
 
-#include "clients/softbody/near/ladder.h"
+#include "clients/softbody/near/fallback_model.h"
 #include "clients/softbody/touch/contact.h"
 #include "core/ledger/energy_ledger.h"
 #include "tests/clients/softbody/elsewhere.h"
@@ -35,25 +35,25 @@ constexpr double kAllowed = 0.01;
 /// Limit for ten thousand paths together, in units of the gain allowed for one path.
 constexpr double kMostTogether = 10;
 
-/// A body with a table that covers half of the learned shapes, so that every model of the ladder answers.
+/// A body with a table that covers half of the learned shapes, so that every model of the fallbacks answers.
 struct Climbed {
-  Climbed(const PressedBefore& block, bool by_thread, bool with_rungs = true) {
+  Climbed(const PressedBefore& block, bool by_thread, bool with_levels = true) {
     auto made = block.near(5e-3);
     near = made.get();
     if (by_thread) near->make_fields_by(thread.background());
     std::vector<double> errors = block.answers.errors;
     std::ranges::nth_element(errors, errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 2));
-    std::vector<std::unique_ptr<Rung>> rungs;
-    if (with_rungs) {
-      rungs.push_back(block.tabulated(errors[errors.size() / 2]));
-      rungs.push_back(block.learned(0.02));
+    std::vector<std::unique_ptr<FallbackLevel>> levels;
+    if (with_levels) {
+      levels.push_back(block.tabulated(errors[errors.size() / 2]));
+      levels.push_back(block.learned(0.02));
     }
-    ladder = std::make_unique<Ladder>(std::move(rungs), std::move(made));
-    contact = std::make_unique<PatchContact>(*ladder, block.top, 0, PatchContact::Side::kUnilateral);
+    fallbacks = std::make_unique<FallbackModel>(std::move(levels), std::move(made));
+    contact = std::make_unique<PatchContact>(*fallbacks, block.top, 0, PatchContact::Side::kUnilateral);
   }
   Elsewhere thread;
   NearModel* near = nullptr;
-  std::unique_ptr<Ladder> ladder;
+  std::unique_ptr<FallbackModel> fallbacks;
   std::unique_ptr<PatchContact> contact;
 };
 
@@ -171,7 +171,8 @@ Account expect_nothing_given(Fields fields, int ways, const Most& most) {
     EXPECT_LE(all.most_kept, most.given);
     EXPECT_LE(all.given_together(), most.together);
     // Every model has answered, and near fields have changed.
-    for (const Ladder::Step& step : body.ladder->steps()) EXPECT_GT(step.answers, 10 * ways) << step.size.name;
+    for (const FallbackModel::Step& step : body.fallbacks->steps())
+      EXPECT_GT(step.answers, 10 * ways) << step.size.name;
     const NearModel::Size near = body.near->size();
     EXPECT_EQ(near.radius > 0, fields != Fields::kNone);
     if (fields != Fields::kNone) {

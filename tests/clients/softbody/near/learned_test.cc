@@ -22,12 +22,12 @@ constexpr Law kBothLaws[] = {Law::kNeoHookean, Law::kCorotational};
 TEST(LearnedShapes, PressesBetweenAreWithinTheErrorSaidAndTwoPercent) {
   for (const Law law : kBothLaws) {
     PressedBefore& block = small_block(law);
-    const auto rung = block.learned(0.02);
+    const auto fallback_level = block.learned(0.02);
     Dice dice(1);
     for (int i = 0; i < 60; ++i) {
       const Vec2 place(dice.within(-0.005, 0.005), dice.within(-0.005, 0.005));
       const double depth = dice.within(1e-4, 0.0055);
-      const auto found = rung->press(*block.top.patch_with_curvatures(place), depth);
+      const auto found = fallback_level->press(*block.top.patch_with_curvatures(place), depth);
       ASSERT_TRUE(found) << i;
       EXPECT_EQ(found->share, 1) << i;
       const double truth = block.truth(place, depth);
@@ -58,9 +58,9 @@ TEST(LearnedShapes, AnAnswerBeginsNextToItsShape) {
 
 TEST(LearnedShapes, ASmallPressIsThatOfTheWholeLinearBody) {
   PressedBefore& block = small_block(Law::kNeoHookean);
-  const auto rung = block.learned(0.02);
+  const auto fallback_level = block.learned(0.02);
   const Vec2 place(0.0013, -0.0021);
-  const Reaction found = rung->press(*block.top.patch_with_curvatures(place), 1e-7)->reaction;
+  const Reaction found = fallback_level->press(*block.top.patch_with_curvatures(place), 1e-7)->reaction;
   const Reaction truth = block.exact.press(*block.top.patch_with_curvatures(place), Given::kDepth, 1e-7);
   EXPECT_NEAR(found.stiffness, truth.stiffness, 3e-3 * truth.stiffness);
   EXPECT_NEAR(found.force, truth.force, 3e-3 * truth.force);
@@ -97,9 +97,9 @@ TEST(LearnedShapes, TheForcesAreTheSlopesOfTheReducedEnergy) {
 
 TEST(LearnedShapes, OutsideOfWhatWasLearnedThereIsNoAnswer) {
   PressedBefore& block = small_block(Law::kNeoHookean);
-  const auto rung = block.learned(0.1);
+  const auto fallback_level = block.learned(0.1);
   const auto answers = [&](const Vec2& place, double depth) {
-    return rung->press(*block.top.patch_with_curvatures(place), depth).has_value();
+    return fallback_level->press(*block.top.patch_with_curvatures(place), depth).has_value();
   };
   EXPECT_TRUE(answers(Vec2::Zero(), 0.003));
   EXPECT_FALSE(answers(Vec2(0.0101, 0), 0.003));
@@ -111,10 +111,10 @@ TEST(LearnedShapes, OutsideOfWhatWasLearnedThereIsNoAnswer) {
 
 TEST(LearnedShapes, TowardsTheRimOfWhatWasLearnedTheirShareFallsToNothing) {
   PressedBefore& block = small_block(Law::kNeoHookean);
-  const auto rung = block.learned(0.1);
+  const auto fallback_level = block.learned(0.1);
   double last = 1;
   for (const double x : {0.0049, 0.006, 0.0075, 0.009, 0.0099}) {
-    const auto answer = rung->press(*block.top.patch_with_curvatures(Vec2(x, 0)), 0.003);
+    const auto answer = fallback_level->press(*block.top.patch_with_curvatures(Vec2(x, 0)), 0.003);
     ASSERT_TRUE(answer);
     EXPECT_NEAR(answer->share, x < 0.005 ? 1 : (0.01 - x) / 0.005, 1e-9);
     EXPECT_LE(answer->share, last);
@@ -128,11 +128,11 @@ TEST(LearnedShapes, WhereASolutionWasNotGoodNothingIsAnswered) {
   SolvedPress& bad = presses.knots[static_cast<std::size_t>(presses.grid.knot(2, 2, 3))];
   bad.good = false;
   bad.shape = VectorXd();
-  const LearnedRung rung(block.solid, block.top, learn_shapes(block.solid, block.top, presses, {}), 0.02);
+  const LearnedLevel fallback_level(block.solid, block.top, learn_shapes(block.solid, block.top, presses, {}), 0.02);
   const double step = presses.grid.step;
-  EXPECT_FALSE(rung.press(*block.top.patch(Vec2::Zero()), 3 * step));
-  EXPECT_LT(rung.press(*block.top.patch(Vec2::Zero()), 1.5 * step)->share, 1);
-  EXPECT_EQ(rung.press(*block.top.patch(Vec2::Zero()), 0.9 * step)->share, 1);
+  EXPECT_FALSE(fallback_level.press(*block.top.patch(Vec2::Zero()), 3 * step));
+  EXPECT_LT(fallback_level.press(*block.top.patch(Vec2::Zero()), 1.5 * step)->share, 1);
+  EXPECT_EQ(fallback_level.press(*block.top.patch(Vec2::Zero()), 0.9 * step)->share, 1);
 }
 
 /// A wrong force at one knot invalidates only the eight cells around it.
@@ -141,9 +141,9 @@ TEST(LearnedShapes, WhereTheForcesAreNotThoseThatWereSolvedNothingIsAnswered) {
   SolvedPresses presses = block.presses;
   SolvedPress& wrong = presses.knots[static_cast<std::size_t>(presses.grid.knot(2, 2, 3))];
   wrong.reaction.force *= 1.1;
-  const LearnedRung rung(block.solid, block.top, learn_shapes(block.solid, block.top, presses, {}), 0.02);
-  EXPECT_FALSE(rung.press(*block.top.patch(Vec2::Zero()), 3 * presses.grid.step));
-  EXPECT_EQ(rung.size().cells, rung.size().of_cells - 8);
+  const LearnedLevel fallback_level(block.solid, block.top, learn_shapes(block.solid, block.top, presses, {}), 0.02);
+  EXPECT_FALSE(fallback_level.press(*block.top.patch(Vec2::Zero()), 3 * presses.grid.step));
+  EXPECT_EQ(fallback_level.size().cells, fallback_level.size().of_cells - 8);
 }
 
 TEST(LearnedShapes, ASmallerErrorIsAskedForInFewerCells) {

@@ -285,16 +285,16 @@ TEST(NearCut, WhatWasLearnedOfTheUncutBodyAnswersNoCutOne) {
     Body body(config);
     Elsewhere thread;
     if (beside) body.prepare_by(thread.background());
-    ASSERT_EQ(body.ladder().size(), 2U);
+    ASSERT_EQ(body.fallbacks().size(), 2U);
     const double whole = body.touch(tool).force.z();
-    EXPECT_EQ(body.ladder()[0].answers, 1);
+    EXPECT_EQ(body.fallbacks()[0].answers, 1);
     body.tick(1);
     thread.work();
     for (int i = 0; i < 5; ++i) {
       const Feel feel = body.touch(tool);
       const double expected = truth.exact.press(*truth.top.patch(tool.head<2>()), Given::kDepth, 3e-3).force;
       EXPECT_EQ(feel.topology_changed, i == 0);
-      EXPECT_TRUE(body.ladder().empty());
+      EXPECT_TRUE(body.fallbacks().empty());
       EXPECT_LT(feel.force.z(), 0.99 * whole);
       EXPECT_GE(feel.error, std::abs(feel.force.z() - expected)) << beside << ' ' << i;
       thread.work();

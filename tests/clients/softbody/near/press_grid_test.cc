@@ -98,7 +98,7 @@ TEST(SolvedPresses, WithoutGlidesForceAndShapeAreAsGoodAndNothingIsTabulated) {
     EXPECT_NEAR(press.reaction.force, with.reaction.force, 1e-5 * with.reaction.force);
     EXPECT_NEAR((press.shape - with.shape).norm(), 0, 1e-4 * with.shape.norm());
   }
-  EXPECT_EQ(TabulatedRung(tabulate(without), 0.02).size().cells, 0);
+  EXPECT_EQ(TabulatedLevel(tabulate(without), 0.02).size().cells, 0);
 }
 
 TEST(SolvedPresses, EachPressIsToldOfAndHowManyThereWillBe) {

@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "clients/softbody/near/ladder.h"
+#include "clients/softbody/near/fallback_model.h"
 #include "clients/softbody/near/learn.h"
 #include "tests/clients/softbody/drawn_answers.h"
 #include "tests/clients/softbody/pressed_block.h"
@@ -25,11 +25,11 @@ struct PressedBefore : AskedAndExact {
     return std::make_unique<NearModel>(solid, top, *top.patch(Vec2::Zero()),
                                        NearModel::Config{.newton = {.max_iterations = 100, .tolerance = tolerance}});
   }
-  std::unique_ptr<Rung> learned(double tolerance) const {
-    return std::make_unique<LearnedRung>(solid, top, shapes, tolerance);
+  std::unique_ptr<FallbackLevel> learned(double tolerance) const {
+    return std::make_unique<LearnedLevel>(solid, top, shapes, tolerance);
   }
-  std::unique_ptr<Rung> tabulated(double tolerance) const {
-    return std::make_unique<TabulatedRung>(answers, tolerance);
+  std::unique_ptr<FallbackLevel> tabulated(double tolerance) const {
+    return std::make_unique<TabulatedLevel>(answers, tolerance);
   }
   double truth(const Vec2& place, double depth) { return exact.press(*top.patch(place), Given::kDepth, depth).force; }
 

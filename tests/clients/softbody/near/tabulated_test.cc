@@ -20,11 +20,11 @@ constexpr Law kBothLaws[] = {Law::kNeoHookean, Law::kCorotational};
 TEST(TabulatedAnswers, AKnotHasWhatWasSolvedThere) {
   PressedBefore& block = small_block(Law::kNeoHookean);
   const PressGrid& grid = block.presses.grid;
-  const auto rung = block.tabulated(0.1);
+  const auto fallback_level = block.tabulated(0.1);
   for (const int level : {1, 3, 4}) {
     const Vec2 place = grid.place(1, 2);
     const Reaction& solved = block.presses.knots[static_cast<std::size_t>(grid.knot(1, 2, level))].reaction;
-    const Reaction found = rung->press(*block.top.patch_with_curvatures(place), level * grid.step)->reaction;
+    const Reaction found = fallback_level->press(*block.top.patch_with_curvatures(place), level * grid.step)->reaction;
     EXPECT_NEAR(found.force, solved.force, 1e-9 * solved.force);
     EXPECT_NEAR(found.stiffness, solved.stiffness, 1e-9 * solved.stiffness);
     EXPECT_LT((found.slope - solved.slope).norm(), 1e-9);
@@ -64,13 +64,13 @@ TEST(TabulatedAnswers, ForceAndStiffnessAreTheSlopesOfOneEnergy) {
 TEST(TabulatedAnswers, PressesBetweenAreWithinTheErrorSaidAndTwoPercent) {
   for (const Law law : kBothLaws) {
     PressedBefore& block = small_block(law);
-    const auto rung = block.tabulated(0.02);
+    const auto fallback_level = block.tabulated(0.02);
     Dice dice(2);
     int covered = 0;
     for (int i = 0; i < 100; ++i) {
       const Vec2 place(dice.within(-0.005, 0.005), dice.within(-0.005, 0.005));
       const double depth = dice.within(1e-4, 0.0055);
-      const auto found = rung->press(*block.top.patch_with_curvatures(place), depth);
+      const auto found = fallback_level->press(*block.top.patch_with_curvatures(place), depth);
       ASSERT_TRUE(found) << i;
       const double truth = block.truth(place, depth);
       EXPECT_NEAR(found->reaction.force, truth, 0.02 * truth) << i;
@@ -83,10 +83,10 @@ TEST(TabulatedAnswers, PressesBetweenAreWithinTheErrorSaidAndTwoPercent) {
 /// On closed paths through many cells, a contact returns all energy, up to the error of the numerical integration.
 TEST(TabulatedAnswers, AClosedWayGivesNothing) {
   PressedBefore& block = small_block(Law::kNeoHookean);
-  std::vector<std::unique_ptr<Rung>> rungs;
-  rungs.push_back(block.tabulated(0.1));
-  Ladder ladder(std::move(rungs), block.near(0.02));
-  PatchContact contact(ladder, block.top, 0, PatchContact::Side::kUnilateral);
+  std::vector<std::unique_ptr<FallbackLevel>> levels;
+  levels.push_back(block.tabulated(0.1));
+  FallbackModel fallbacks(std::move(levels), block.near(0.02));
+  PatchContact contact(fallbacks, block.top, 0, PatchContact::Side::kUnilateral);
   constexpr int kSteps = 2000;
   for (const double tilt : {0.0, 0.7}) {
     double work = 0;
@@ -108,17 +108,17 @@ TEST(TabulatedAnswers, AClosedWayGivesNothing) {
     }
     EXPECT_LT(std::abs(work), 1e-5 * most);
   }
-  EXPECT_EQ(ladder.steps().front().answers, 2 * (kSteps + 1));
+  EXPECT_EQ(fallbacks.steps().front().answers, 2 * (kSteps + 1));
 }
 
 TEST(TabulatedAnswers, AKnotThatWasNotSolvedIsNotTabulated) {
   PressedBefore& block = small_block(Law::kNeoHookean);
   SolvedPresses presses = block.presses;
   presses.knots[static_cast<std::size_t>(presses.grid.knot(2, 2, 3))].good = false;
-  const TabulatedRung rung(tabulate(presses), 0.1);
-  EXPECT_FALSE(rung.press(*block.top.patch(Vec2::Zero()), 3 * presses.grid.step));
-  EXPECT_TRUE(rung.press(*block.top.patch(Vec2::Zero()), presses.grid.step));
-  EXPECT_EQ(rung.size().cells, rung.size().of_cells - 8);
+  const TabulatedLevel fallback_level(tabulate(presses), 0.1);
+  EXPECT_FALSE(fallback_level.press(*block.top.patch(Vec2::Zero()), 3 * presses.grid.step));
+  EXPECT_TRUE(fallback_level.press(*block.top.patch(Vec2::Zero()), presses.grid.step));
+  EXPECT_EQ(fallback_level.size().cells, fallback_level.size().of_cells - 8);
 }
 
 }  // namespace

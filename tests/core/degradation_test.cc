@@ -15,12 +15,12 @@
 
 #include "core/haptic_controller.h"
 
-namespace tendon::ladder_test {
+namespace tendon::degradation_test {
 namespace {
 
 using std::chrono::milliseconds;
 
-struct Rung {
+struct Stage {
   std::string name;
   bool after_validity = false;  ///< "v + 20 ms": counted from the end of validity, not from the arrival of the force
   Duration entered{};
@@ -33,42 +33,42 @@ Duration milliseconds_in(const std::string& cell) {
   return std::regex_search(cell, found, std::regex("([0-9]+) ms")) ? milliseconds(std::stol(found[1])) : Duration{};
 }
 
-std::vector<Rung> table() {
+std::vector<Stage> table() {
   std::ifstream page(TENDON_SESSION_MD);
   EXPECT_TRUE(page.is_open()) << TENDON_SESSION_MD;
   const std::regex row(R"(^\| ([^|]+) \| ([^|]+) \| ([0-9]) [^|]+ \| ([^|]+) \|$)");
-  std::vector<Rung> rungs;
+  std::vector<Stage> stages;
   bool here = false;
   for (std::string line; std::getline(page, line);) {
     if (line.rfind("## ", 0) == 0) here = line == "## When forces stop coming";
     std::smatch cells;
     if (!here || !std::regex_match(line, cells, row)) continue;
-    rungs.push_back({.name = cells[1],
-                     .after_validity = cells[2].str().find("v +") != std::string::npos,
-                     .entered = milliseconds_in(cells[2]),
-                     .mode = static_cast<Mode>(std::stoi(cells[3])),
-                     .time_constant = milliseconds_in(cells[4])});
+    stages.push_back({.name = cells[1],
+                      .after_validity = cells[2].str().find("v +") != std::string::npos,
+                      .entered = milliseconds_in(cells[2]),
+                      .mode = static_cast<Mode>(std::stoi(cells[3])),
+                      .time_constant = milliseconds_in(cells[4])});
   }
-  return rungs;
+  return stages;
 }
 
-const Rung& rung(const std::vector<Rung>& rungs, const std::string& name) {
-  const auto found = std::find_if(rungs.begin(), rungs.end(), [&](const Rung& r) { return r.name == name; });
-  if (found == rungs.end()) throw std::runtime_error("SESSION.md has no rung \"" + name + "\"");
+const Stage& stage(const std::vector<Stage>& stages, const std::string& name) {
+  const auto found = std::find_if(stages.begin(), stages.end(), [&](const Stage& r) { return r.name == name; });
+  if (found == stages.end()) throw std::runtime_error("SESSION.md has no stage \"" + name + "\"");
   return *found;
 }
 
-TEST(Ladder, TheTimesOfThePageAreThoseOfTheCode) {
-  const auto rungs = table();
+TEST(Degradation, TheTimesOfThePageAreThoseOfTheCode) {
+  const auto stages = table();
   const HeldForce::Config code;
-  EXPECT_EQ(rungs.size(), 6U);
-  EXPECT_EQ(rung(rungs, "fresh").entered, Duration{});
-  EXPECT_EQ(rung(rungs, "local model").entered, Duration{});
-  EXPECT_EQ(rung(rungs, "hold").entered, Duration{});
-  EXPECT_EQ(rung(rungs, "decay").entered, code.hold);
-  EXPECT_EQ(rung(rungs, "decay").time_constant, code.decay);
-  EXPECT_EQ(rung(rungs, "safe stop").entered, code.safe_stop);
-  EXPECT_EQ(rung(rungs, "re-engage").time_constant, code.ramp_in);
+  EXPECT_EQ(stages.size(), 6U);
+  EXPECT_EQ(stage(stages, "fresh").entered, Duration{});
+  EXPECT_EQ(stage(stages, "local model").entered, Duration{});
+  EXPECT_EQ(stage(stages, "hold").entered, Duration{});
+  EXPECT_EQ(stage(stages, "decay").entered, code.hold);
+  EXPECT_EQ(stage(stages, "decay").time_constant, code.decay);
+  EXPECT_EQ(stage(stages, "safe stop").entered, code.safe_stop);
+  EXPECT_EQ(stage(stages, "re-engage").time_constant, code.ramp_in);
 }
 
 class Walk : public ::testing::Test {
@@ -107,17 +107,17 @@ class Walk : public ::testing::Test {
   }
   static double depth(int ms) { return 4e-3 + 2e-6 * ms; }
 
-  std::vector<Rung> rungs_ = table();
+  std::vector<Stage> stages_ = table();
   std::vector<Step> steps_;
 };
 
-TEST_F(Walk, EachRungIsEnteredAtItsTime) {
+TEST_F(Walk, EachStageIsEnteredAtItsTime) {
   std::map<Mode, int> lasted;  // ms
   for (const Step& step : steps_) {
     if (step.force_sequence == 0) continue;
-    Mode expected = rung(rungs_, "fresh").mode;
+    Mode expected = stage(stages_, "fresh").mode;
     for (const char* name : {"hold", "decay", "safe stop"}) {
-      const Rung& next = rung(rungs_, name);
+      const Stage& next = stage(stages_, name);
       ASSERT_TRUE(next.after_validity) << name;
       // The safe stop begins at its time, and the other stages after it.
       const Duration from = kValid + next.entered;
@@ -127,9 +127,9 @@ TEST_F(Walk, EachRungIsEnteredAtItsTime) {
     ASSERT_EQ(step.mode, expected) << "force " << seconds(step.force_age) << " s old";
     if (step.hand.at < LocalTime(milliseconds(kBack))) ++lasted[expected];
   }
-  EXPECT_EQ(lasted[rung(rungs_, "hold").mode], 20);
-  EXPECT_EQ(lasted[rung(rungs_, "decay").mode], 229);  // ages 81 … 309 ms
-  EXPECT_GT(lasted[rung(rungs_, "safe stop").mode], 600);
+  EXPECT_EQ(lasted[stage(stages_, "hold").mode], 20);
+  EXPECT_EQ(lasted[stage(stages_, "decay").mode], 229);  // ages 81 … 309 ms
+  EXPECT_GT(lasted[stage(stages_, "safe stop").mode], 600);
 }
 
 TEST_F(Walk, NoStepOfTheForceExceedsTheSlewBound) {
@@ -152,14 +152,14 @@ TEST_F(Walk, TheForceFollowsItsModelUntilItFadesAndComesBackOnARamp) {
   EXPECT_NEAR(-at(1040).wanted.x(), wall(1040), 1e-9);
   EXPECT_NEAR(-at(1065).wanted.x(), wall(1065), 1e-9);
   // Decay starts v + 20 ms = 80 ms after 990 ms.
-  const double decay = seconds(rung(rungs_, "decay").time_constant);
+  const double decay = seconds(stage(stages_, "decay").time_constant);
   EXPECT_NEAR(-at(1150).wanted.x(), wall(1150) * std::exp(-0.080 / decay), 1e-9);
   EXPECT_EQ(at(1500).wanted.norm(), 0);
   EXPECT_EQ(at(1999).wanted.norm(), 0);
-  const double ramp = seconds(rung(rungs_, "re-engage").time_constant);
+  const double ramp = seconds(stage(stages_, "re-engage").time_constant);
   EXPECT_NEAR(-at(2025).wanted.x(), wall(2025) * 0.025 / ramp, 1e-9);
   EXPECT_NEAR(-at(2200).wanted.x(), wall(2200), 1e-9);
 }
 
 }  // namespace
-}  // namespace tendon::ladder_test
+}  // namespace tendon::degradation_test

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "clients/softbody/near/ladder.h"
+#include "clients/softbody/near/fallback_model.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,16 +7,16 @@
 
 namespace tendon::softbody {
 
-Ladder::Ladder(std::vector<std::unique_ptr<Rung>> rungs, std::unique_ptr<NearModel> near)
-    : rungs_(std::move(rungs)), answers_(rungs_.size()), near_(std::move(near)) {}
+FallbackModel::FallbackModel(std::vector<std::unique_ptr<FallbackLevel>> levels, std::unique_ptr<NearModel> near)
+    : levels_(std::move(levels)), answers_(levels_.size()), near_(std::move(near)) {}
 
-Reaction Ladder::press(const Patch& patch, Given given, double value) {
+Reaction FallbackModel::press(const Patch& patch, Given given, double value) {
   if (given == Given::kForce || patch.nodes.empty()) return near_->press(patch, given, value);
-  std::vector<Rung::Answer> answers;
+  std::vector<FallbackLevel::Answer> answers;
   bool whole = false;
-  for (std::size_t i = 0; i < rungs_.size() && !whole; ++i) {
-    const auto answer = rungs_[i]->press(patch, value);
-    // A rung may pull.
+  for (std::size_t i = 0; i < levels_.size() && !whole; ++i) {
+    const auto answer = levels_[i]->press(patch, value);
+    // A level may pull.
     if (!answer || (given == Given::kLeastDepth && answer->reaction.force < 0)) continue;
     ++answers_[i];
     answers.push_back(*answer);
@@ -31,31 +31,31 @@ Reaction Ladder::press(const Patch& patch, Given given, double value) {
   return felt;
 }
 
-double Ladder::room(const Patch& patch, double depth) const {
+double FallbackModel::room(const Patch& patch, double depth) const {
   double most = 0;
-  for (const auto& rung : rungs_) most = std::max(most, rung->room(patch.middle, depth));
+  for (const auto& fallback_level : levels_) most = std::max(most, fallback_level->room(patch.middle, depth));
   return most;
 }
 
-void Ladder::cut(const Division& division, const EffectsConfig& effects) {
-  rungs_.clear();
+void FallbackModel::cut(const Division& division, const EffectsConfig& effects) {
+  levels_.clear();
   answers_.clear();
   near_->cut(division, effects);
 }
 
-void Ladder::go_on_from(const Model& before, std::span<const int> node_before) {
-  near_->go_on_from(*static_cast<const Ladder&>(before).near_, node_before);  // same kind by contract
+void FallbackModel::go_on_from(const Model& before, std::span<const int> node_before) {
+  near_->go_on_from(*static_cast<const FallbackModel&>(before).near_, node_before);  // same kind by contract
 }
 
-std::vector<Ladder::Step> Ladder::steps() const {
+std::vector<FallbackModel::Step> FallbackModel::steps() const {
   std::vector<Step> all;
-  for (std::size_t i = 0; i < rungs_.size(); ++i) all.push_back({rungs_[i]->size(), answers_[i]});
+  for (std::size_t i = 0; i < levels_.size(); ++i) all.push_back({levels_[i]->size(), answers_[i]});
   return all;
 }
 
-std::size_t Ladder::bytes() const noexcept {
+std::size_t FallbackModel::bytes() const noexcept {
   std::size_t sum = near_->bytes();
-  for (const auto& rung : rungs_) sum += rung->size().bytes;
+  for (const auto& fallback_level : levels_) sum += fallback_level->size().bytes;
   return sum;
 }
 

@@ -18,7 +18,7 @@ namespace tendon {
 /// If `late` is true, the result is silent and gone for every age.
 ///
 /// Thread-safe: no. Realtime-safe: yes.
-class LossLadder {
+class LossStages {
  public:
   static constexpr Duration kStale =
       std::chrono::milliseconds(20);  ///< The minimum of v, and the time from v to silent.
@@ -26,13 +26,13 @@ class LossLadder {
   static constexpr Duration kMostGap = std::chrono::milliseconds(100);  ///< The maximum value of a gap.
   static constexpr Duration kGapsKept = std::chrono::seconds(5);
 
-  struct Rung {
+  struct Stage {
     bool fresh = false;
     bool silent = false;
     bool gone = false;
   };
 
-  explicit LossLadder(Duration peer_period) : peer_period_(peer_period) {}
+  explicit LossStages(Duration peer_period) : peer_period_(peer_period) {}
 
   /// Records the arrival of a state. If `counts` is false, the gap to the previous state is ignored.
   void receive(LocalTime now, bool counts) noexcept {
@@ -53,7 +53,7 @@ class LossLadder {
   }
 
   /// Returns the state of the link. `heard` is false if no state was received.
-  Rung at(LocalTime now, bool heard, bool late) const noexcept {
+  Stage at(LocalTime now, bool heard, bool late) const noexcept {
     const Duration age = heard ? now - arrived_ : Duration::max();
     return {.fresh = !late && age <= patience(),
             .silent = late || age > patience() + kStale,

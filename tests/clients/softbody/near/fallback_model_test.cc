@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "clients/softbody/near/ladder.h"
+#include "clients/softbody/near/fallback_model.h"
 
 #include <gtest/gtest.h>
 
@@ -16,7 +16,7 @@
 #include "tests/clients/softbody/pressed_block.h"
 #include "tests/clients/softbody/same_answer.h"
 
-namespace tendon::softbody::ladder_test {
+namespace tendon::softbody::fallback_model_test {
 namespace {
 
 using testing::AskedAndExact;
@@ -28,11 +28,11 @@ using testing::small_block;
 
 constexpr Law kBothLaws[] = {Law::kNeoHookean, Law::kCorotational};
 
-std::unique_ptr<Ladder> ladder_with(const PressedBefore& block, bool tabulated, double tolerance) {
-  std::vector<std::unique_ptr<Rung>> rungs;
-  if (tabulated) rungs.push_back(block.tabulated(tolerance));
-  rungs.push_back(block.learned(tolerance));
-  return std::make_unique<Ladder>(std::move(rungs), block.near(tolerance));
+std::unique_ptr<FallbackModel> fallbacks_with(const PressedBefore& block, bool tabulated, double tolerance) {
+  std::vector<std::unique_ptr<FallbackLevel>> levels;
+  if (tabulated) levels.push_back(block.tabulated(tolerance));
+  levels.push_back(block.learned(tolerance));
+  return std::make_unique<FallbackModel>(std::move(levels), block.near(tolerance));
 }
 
 Reaction press(const PressedBefore& block, Model& model, const Vec2& place, double depth) {
@@ -66,9 +66,9 @@ ClosedWay go_around(PatchContact& contact, const std::vector<Vec3>& corners, dou
   return way;
 }
 
-/// A rung that knows the whole body within 15 mm of the center and 4 mm of depth, and fades out like a grid. It can
+/// A level that knows the whole body within 15 mm of the center and 4 mm of depth, and fades out like a grid. It can
 /// report a body that is `times` as stiff.
-class Knows : public Rung {
+class Knows : public FallbackLevel {
  public:
   Knows(AskedAndExact& block, double times) : block_(block), times_(times) {}
   std::optional<Answer> press(const Patch& patch, double depth) const override {
@@ -94,37 +94,37 @@ class Knows : public Rung {
   double times_;
 };
 
-/// Block B1 with this rung. Its mesh is larger than the near field.
+/// Block B1 with this level. Its mesh is larger than the near field.
 struct KnownBlock : AskedAndExact {
   explicit KnownBlock(Law law, double times = 1) : AskedAndExact(pressed_block(Element::kHex8Sri, 8, 0.45, law)) {
     auto made = std::make_unique<NearModel>(solid, top, *top.patch(Vec2::Zero()),
                                             NearModel::Config{.newton = {.max_iterations = 100, .tolerance = 5e-3}});
     near = made.get();
-    std::vector<std::unique_ptr<Rung>> rungs;
-    rungs.push_back(std::make_unique<Knows>(*this, times));
-    ladder = std::make_unique<Ladder>(std::move(rungs), std::move(made));
+    std::vector<std::unique_ptr<FallbackLevel>> levels;
+    levels.push_back(std::make_unique<Knows>(*this, times));
+    fallbacks = std::make_unique<FallbackModel>(std::move(levels), std::move(made));
   }
   Reaction press(const Vec2& place, double depth) {
-    return ladder->press(*top.patch_with_curvatures(place), Given::kLeastDepth, depth);
+    return fallbacks->press(*top.patch_with_curvatures(place), Given::kLeastDepth, depth);
   }
   double truth(const Vec2& place, double depth) { return exact.press(*top.patch(place), Given::kDepth, depth).force; }
-  std::unique_ptr<Ladder> ladder;
+  std::unique_ptr<FallbackModel> fallbacks;
   NearModel* near = nullptr;
 };
 
-TEST(Ladder, TheFirstRungThatIsGoodEnoughAnswers) {
+TEST(Levels, TheFirstLevelThatIsGoodEnoughAnswers) {
   PressedBefore& block = small_block(Law::kNeoHookean);
-  const auto both = ladder_with(block, true, 0.02);
+  const auto both = fallbacks_with(block, true, 0.02);
   EXPECT_EQ(press(block, *both, Vec2::Zero(), 0.003).way, Way::kTabulated);
   EXPECT_EQ(both->steps()[0].answers, 1);
   EXPECT_EQ(both->steps()[1].answers, 0);
   EXPECT_EQ(both->steps()[0].size.name, "tabulated");
   // A tolerance between the error of the table and that of the shapes.
-  const auto exact = ladder_with(block, true, 1e-3);
+  const auto exact = fallbacks_with(block, true, 1e-3);
   EXPECT_EQ(press(block, *exact, Vec2(0.001, 0.002), 0.003).way, Way::kLearned);
   EXPECT_EQ(exact->steps()[0].answers, 0);
   EXPECT_EQ(exact->steps()[1].answers, 1);
-  const auto none = ladder_with(block, true, 1e-6);
+  const auto none = fallbacks_with(block, true, 1e-6);
   NearModel near(block.solid, block.top, *block.top.patch(Vec2::Zero()),
                  {.newton = {.max_iterations = 100, .tolerance = 1e-6}});
   const Reaction by_field = press(block, *none, Vec2::Zero(), 0.003);
@@ -133,22 +133,22 @@ TEST(Ladder, TheFirstRungThatIsGoodEnoughAnswers) {
   EXPECT_EQ(none->steps()[0].answers + none->steps()[1].answers, 0);
 }
 
-TEST(Ladder, AGivenForceIsAnsweredByTheNearField) {
+TEST(Levels, AGivenForceIsAnsweredByTheNearField) {
   PressedBefore& block = small_block(Law::kNeoHookean);
-  const auto ladder = ladder_with(block, true, 0.02);
-  const Reaction found = ladder->press(*block.top.patch(Vec2::Zero()), Given::kForce, 1);
+  const auto fallbacks = fallbacks_with(block, true, 0.02);
+  const Reaction found = fallbacks->press(*block.top.patch(Vec2::Zero()), Given::kForce, 1);
   EXPECT_NEAR(block.truth(Vec2::Zero(), found.depth), 1, 0.02);
-  EXPECT_EQ(ladder->steps()[0].answers + ladder->steps()[1].answers, 0);
+  EXPECT_EQ(fallbacks->steps()[0].answers + fallbacks->steps()[1].answers, 0);
 }
 
-TEST(Ladder, WhereAnotherRungTakesOverNothingJumps) {
+TEST(Levels, WhereAnotherLevelTakesOverNothingJumps) {
   for (const Law law : kBothLaws) {
     PressedBefore& block = small_block(law);
-    const auto ladder = ladder_with(block, true, 0.02);
+    const auto fallbacks = fallbacks_with(block, true, 0.02);
     double last = 0;
     for (int i = 0; i <= 120; ++i) {
       const Vec2 place(1e-4 * i, 5e-5 * i);
-      const Reaction found = press(block, *ladder, place, 4e-3);
+      const Reaction found = press(block, *fallbacks, place, 4e-3);
       const double truth = block.truth(place, 4e-3);
       EXPECT_NEAR(found.force, truth, 0.02 * truth) << i;
       EXPECT_GE(found.error, std::abs(found.force - truth)) << i;
@@ -160,19 +160,19 @@ TEST(Ladder, WhereAnotherRungTakesOverNothingJumps) {
     for (int i = 0; i <= 60; ++i) {
       const double depth = 3e-3 + 1e-4 * i;
       const double truth = block.truth(Vec2::Zero(), depth);
-      const Reaction found = press(block, *ladder, Vec2::Zero(), depth);
+      const Reaction found = press(block, *fallbacks, Vec2::Zero(), depth);
       EXPECT_NEAR(found.force, truth, 0.02 * truth) << i;
       EXPECT_GE(found.error, std::abs(found.force - truth)) << i;
     }
-    const int answers = ladder->steps()[0].answers;
+    const int answers = fallbacks->steps()[0].answers;
     EXPECT_GT(answers, 50);
     EXPECT_LT(answers, 182);
   }
 }
 
-/// The rung reports 10 % more force than the body has. The transition depends on the position only, so it is the same
+/// The level reports 10 % more force than the body has. The transition depends on the position only, so it is the same
 /// in both directions.
-TEST(Ladder, FromARungThatIsStifferTheForceGoesOverByThePlace) {
+TEST(Levels, FromALevelThatIsStifferTheForceGoesOverByThePlace) {
   KnownBlock block(Law::kNeoHookean, 1.1);
   constexpr double kStep = 1e-4;
   std::vector<double> out;
@@ -190,12 +190,12 @@ TEST(Ladder, FromARungThatIsStifferTheForceGoesOverByThePlace) {
   }
 }
 
-TEST(Ladder, TheStiffnessSentIsTheForcesOwnSlope) {
+TEST(Levels, TheStiffnessSentIsTheForcesOwnSlope) {
   for (const bool tabulated : {false, true}) {
     for (const Law law : kBothLaws) {
       PressedBefore& block = small_block(law);
-      const auto ladder = ladder_with(block, tabulated, 0.02);
-      PatchContact contact(*ladder, block.top, 0, PatchContact::Side::kUnilateral);
+      const auto fallbacks = fallbacks_with(block, tabulated, 0.02);
+      PatchContact contact(*fallbacks, block.top, 0, PatchContact::Side::kUnilateral);
       for (const Vec3& tool :
            {Vec3(0.003, 0.0021, 0.0452), Vec3(-0.0017, 0.0003, 0.0473), Vec3(0.004, -0.004, 0.0465)}) {
         const Mat3 given = contact.at(tool).stiffness;
@@ -212,11 +212,11 @@ TEST(Ladder, TheStiffnessSentIsTheForcesOwnSlope) {
   }
 }
 
-TEST(Ladder, ClosedWaysAcrossRungsGiveNoMoreThanAHundredthOfWhatTheyTook) {
+TEST(Levels, ClosedWaysAcrossLevelsGiveNoMoreThanAHundredthOfWhatTheyTook) {
   for (const Law law : kBothLaws) {
     PressedBefore& block = small_block(law);
-    const auto ladder = ladder_with(block, true, 0.02);
-    PatchContact contact(*ladder, block.top, 0, PatchContact::Side::kUnilateral);
+    const auto fallbacks = fallbacks_with(block, true, 0.02);
+    PatchContact contact(*fallbacks, block.top, 0, PatchContact::Side::kUnilateral);
     // Down at the center, out beyond the edge, and back at another depth or sideways, in both directions.
     for (const double aside : {0.0, 0.004}) {
       for (const bool back : {false, true}) {
@@ -229,18 +229,18 @@ TEST(Ladder, ClosedWaysAcrossRungsGiveNoMoreThanAHundredthOfWhatTheyTook) {
         EXPECT_GT(way.given, 1e-3);
       }
     }
-    EXPECT_GT(ladder->steps()[0].answers, 100);
+    EXPECT_GT(fallbacks->steps()[0].answers, 100);
   }
 }
 
-TEST(Ladder, ClosedWaysOnWhichFieldsTakeOverUnderARungGiveNoMoreEither) {
+TEST(Levels, ClosedWaysOnWhichFieldsTakeOverUnderALevelGiveNoMoreEither) {
   for (const Law law : kBothLaws) {
     for (const bool beside : {false, true}) {
       KnownBlock block(law);
       Elsewhere thread;
       if (beside) block.near->make_fields_by(thread.background());
-      PatchContact contact(*block.ladder, block.top, 0, PatchContact::Side::kUnilateral);
-      // Leaves the region of the rung at one depth, returns at another, and leaves it downward.
+      PatchContact contact(*block.fallbacks, block.top, 0, PatchContact::Side::kUnilateral);
+      // Leaves the region of the level at one depth, returns at another, and leaves it downward.
       const std::vector<Vec3> corners{Vec3(0, 0, 0.0505),         Vec3(0, 0, 0.047),  Vec3(0.019, 0.004, 0.0465),
                                       Vec3(0.021, 0, 0.0478),     Vec3(0, 0, 0.0478), Vec3(-0.004, 0.01, 0.0475),
                                       Vec3(-0.004, 0.01, 0.0455), Vec3(0, 0, 0.0505)};
@@ -252,14 +252,14 @@ TEST(Ladder, ClosedWaysOnWhichFieldsTakeOverUnderARungGiveNoMoreEither) {
       EXPECT_GT(way.given, 1e-3);
       EXPECT_GE(block.near->size().made, 3) << beside;
       EXPECT_EQ(block.near->size().linear, 0);
-      const int by_rung = block.ladder->steps()[0].answers;
-      EXPECT_GT(by_rung, 100);
+      const int by_level = block.fallbacks->steps()[0].answers;
+      EXPECT_GT(by_level, 100);
     }
   }
 }
 
-/// First within the region of the rung, then beyond it.
-TEST(Ladder, WhereTheNearFieldTakesOverAfterAFarWayNoAnswerMakesAWholeField) {
+/// First within the region of the level, then beyond it.
+TEST(Levels, WhereTheNearFieldTakesOverAfterAFarWayNoAnswerMakesAWholeField) {
   for (const Law law : kBothLaws) {
     // step per answer, m
     for (const auto& [step, most] : {std::pair(1e-4, 1), std::pair(2e-4, 2), std::pair(5e-4, 5)}) {
@@ -290,7 +290,7 @@ TEST(Ladder, WhereTheNearFieldTakesOverAfterAFarWayNoAnswerMakesAWholeField) {
   }
 }
 
-TEST(Ladder, WhereAPressLeavesTheRungBelowTheFieldOfThatPlaceIsThere) {
+TEST(Levels, WhereAPressLeavesTheLevelBelowTheFieldOfThatPlaceIsThere) {
   for (const double aside : {0.0, 0.0095}) {  // inside and outside of the initial field
     KnownBlock block(Law::kNeoHookean);
     const Vec2 place(aside, 0);
@@ -315,7 +315,7 @@ TEST(Ladder, WhereAPressLeavesTheRungBelowTheFieldOfThatPlaceIsThere) {
   }
 }
 
-TEST(Ladder, OfAFieldThatTookOverUnderARungNothingIsOfThatRung) {
+TEST(Levels, OfAFieldThatTookOverUnderALevelNothingIsOfThatLevel) {
   KnownBlock block(Law::kNeoHookean, 1.1);
   const Vec2 place(0.0095, 0);
   Reaction found;
@@ -325,7 +325,7 @@ TEST(Ladder, OfAFieldThatTookOverUnderARungNothingIsOfThatRung) {
   EXPECT_NEAR(found.force, truth, 0.02 * truth);
 }
 
-TEST(Ladder, AHandThatRestsUnderARungHasOneFieldMade) {
+TEST(Levels, AHandThatRestsUnderALevelHasOneFieldMade) {
   KnownBlock block(Law::kNeoHookean);
   const int pieces = block.near->size().pieces;
   for (int i = 0; i <= 140; ++i) block.press(Vec2(1e-4 * i, 0), 2e-3);
@@ -334,7 +334,7 @@ TEST(Ladder, AHandThatRestsUnderARungHasOneFieldMade) {
   EXPECT_LE(block.near->size().pieces - pieces, 31);
 }
 
-TEST(Ladder, AnotherThreadMakesTheFieldsForAHandUnderARung) {
+TEST(Levels, AnotherThreadMakesTheFieldsForAHandUnderALevel) {
   for (const Law law : kBothLaws) {
     KnownBlock block(law);
     Elsewhere thread;
@@ -347,7 +347,7 @@ TEST(Ladder, AnotherThreadMakesTheFieldsForAHandUnderARung) {
       const int made = block.near->size().made;
       const Reaction found = block.press(place, 3e-3);
       if (place.x() > Knows::kReach && ++taken_over == 1) {
-        EXPECT_GE(made, 3) << "made under the rung";
+        EXPECT_GE(made, 3) << "made under the level";
       }
       EXPECT_LE(thread.given.size(), 1U) << i;
       if (i > 0) {
@@ -362,7 +362,7 @@ TEST(Ladder, AnotherThreadMakesTheFieldsForAHandUnderARung) {
   }
 }
 
-TEST(Ladder, WhereNoFieldIsThereYetTheLinearBodyGoesOnFromTheForceOfTheRung) {
+TEST(Levels, WhereNoFieldIsThereYetTheLinearBodyGoesOnFromTheForceOfTheLevel) {
   KnownBlock block(Law::kCorotational);
   Elsewhere thread;
   block.near->make_fields_by(thread.background());
@@ -380,7 +380,7 @@ TEST(Ladder, WhereNoFieldIsThereYetTheLinearBodyGoesOnFromTheForceOfTheRung) {
   for (const double depth : {3e-3, 3.9e-3, 5.2e-3}) press(Vec2::Zero(), depth);
 }
 
-TEST(Ladder, WithoutAnotherThreadTheSameWayHasTheSameAnswersBitByBit) {
+TEST(Levels, WithoutAnotherThreadTheSameWayHasTheSameAnswersBitByBit) {
   KnownBlock one(Law::kNeoHookean);
   KnownBlock other(Law::kNeoHookean);
   for (int i = 0; i < 100; ++i) {
@@ -394,16 +394,16 @@ TEST(Ladder, WithoutAnotherThreadTheSameWayHasTheSameAnswersBitByBit) {
   EXPECT_GE(one.near->size().made, 3);
 }
 
-TEST(Ladder, ARungHasRoomAmongGoodCellsAndNoneWhereItsShareFalls) {
+TEST(Levels, ALevelHasRoomAmongGoodCellsAndNoneWhereItsShareFalls) {
   PressedBefore& block = small_block(Law::kNeoHookean);
-  for (const auto& rung : {block.learned(0.02), block.tabulated(0.02)}) {
+  for (const auto& fallback_level : {block.learned(0.02), block.tabulated(0.02)}) {
     const double deepest = block.presses.grid.deepest();
     const double step = block.presses.grid.step;
     double before = 1;
     for (int i = 0; i <= 100; ++i) {  // at the center, whose neighbor cells are all valid
       const double depth = deepest * i / 100;
-      const double room = rung->room(Vec2::Zero(), depth);
-      const auto answer = rung->press(*block.top.patch(Vec2::Zero()), depth);
+      const double room = fallback_level->room(Vec2::Zero(), depth);
+      const auto answer = fallback_level->press(*block.top.patch(Vec2::Zero()), depth);
       EXPECT_EQ(room > 0, depth < deepest - step - 1e-9) << depth;
       if (room > 0) {
         EXPECT_EQ(answer->share, 1) << depth;
@@ -416,22 +416,22 @@ TEST(Ladder, ARungHasRoomAmongGoodCellsAndNoneWhereItsShareFalls) {
     }
     for (int i = 0; i <= 100; ++i) {
       const Vec2 place(1e-4 * i, 5e-5 * i);
-      EXPECT_NEAR(rung->room(place, step), std::max(0.0, 1 - place.x() / 5e-3) * std::max(0.0, 1 - place.y() / 5e-3),
-                  1e-9);
+      EXPECT_NEAR(fallback_level->room(place, step),
+                  std::max(0.0, 1 - place.x() / 5e-3) * std::max(0.0, 1 - place.y() / 5e-3), 1e-9);
     }
-    EXPECT_EQ(rung->room(Vec2(0.5, 0), step), 0);
-    EXPECT_EQ(rung->room(Vec2::Zero(), 2 * deepest), 0);
+    EXPECT_EQ(fallback_level->room(Vec2(0.5, 0), step), 0);
+    EXPECT_EQ(fallback_level->room(Vec2::Zero(), 2 * deepest), 0);
   }
 }
 
-TEST(Ladder, TheErrorSaidCoversTheTrueOneOfDrawnAnswers) {
+TEST(Levels, TheErrorSaidCoversTheTrueOneOfDrawnAnswers) {
   static PressedBefore* const blocks[] = {new PressedBefore(6, 0.45, Law::kNeoHookean, 0.01),
                                           new PressedBefore(6, 0.45, Law::kCorotational, 0.01),
                                           new PressedBefore(6, 0.499, Law::kCorotational, 0.01)};
   const testing::ErrorsSaid said = testing::errors_said(5e-3, [&](int path, double tolerance) {
     const PressedBefore& block = *blocks[path % 4 == 3 ? 2 : path % 2];
     auto asked = std::make_unique<AskedAndExact>(block.solid);
-    asked->asked = ladder_with(block, path % 3 != 0, tolerance);
+    asked->asked = fallbacks_with(block, path % 3 != 0, tolerance);
     return asked;
   });
   EXPECT_GE(said.answers, 40);
@@ -439,7 +439,7 @@ TEST(Ladder, TheErrorSaidCoversTheTrueOneOfDrawnAnswers) {
   ::testing::Test::RecordProperty("covered", said.covered);
 }
 
-TEST(Ladder, BlendedAnswersAreBetweenTheTwoInForceAndInStiffness) {
+TEST(Levels, BlendedAnswersAreBetweenTheTwoInForceAndInStiffness) {
   const Reaction one = testing::whole_answer();
   Reaction other = one;
   other.force = 2.1;
@@ -456,7 +456,7 @@ TEST(Ladder, BlendedAnswersAreBetweenTheTwoInForceAndInStiffness) {
   }
 }
 
-TEST(Ladder, ABlendedAnswerSaysTheWayThatHasTheGreaterShare) {
+TEST(Levels, ABlendedAnswerSaysTheWayThatHasTheGreaterShare) {
   Reaction one = testing::whole_answer();
   Reaction other = one;
   one.way = Way::kNear;
@@ -467,7 +467,7 @@ TEST(Ladder, ABlendedAnswerSaysTheWayThatHasTheGreaterShare) {
   EXPECT_EQ(blended(one, other, 0.51).way, Way::kTabulated) << "of no force, too";
 }
 
-TEST(Ladder, EachWayHasANameThatTheWireTakes) {
+TEST(Levels, EachWayHasANameThatTheWireTakes) {
   EXPECT_EQ(name_of(Way::kOnly), "");
   EXPECT_EQ(name_of(Way::kTabulated), "tabulated");
   EXPECT_EQ(name_of(Way::kLinear), "linear");
@@ -475,19 +475,19 @@ TEST(Ladder, EachWayHasANameThatTheWireTakes) {
   for (const std::string_view name : kWayNames) EXPECT_LE(name.size(), limits::kMaxLabel);
 }
 
-TEST(Ladder, ABodyThatListsNothingHasNoLadder) {
+TEST(Levels, ABodyThatListsNothingHasNoFallbacks) {
   BodyConfig config = testing::pressed_body(ModelKind::kNear, Element::kHex8Sri, 6);
-  EXPECT_TRUE(Body(config).ladder().empty());
+  EXPECT_TRUE(Body(config).fallbacks().empty());
   config.near.learn = true;
   config.reach = 0.005;
   config.tolerance = 0.02;
   const Body learned(config);
-  ASSERT_EQ(learned.ladder().size(), 1U);
-  EXPECT_EQ(learned.ladder()[0].size.name, "learned");
+  ASSERT_EQ(learned.fallbacks().size(), 1U);
+  EXPECT_EQ(learned.fallbacks()[0].size.name, "learned");
   EXPECT_GT(learned.size().bytes, Body(testing::pressed_body(ModelKind::kNear, Element::kHex8Sri, 6)).size().bytes);
 }
 
-TEST(Ladder, WhatCannotBeLearnedIsRefused) {
+TEST(Levels, WhatCannotBeLearnedIsRefused) {
   BodyConfig config = testing::pressed_body(ModelKind::kNear, Element::kHex8Sri, 6);
   config.near.tabulate = true;
   EXPECT_THROW(Body{config}, std::invalid_argument);
@@ -503,4 +503,4 @@ TEST(Ladder, WhatCannotBeLearnedIsRefused) {
 }
 
 }  // namespace
-}  // namespace tendon::softbody::ladder_test
+}  // namespace tendon::softbody::fallback_model_test

@@ -9,13 +9,13 @@
 
 namespace tendon::softbody {
 
-/// A fast method for some presses (near/ladder.h). It has no state.
-class Rung {
+/// A fast method for some presses (near/fallback_model.h). It has no state.
+class FallbackLevel {
  public:
-  Rung() = default;
-  virtual ~Rung() = default;
-  Rung(const Rung&) = delete;
-  Rung& operator=(const Rung&) = delete;
+  FallbackLevel() = default;
+  virtual ~FallbackLevel() = default;
+  FallbackLevel(const FallbackLevel&) = delete;
+  FallbackLevel& operator=(const FallbackLevel&) = delete;
 
   struct Answer {
     Reaction reaction;
