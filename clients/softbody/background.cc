@@ -14,23 +14,23 @@ constexpr int kNice = 5;
 
 }  // namespace
 
-struct BackgroundThread::Given {
+struct BackgroundThread::Task {
   std::packaged_task<void()> work;
-  Given* before = nullptr;
+  Task* before = nullptr;
 };
 
 BackgroundThread::BackgroundThread() : thread_([this] { run(); }) {}
 
 BackgroundThread::~BackgroundThread() {
   ends_ = true;
-  put(new Given);  // wakes the thread
+  put(new Task);  // wakes the thread
   thread_.join();
-  for (Given* left = given_; left != nullptr;) delete std::exchange(left, left->before);
+  for (Task* left = given_; left != nullptr;) delete std::exchange(left, left->before);
 }
 
-void BackgroundThread::give(std::packaged_task<void()> work) { put(new Given{std::move(work)}); }
+void BackgroundThread::give(std::packaged_task<void()> work) { put(new Task{std::move(work)}); }
 
-void BackgroundThread::put(Given* last) {
+void BackgroundThread::put(Task* last) {
   last->before = given_.load(std::memory_order_relaxed);
   while (!given_.compare_exchange_weak(last->before, last, std::memory_order_acq_rel)) {
   }
@@ -41,9 +41,9 @@ void BackgroundThread::run() {
   setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), kNice);  // on Linux this affects the calling thread only
   while (!ends_) {
     given_.wait(nullptr);
-    std::unique_ptr<Given> first;
-    for (Given* left = given_.exchange(nullptr, std::memory_order_acq_rel); left != nullptr;) {
-      std::unique_ptr<Given> next(std::exchange(left, left->before));
+    std::unique_ptr<Task> first;
+    for (Task* left = given_.exchange(nullptr, std::memory_order_acq_rel); left != nullptr;) {
+      std::unique_ptr<Task> next(std::exchange(left, left->before));
       next->before = first.release();
       first = std::move(next);
     }

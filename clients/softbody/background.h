@@ -26,11 +26,11 @@ class BackgroundThread {
   void give(std::packaged_task<void()> work);
 
  private:
-  struct Given;
-  void put(Given* last);
+  struct Task;
+  void put(Task* last);
   void run();
 
-  std::atomic<Given*> given_{nullptr};
+  std::atomic<Task*> given_{nullptr};
   std::atomic<bool> ends_{false};
   std::thread thread_;
 };

@@ -53,7 +53,7 @@ bool wants_glide(const BodyConfig& config, const TouchSurface& surface) {
   return config.whole_stiffness || surface.curved();
 }
 
-struct Made {
+struct BuiltModel {
   std::unique_ptr<Model> model;
   std::optional<double> linear_up_to{};  ///< m, if a table file provides it
   const CondensedModel* condensed = nullptr;
@@ -95,7 +95,7 @@ std::vector<int> touchable(const BodyConfig& config, const TouchSurface& surface
   return config.reach ? surface.nodes_of_patches(surface.across(config.middle), *config.reach) : surface.nodes();
 }
 
-double stiffness_under(Model& model, const Patch& patch) { return model.press(patch, Given::kForce, 1).stiffness; }
+double stiffness_under(Model& model, const Patch& patch) { return model.press(patch, Prescribed::kForce, 1).stiffness; }
 
 /// Throws if the table does not belong to this body, or does not reproduce its recorded stiffness.
 std::unique_ptr<CondensedModel> condensed_from(const BodyConfig& config, const Solid& solid,
@@ -157,9 +157,9 @@ std::unique_ptr<NearModel> near_model_of(const BodyConfig& config, const Solid& 
   return std::make_unique<NearModel>(solid, surface, middle_patch(surface, config.middle), made);
 }
 
-Made model_of(const BodyConfig& config, const Solid& solid, const TouchSurface& surface, const SolverOf& solver,
-              Background fields) {
-  Made made;
+BuiltModel model_of(const BodyConfig& config, const Solid& solid, const TouchSurface& surface, const SolverOf& solver,
+                    Background fields) {
+  BuiltModel made;
   if (solver) {
     made.model = solved_model_of(config, solid, surface, solver);
   } else if (config.model == ModelKind::kCondensed) {
@@ -360,7 +360,7 @@ struct Body::Parts {
 
   Solid solid;
   TouchSurface surface;
-  Made made;
+  BuiltModel made;
   Model& model;
   PatchContact contact;
   std::optional<SphereContact> sphere;
@@ -515,9 +515,9 @@ void Body::tick(double time) {
 
 bool Body::has_clock() const noexcept { return parts_->made.stiffening != nullptr || parts_->cutting; }
 
-Reaction Body::press(Given given, double value) { return parts_->model.press(parts_->patch, given, value); }
+Reaction Body::press(Prescribed given, double value) { return parts_->model.press(parts_->patch, given, value); }
 
-Reaction Body::settle(Given given, double value) {
+Reaction Body::settle(Prescribed given, double value) {
   return softbody::settle(parts_->model, parts_->patch, given, value);
 }
 

@@ -215,8 +215,8 @@ class Body {
 
   /// Presses the model with a patch at `middle`. If the body has time, this is one step. settle() repeats this until
   /// the body is at rest or until the model has converged.
-  Reaction press(Given given, double value);
-  Reaction settle(Given given, double value);
+  Reaction press(Prescribed given, double value);
+  Reaction settle(Prescribed given, double value);
 
   /// Returns the depth (m) at which the material rotates somewhere by kLargestTurn. If the tool is deeper, a model
   /// without geometric nonlinearity is wrong, because it treats rotation as strain. Infinite for all other models.

@@ -133,8 +133,8 @@ double off_the_exact_interface(const BodyConfig& config) {
   double most = 0;
   for (const double share : {0.01, 0.1, 0.2}) {
     const double depth = share * config.patch_radius;
-    const double expected = exact.settle(Given::kDepth, depth).force;
-    most = std::max(most, std::abs(modes.settle(Given::kDepth, depth).force / expected - 1));
+    const double expected = exact.settle(Prescribed::kDepth, depth).force;
+    most = std::max(most, std::abs(modes.settle(Prescribed::kDepth, depth).force / expected - 1));
   }
   return most;
 }
@@ -160,7 +160,7 @@ Explanation explain(const Scene& scene, const std::function<double()>& processor
                   .beside = fields_beside(config, to_device(scene).transpose(), processor_time),
                   .learned = {},
                   .step = body.step(),
-                  .stiffness = body.settle(Given::kForce, push).stiffness,
+                  .stiffness = body.settle(Prescribed::kForce, push).stiffness,
                   .linear_up_to = body.linear_up_to()};
 
   std::vector<BodyConfig> bodies{config, config};

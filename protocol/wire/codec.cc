@@ -49,11 +49,11 @@ std::size_t write_frame(Byte* to, const Value& value, List list) noexcept {
 template <class Make>
 auto& append(std::vector<Frame>& frames, Make make) {
   using Value = decltype(make());
-  struct Made {
+  struct Parsed {
     Make make;
     operator Value() const noexcept { return make(); }
   };
-  return std::get<Value>(frames.emplace_back(std::in_place_type<Value>, Made{make}));
+  return std::get<Value>(frames.emplace_back(std::in_place_type<Value>, Parsed{make}));
 }
 
 /// Counts a value that is out of bounds. Returns false if it must be dropped. Requests and answers with a valid id must

@@ -21,9 +21,9 @@ namespace {
 constexpr int kSteps = 200;
 constexpr int kSamples = 2000;  ///< used instead of the device
 
-class Tape final : public Device {
+class TraceDevice final : public Device {
  public:
-  Tape(const SimulatedDevice::Config& config, std::vector<PositionSample>& samples)
+  TraceDevice(const SimulatedDevice::Config& config, std::vector<PositionSample>& samples)
       : device_(config), samples_(samples) {}
 
   const DeviceInfo& info() const noexcept override { return device_.info(); }
@@ -121,7 +121,7 @@ class Trial {
 std::unique_ptr<Device> playback_of(const Scene& scene) {
   std::vector<PositionSample> samples;
   samples.reserve(kSamples);
-  Trial trial(scene, std::make_unique<Tape>(scene.simulated(), samples));
+  Trial trial(scene, std::make_unique<TraceDevice>(scene.simulated(), samples));
   for (int i = 0; i < kSamples / kSteps; ++i) trial.steps([] { return Duration::zero(); });
   if (samples.empty()) samples.emplace_back();
   return std::make_unique<Playback>(SimulatedDevice(scene.simulated()).info(), std::move(samples));
@@ -129,7 +129,7 @@ std::unique_ptr<Device> playback_of(const Scene& scene) {
 
 /// The uncertainty is the difference between the minimum of the odd measurements and the minimum of the even
 /// measurements.
-class Least {
+class Minimum {
  public:
   void add(double value) {
     std::swap(here_, there_);
@@ -164,14 +164,14 @@ Explanation explain(const Scene& listed, const std::function<Duration()>& proces
     trials.push_back(std::make_unique<Trial>(less));
     part_of.push_back(out.parts.size() - 1);
   }
-  std::vector<Least> least(trials.size());
+  std::vector<Minimum> least(trials.size());
   for (int round = 0; round < rounds; ++round) {
     for (std::size_t i = 0; i < trials.size(); ++i) least[i].add(trials[i]->steps(processor_time));
   }
   out.step_ns = least[0].value();
   out.device_ns = std::clamp(out.step_ns - least[kWithoutDevice].value(), 0.0, out.step_ns);
   out.resolution_ns = std::abs(least[0].value() - least[1].value());
-  for (const Least& one : least) out.resolution_ns = std::max(out.resolution_ns, one.doubt());
+  for (const Minimum& one : least) out.resolution_ns = std::max(out.resolution_ns, one.doubt());
   for (std::size_t i = kWithoutDevice + 1; i < trials.size(); ++i) {
     out.parts[part_of[i]].cost_ns = out.step_ns - least[i].value();
   }

@@ -63,7 +63,7 @@ TEST(HardPhysics, ANearlyIncompressibleBlockDoesNotLock) {
   const auto percent = [](Element element) {
     BodyConfig body = pressed_body(ModelKind::kLinear, element, 8);
     body.material.poisson = 0.499;
-    const Reaction reaction = Body(body).press(Given::kForce, 0.3);
+    const Reaction reaction = Body(body).press(Prescribed::kForce, 0.3);
     return 100 * (reaction.stiffness / kB1NearlyIncompressible - 1);
   };
   const double found = percent(Element::kHex8Sri);
@@ -309,7 +309,7 @@ TEST(HardPhysics, MassesAMillionTimesApartStayBoundedAndOnlyLoseEnergy) {
   double off = 0;
   for (int i = 1; i <= 20; ++i) {
     const double depth = 1e-4 * i;
-    off = std::max(off, std::abs(model.press(patch, Given::kDepth, depth).depth - depth));
+    off = std::max(off, std::abs(model.press(patch, Prescribed::kDepth, depth).depth - depth));
   }
   EXPECT_LT(off, 1e-9);
   const auto energy = [&](const VectorXd& before) {
@@ -347,10 +347,10 @@ TEST(HardPhysics, TheRestOfABodyDoesNotDependOnTheStep) {
   double worst = 0;
   for (const ModelKind kind : {ModelKind::kLinear, ModelKind::kCorotational, ModelKind::kNeoHookean}) {
     BodyConfig config = pressed_body(kind, Element::kHex8Sri, 4);
-    const Reaction still = Body(config).press(Given::kForce, 0.3);
+    const Reaction still = Body(config).press(Prescribed::kForce, 0.3);
     for (const double step : {1e-3, 1e-2, 0.2}) {
       config.effects = {.density = 1000, .step = step, .inertia = true, .damping = 40};
-      const Reaction found = Body(config).settle(Given::kForce, 0.3);
+      const Reaction found = Body(config).settle(Prescribed::kForce, 0.3);
       EXPECT_NEAR(found.depth / still.depth, 1, 1e-3) << info(kind).name << ' ' << step;
       EXPECT_NEAR(found.stiffness * still.depth / 0.3, 1, 1e-3) << info(kind).name << ' ' << step;
       worst = std::max(worst, std::abs(found.depth / still.depth - 1));
@@ -361,7 +361,7 @@ TEST(HardPhysics, TheRestOfABodyDoesNotDependOnTheStep) {
     compared::Config config = soon_at_rest(compared::Kind::kXpbd);
     config.iterations = 1;
     config.effects.step = i == 0 ? 1e-3 : 1e-2;
-    xpbd[i] = pressed_b1(compared::Kind::kXpbd, Element::kTet4, 4, config).settle(Given::kForce, 0.3).depth;
+    xpbd[i] = pressed_b1(compared::Kind::kXpbd, Element::kTet4, 4, config).settle(Prescribed::kForce, 0.3).depth;
   }
   report({.hard = "if iterations are cut off, the stiffness depends on the step",
           .oracle = "depth of B1 at rest under 0.3 N with steps of 1, 10 and 200 ms within 1e-3 of the static body",
@@ -387,7 +387,7 @@ TEST(HardPhysics, AnExplicitStepIsStableBelowItsLimitAndRefusedAboveIt) {
   };
   // 0.95 of it is stable with a tool too, without any damping.
   compared::PressedBody body = tensor_mass(0.95 * limit);
-  for (int i = 0; i < 3000; ++i) EXPECT_LT(std::abs(body.press(Given::kForce, 0.3).depth), 1e-3);
+  for (int i = 0; i < 3000; ++i) EXPECT_LT(std::abs(body.press(Prescribed::kForce, 0.3).depth), 1e-3);
   const std::string refused = thrown_by<std::exception>([&] { tensor_mass(1.05 * limit); });
   EXPECT_NE(refused.find("step of " + text(1e3 * 1.05 * limit, 6)), std::string::npos) << refused;
   EXPECT_NE(refused.find("at most " + text(1e3 * limit, 6)), std::string::npos) << refused;
@@ -409,7 +409,7 @@ TEST(HardPhysics, ACutUnderLoadPutsInNoEnergyAndTheBodyGivesWayWithEach) {
       Solid solid = pressed_block(element, 4, 0.45, law);
       TouchSurface top(solid.mesh(), Vec3::UnitZ(), kB1PatchRadius);
       QuasiStaticModel model(solid, top, {});
-      const auto press = [&] { return model.press(*top.patch(Vec2::Zero()), Given::kDepth, 4e-3); };
+      const auto press = [&] { return model.press(*top.patch(Vec2::Zero()), Prescribed::kDepth, 4e-3); };
       Reaction before = press();
       std::vector<Cut> cuts;
       for (const double x : {0.0, 0.025, -0.025}) {
@@ -495,7 +495,7 @@ TEST(HardPhysics, ARigidTurnMakesGhostForcesOnlyInTheLinearLaw) {
   Body truth(pressed_body(ModelKind::kCorotational, Element::kHex8Sri, 4));
   Body linear(pressed_body(ModelKind::kLinear, Element::kHex8Sri, 4));
   const auto wrong = [&](double depth) {
-    return std::abs(linear.press(Given::kDepth, depth).force / truth.press(Given::kDepth, depth).force - 1);
+    return std::abs(linear.press(Prescribed::kDepth, depth).force / truth.press(Prescribed::kDepth, depth).force - 1);
   };
   const double up_to = linear.linear_up_to();
   EXPECT_LT(wrong(up_to), 0.1);
@@ -514,11 +514,11 @@ TEST(HardPhysics, ARigidTurnMakesGhostForcesOnlyInTheLinearLaw) {
 // Oracle: the force at 2 mm is the same before and after the jump.
 TEST(HardPhysics, AToolThatJumps20MillimetresDeepMeetsAFiniteForce) {
   PressedByNewton pressed(Element::kHex8Sri, 4, Law::kNeoHookean);
-  const double before = pressed.model.press(pressed.patch, Given::kDepth, 0.002).force;
-  const Reaction deep = pressed.model.press(pressed.patch, Given::kDepth, 0.02);
+  const double before = pressed.model.press(pressed.patch, Prescribed::kDepth, 0.002).force;
+  const Reaction deep = pressed.model.press(pressed.patch, Prescribed::kDepth, 0.02);
   EXPECT_GT(deep.force, before);
   EXPECT_LT(deep.force, 100);
-  const double trace = std::abs(pressed.model.press(pressed.patch, Given::kDepth, 0.002).force / before - 1);
+  const double trace = std::abs(pressed.model.press(pressed.patch, Prescribed::kDepth, 0.002).force / before - 1);
   EXPECT_LT(trace, 1e-6);
   report({.hard = "a tool is 20 mm deeper in the next answer, which gave 153 N in MuJoCo",
           .oracle = "below 100 N; back at 2 mm, the same force as before to 1e-6",

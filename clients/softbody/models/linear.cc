@@ -46,12 +46,12 @@ VectorXd depth_of(const Solid& solid, const Vec3& normal, const Patch& patch, co
 
 }  // namespace
 
-Reaction linear_reaction(const Patch& patch, const VectorXd& depth_per_newton, Given given, double value) {
+Reaction linear_reaction(const Patch& patch, const VectorXd& depth_per_newton, Prescribed given, double value) {
   const double compliance = patch.weights.dot(depth_per_newton);
   Reaction reaction;
   reaction.stiffness = 1 / compliance;
   reaction.force = constrained_force(given, value, 0, compliance);
-  reaction.depth = given == Given::kDepth ? value : reaction.force * compliance;
+  reaction.depth = given == Prescribed::kDepth ? value : reaction.force * compliance;
   reaction.slope = reaction.force * (patch.slopes * depth_per_newton);
   return reaction;
 }
@@ -134,7 +134,7 @@ VectorXd LinearModel::untouched() const {
   return factor_.solve(force);
 }
 
-Reaction LinearModel::press(const Patch& patch, Given given, double value) {
+Reaction LinearModel::press(const Patch& patch, Prescribed given, double value) {
   if (!effects_.empty()) return press_among_effects(patch, given, value);
   if (patch.curvatures.size() == 0) {
     return linear_reaction(patch, depth_of(solid_, normal_, patch, displacements(patch)), given, value);
@@ -145,7 +145,7 @@ Reaction LinearModel::press(const Patch& patch, Given given, double value) {
   return reaction;
 }
 
-Reaction LinearModel::press_among_effects(const Patch& patch, Given given, double value) {
+Reaction LinearModel::press_among_effects(const Patch& patch, Prescribed given, double value) {
   const VectorXd per_newton = displacements(patch);
   VectorXd u = untouched();
   const VectorXd load = solid_.to_free(patch_load(solid_, normal_, patch));
@@ -254,13 +254,13 @@ SolvedModel::SolvedModel(const Solid& solid, const TouchSurface& surface, const 
   slope_factor_ = kOtherPlaces * std::sqrt(loads.cwiseProduct(solver_->solve(loads)).sum());
 }
 
-Reaction SolvedModel::press(const Patch& patch, Given given, double value) {
+Reaction SolvedModel::press(const Patch& patch, Prescribed given, double value) {
   const Solver::Rough rough = solver_->solve_roughly(solid_.to_free(patch_load(solid_, normal_, patch)));
   const VectorXd depth = depth_of(solid_, normal_, patch, rough.displacements);
   Reaction reaction = linear_reaction(patch, depth, given, value);
   reaction.stiffness = 1 / rough.compliance;
   reaction.force = constrained_force(given, value, 0, rough.compliance);
-  reaction.depth = given == Given::kDepth ? value : reaction.force * rough.compliance;
+  reaction.depth = given == Prescribed::kDepth ? value : reaction.force * rough.compliance;
   const double force = std::abs(reaction.force);
   const double along = force * rough.missing / (rough.compliance + rough.missing);
   const double aside = force * force * slope_factor_ * std::sqrt(rough.missing);
@@ -278,7 +278,7 @@ CondensedModel::CondensedModel(std::size_t mesh_nodes, std::vector<int> nodes, M
   for (std::size_t i = 0; i < nodes_.size(); ++i) row_of_.at(at(nodes_[i])) = static_cast<int>(i);
 }
 
-Reaction CondensedModel::press(const Patch& patch, Given given, double value) {
+Reaction CondensedModel::press(const Patch& patch, Prescribed given, double value) {
   rows_.clear();
   for (const int node : patch.nodes) {
     const int row = row_of_.at(at(node));

@@ -19,7 +19,7 @@ class LinearModel : public Model {
   /// std::runtime_error if the solid is not held.
   LinearModel(const Solid& solid, const TouchSurface& surface, const EffectsConfig& effects = {}, bool glides = false);
 
-  Reaction press(const Patch& patch, Given given, double value) override;
+  Reaction press(const Patch& patch, Prescribed given, double value) override;
   void cut(const Division& division, const EffectsConfig& effects) override;
   void go_on_from(const Model&, std::span<const int>) override {}
   double step() const noexcept override { return step_; }
@@ -33,7 +33,7 @@ class LinearModel : public Model {
  private:
   Mat2 giving(const Patch& patch);
   void glide_from(const Patch& patch);
-  Reaction press_among_effects(const Patch& patch, Given given, double value);
+  Reaction press_among_effects(const Patch& patch, Prescribed given, double value);
   VectorXd untouched() const;
 
   const Solid& solid_;
@@ -54,7 +54,7 @@ class LinearModel : public Model {
 MatrixXd compliance_of(const Solid& solid, const std::vector<int>& nodes);
 
 /// Returns the reaction of a linear body. `depth_per_newton` is the depth of each node for 1 N on the patch.
-Reaction linear_reaction(const Patch& patch, const VectorXd& depth_per_newton, Given given, double value);
+Reaction linear_reaction(const Patch& patch, const VectorXd& depth_per_newton, Prescribed given, double value);
 
 /// Adds Reaction::glide. The patch must have curvatures.
 void add_glide(const Patch& patch, const VectorXd& depth_per_newton, const Mat2& giving, Reaction& to);
@@ -98,7 +98,7 @@ class SolvedModel : public Model {
   /// The solid must outlive this object.
   SolvedModel(const Solid& solid, const TouchSurface& surface, const Patch& middle, std::unique_ptr<Solver> solver);
 
-  Reaction press(const Patch& patch, Given given, double value) override;
+  Reaction press(const Patch& patch, Prescribed given, double value) override;
   std::size_t bytes() const noexcept override { return 0; }
 
  private:
@@ -118,7 +118,7 @@ class CondensedModel : public Model {
   CondensedModel(std::size_t mesh_nodes, std::vector<int> nodes, MatrixXd table, bool glides = false);
 
   /// Throws std::out_of_range if a node of the patch is not in the table.
-  Reaction press(const Patch& patch, Given given, double value) override;
+  Reaction press(const Patch& patch, Prescribed given, double value) override;
   bool glides() const noexcept override { return glides_; }
   std::size_t bytes() const noexcept override;
 

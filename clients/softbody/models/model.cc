@@ -13,11 +13,11 @@ constexpr int kAlike = 10;       // several in a row, because an oscillation can
 
 }  // namespace
 
-double constrained_force(Given given, double value, double untouched, double compliance) {
-  if (given == Given::kForce) return value;
+double constrained_force(Prescribed given, double value, double untouched, double compliance) {
+  if (given == Prescribed::kForce) return value;
   if (!(compliance > 0)) return 0;
   const double force = (value - untouched) / compliance;
-  return given == Given::kLeastDepth ? std::max(0.0, force) : force;
+  return given == Prescribed::kLeastDepth ? std::max(0.0, force) : force;
 }
 
 double secant(const Reaction& reaction, double rest) {
@@ -32,7 +32,7 @@ void Model::go_on_from(const Model&, std::span<const int>) {
   throw std::logic_error("this model does not support cutting");
 }
 
-Reaction settle(Model& model, const Patch& patch, Given given, double value, double tolerance, double most) {
+Reaction settle(Model& model, const Patch& patch, Prescribed given, double value, double tolerance, double most) {
   const int apart = model.step() > 0 ? std::max(1, static_cast<int>(std::lround(kApart / model.step()))) : 1;
   const int rounds = static_cast<int>(std::ceil(most / kApart));
   Reaction last = model.press(patch, given, value);

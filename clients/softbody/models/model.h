@@ -15,7 +15,7 @@ struct Division;
 struct EffectsConfig;
 
 /// The quantity that is given.
-enum class Given : std::uint8_t {
+enum class Prescribed : std::uint8_t {
   kDepth,       ///< mean depth of the patch, m; the force may pull
   kLeastDepth,  ///< minimum of the mean depth, m; the tool cannot pull
   kForce,       ///< force on the body, N
@@ -59,7 +59,7 @@ struct Reaction {
 
 /// Returns the force (N) of the tool. `untouched` is the depth without the tool (m), and `compliance` is the change of
 /// depth per force (m/N).
-double constrained_force(Given given, double value, double untouched, double compliance);
+double constrained_force(Prescribed given, double value, double untouched, double compliance);
 
 /// `rest` is the depth (m) at rest.
 double secant(const Reaction& reaction, double rest);
@@ -76,7 +76,7 @@ class Model {
 
   /// Returns the answer to one patch. If the model has a state, it continues from the last call. If the model has time,
   /// this is one step. If the patch has no nodes, there is no contact.
-  virtual Reaction press(const Patch& patch, Given given, double value) = 0;
+  virtual Reaction press(const Patch& patch, Prescribed given, double value) = 0;
 
   /// Must be called after the solid has been cut in place. Throws std::logic_error if the model does not support
   /// cutting.
@@ -100,6 +100,7 @@ class Model {
 
 /// Presses until the relative difference of two answers is below `tolerance`, or for at most `most` seconds. For a body
 /// with time, the two answers are 0.01 s apart. The error of the answer includes the remaining change.
-Reaction settle(Model& model, const Patch& patch, Given given, double value, double tolerance = 1e-4, double most = 5);
+Reaction settle(Model& model, const Patch& patch, Prescribed given, double value, double tolerance = 1e-4,
+                double most = 5);
 
 }  // namespace tendon::softbody

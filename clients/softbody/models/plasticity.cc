@@ -172,7 +172,7 @@ PlasticModel::PlasticModel(const Solid& solid, const TouchSurface& surface, cons
   model_.forget_forces();
 }
 
-Reaction PlasticModel::press(const Patch& patch, Given given, double value) {
+Reaction PlasticModel::press(const Patch& patch, Prescribed given, double value) {
   const Reaction reaction = model_.press(patch, given, value);
   solid_.advance(model_.displacements());
   model_.forget_forces();

@@ -67,7 +67,7 @@ class PlasticModel : public Model {
   PlasticModel(const Solid& solid, const TouchSurface& surface, const QuasiStaticModel::Config& config,
                const EffectsConfig& effects, const Yield& yield);
 
-  Reaction press(const Patch& patch, Given given, double value) override;
+  Reaction press(const Patch& patch, Prescribed given, double value) override;
   bool still() const noexcept override { return model_.still() && !solid_.yielded(); }
   bool glides() const noexcept override { return model_.glides(); }
   std::size_t bytes() const noexcept override { return solid_.bytes() + model_.bytes(); }

@@ -125,13 +125,13 @@ VectorXd QuasiStaticModel::solve_at_depth(const VectorXd& b, bool among_sides, c
   return x - load.dot(x) / load.dot(by_tool) * by_tool;
 }
 
-bool QuasiStaticModel::foresee(const VectorXd& internal, const VectorXd& load, Given given, double value) {
+bool QuasiStaticModel::foresee(const VectorXd& internal, const VectorXd& load, Prescribed given, double value) {
   const VectorXd b = self_collision_->free_forces(u_) - internal;
-  if (given == Given::kForce) {
+  if (given == Prescribed::kForce) {
     self_collision_->foresee(factor_, u_, b + value * load, nullptr, 0);
   } else {
     const double by = value - load.dot(elastic_.to_free(u_));
-    const bool pulls = self_collision_->foresee(factor_, u_, b, &load, by) < 0 && given == Given::kLeastDepth;
+    const bool pulls = self_collision_->foresee(factor_, u_, b, &load, by) < 0 && given == Prescribed::kLeastDepth;
     if (pulls) {
       self_collision_->foresee(factor_, u_, b, nullptr, 0);
     }
@@ -269,7 +269,7 @@ void QuasiStaticModel::find_tangent(const VectorXd& load, const Patch* patch, co
   reaction.knows_glide = true;
 }
 
-double QuasiStaticModel::newton(const VectorXd& load, const Patch* patch, Given given, double value,
+double QuasiStaticModel::newton(const VectorXd& load, const Patch* patch, Prescribed given, double value,
                                 Reaction& reaction) {
   double error = std::numeric_limits<double>::infinity();
   double before = std::numeric_limits<double>::infinity();
@@ -338,7 +338,7 @@ double QuasiStaticModel::newton(const VectorXd& load, const Patch* patch, Given 
   return error;
 }
 
-double QuasiStaticModel::part_sides(const VectorXd& load, const Patch* patch, Given given, double value,
+double QuasiStaticModel::part_sides(const VectorXd& load, const Patch* patch, Prescribed given, double value,
                                     Reaction& reaction) {
   int iterations = iterations_;
   double error = reaction.error;
@@ -353,7 +353,7 @@ double QuasiStaticModel::part_sides(const VectorXd& load, const Patch* patch, Gi
   }
 }
 
-Reaction QuasiStaticModel::press(const Patch& patch, Given given, double value) {
+Reaction QuasiStaticModel::press(const Patch& patch, Prescribed given, double value) {
   Reaction reaction;
   if (patch.nodes.empty()) {
     release();
@@ -395,8 +395,8 @@ double QuasiStaticModel::release() {
   Reaction free;
   VectorXd nothing = VectorXd::Zero(elastic_.free_count());
   nothing[0] = 1;  // any direction
-  free.error = newton(nothing, nullptr, Given::kForce, 0, free);
-  if (self_collision_) part_sides(nothing, nullptr, Given::kForce, 0, free);
+  free.error = newton(nothing, nullptr, Prescribed::kForce, 0, free);
+  if (self_collision_) part_sides(nothing, nullptr, Prescribed::kForce, 0, free);
   for (const auto& effect : effects_) effect->advance(elastic_.to_free(u_));
   return forces().energy;
 }

@@ -35,7 +35,7 @@ class QuasiStaticModel : public Model {
   QuasiStaticModel(const Elastic& elastic, const TouchSurface& surface, const Config& config,
                    const EffectsConfig& effects = {});
 
-  Reaction press(const Patch& patch, Given given, double value) override;
+  Reaction press(const Patch& patch, Prescribed given, double value) override;
   void cut(const Division& division, const EffectsConfig& effects) override;
   void go_on_from(const Model& before, std::span<const int> node_before) override;
   double step() const noexcept override { return step_; }
@@ -79,7 +79,7 @@ class QuasiStaticModel : public Model {
   void stiffness(Elastic::Curvature curvature);
   bool factorize();
   /// Returns true if two sides of the body will be in contact.
-  bool foresee(const VectorXd& internal, const VectorXd& load, Given given, double value);
+  bool foresee(const VectorXd& internal, const VectorXd& load, Prescribed given, double value);
   Step step_among_sides(const VectorXd& internal, const VectorXd& load) const;
   VectorXd solve(const VectorXd& b, bool among_sides) const;
   VectorXd solve_at_depth(const VectorXd& b, bool among_sides, const VectorXd& load, const VectorXd& by_tool) const;
@@ -90,9 +90,9 @@ class QuasiStaticModel : public Model {
   void find_shapes(const VectorXd& load, const MatrixXd& slopes, const Tangent& tangent);
   void find_tangent(const VectorXd& load, const Patch* patch, const Tangent& tangent, Reaction& reaction);
   /// Solves for fixed pairs of sides. Returns the error (N).
-  double newton(const VectorXd& load, const Patch* patch, Given given, double value, Reaction& reaction);
+  double newton(const VectorXd& load, const Patch* patch, Prescribed given, double value, Reaction& reaction);
   /// Solves and updates the pairs of sides until they do not change. Returns the error (N).
-  double part_sides(const VectorXd& load, const Patch* patch, Given given, double value, Reaction& reaction);
+  double part_sides(const VectorXd& load, const Patch* patch, Prescribed given, double value, Reaction& reaction);
 
   const Elastic& elastic_;
   Vec3 normal_;

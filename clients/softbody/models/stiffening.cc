@@ -44,8 +44,8 @@ void StiffeningModel::go_on_from(const Model& before, std::span<const int> node_
   model_->go_on_from(*same.model_, node_before);
 }
 
-Reaction StiffeningModel::press(const Patch& patch, Given given, double value) {
-  Reaction reaction = model_->press(patch, given, given == Given::kForce ? value / factor_ : value);
+Reaction StiffeningModel::press(const Patch& patch, Prescribed given, double value) {
+  Reaction reaction = model_->press(patch, given, given == Prescribed::kForce ? value / factor_ : value);
   reaction.force *= factor_;
   reaction.stiffness *= factor_;
   reaction.error *= factor_;

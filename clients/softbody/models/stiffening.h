@@ -34,7 +34,7 @@ class StiffeningModel : public Model {
 
   void tick(double time) { factor_ = law_.factor_at(time); }  ///< s
 
-  Reaction press(const Patch& patch, Given given, double value) override;
+  Reaction press(const Patch& patch, Prescribed given, double value) override;
   void cut(const Division& division, const EffectsConfig& effects) override { model_->cut(division, effects); }
   void go_on_from(const Model& before, std::span<const int> node_before) override;
   double step() const noexcept override { return model_->step(); }

@@ -10,14 +10,14 @@ namespace tendon::softbody {
 FallbackModel::FallbackModel(std::vector<std::unique_ptr<FallbackLevel>> levels, std::unique_ptr<NearModel> near)
     : levels_(std::move(levels)), answers_(levels_.size()), near_(std::move(near)) {}
 
-Reaction FallbackModel::press(const Patch& patch, Given given, double value) {
-  if (given == Given::kForce || patch.nodes.empty()) return near_->press(patch, given, value);
+Reaction FallbackModel::press(const Patch& patch, Prescribed given, double value) {
+  if (given == Prescribed::kForce || patch.nodes.empty()) return near_->press(patch, given, value);
   std::vector<FallbackLevel::Answer> answers;
   bool whole = false;
   for (std::size_t i = 0; i < levels_.size() && !whole; ++i) {
     const auto answer = levels_[i]->press(patch, value);
     // A level may pull.
-    if (!answer || (given == Given::kLeastDepth && answer->reaction.force < 0)) continue;
+    if (!answer || (given == Prescribed::kLeastDepth && answer->reaction.force < 0)) continue;
     ++answers_[i];
     answers.push_back(*answer);
     whole = answer->share >= 1;

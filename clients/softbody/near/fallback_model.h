@@ -19,7 +19,7 @@ class FallbackModel : public Model {
   /// The first level is preferred.
   FallbackModel(std::vector<std::unique_ptr<FallbackLevel>> levels, std::unique_ptr<NearModel> near);
 
-  Reaction press(const Patch& patch, Given given, double value) override;
+  Reaction press(const Patch& patch, Prescribed given, double value) override;
   /// Removes the levels, which are valid for the uncut body only.
   void cut(const Division& division, const EffectsConfig& effects) override;
   void go_on_from(const Model& before, std::span<const int> node_before) override;

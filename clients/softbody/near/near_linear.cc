@@ -23,7 +23,7 @@ constexpr double kByEnergy = 5;
 
 }  // namespace
 
-Reaction NearModel::linear_press(const Patch& patch, Given given, double value) const {
+Reaction NearModel::linear_press(const Patch& patch, Prescribed given, double value) const {
   const VectorXd load = solid_.to_free(patch_load(solid_, surface_.normal(), patch));
   const VectorXd per_newton = at_rest_.solve(load);
   const double compliance = load.dot(per_newton);
@@ -56,7 +56,7 @@ Reaction NearModel::linear_press(const Patch& patch, Given given, double value) 
       kStepSafety * std::abs(work - reaction.force) + (1 - share) * kLinearSafety * std::abs(work - linear);
   // The nonlinear part of the force is quadratic in the depth.
   reaction.stiffness = (linear != 0 ? 2 * reaction.force / linear - 1 : 1) / compliance;
-  if (given == Given::kForce) {
+  if (given == Prescribed::kForce) {
     solid_.add_free((value - reaction.force) * per_newton, u);
     reaction.force = value;
   }
@@ -71,7 +71,7 @@ Reaction NearModel::linear_press(const Patch& patch, Given given, double value) 
 Handover NearModel::beyond_linear() const {
   if (by_linear_) return handover_;
   if (!(last_.felt.depth > 0)) return {};
-  const Reaction there = linear_press(last_.patch, Given::kDepth, last_.felt.depth);
+  const Reaction there = linear_press(last_.patch, Prescribed::kDepth, last_.felt.depth);
   return handover(last_.felt, there, last_.felt.depth);
 }
 

@@ -126,7 +126,7 @@ struct NearModel::Field {
     return patch;
   }
 
-  Reaction press(const Patch& patch, Given given, double value) {
+  Reaction press(const Patch& patch, Prescribed given, double value) {
     if (body == nullptr) {
       Reaction reaction = model->press(patch, given, value);
       reaction.way = Way::kWhole;
@@ -342,7 +342,7 @@ Pieces NearModel::Making::pieces() {
     if (i == kFactorAt && about.size() == 0) field->model->set_displacements(field->model->displacements());
     Patch here = field->own(held ? hand.patch : first);
     here.curvatures = {};
-    const Reaction reaction = field->model->press(here, Given::kDepth, deep);
+    const Reaction reaction = field->model->press(here, Prescribed::kDepth, deep);
     field->handover = held ? handover(hand.felt, reaction, deep) : Handover{};
     co_await kPieceDone;
     if (i >= kFactorAt && reaction.error <= config.newton.tolerance * std::abs(reaction.force)) break;
@@ -375,7 +375,7 @@ Pieces NearModel::Oracle::pieces(Making& making) {
   Reaction pressed;
   bool bent = false;
   for (int i = 0; making.depth > 0 && i < kShapePresses && !bent; ++i) {
-    pressed = whole.press(making.first, Given::kDepth, making.depth);
+    pressed = whole.press(making.first, Prescribed::kDepth, making.depth);
     bent = pressed.error <= kShape * std::abs(pressed.force);
     co_await kPieceDone;
   }
@@ -449,7 +449,7 @@ void NearModel::take_made(const Patch& patch, const Vec3& place, double depth) {
   spent_ = std::move(made);
 }
 
-Reaction NearModel::press_by_field_or_linear(const Patch& patch, const Vec3& place, Given given, double value) {
+Reaction NearModel::press_by_field_or_linear(const Patch& patch, const Vec3& place, Prescribed given, double value) {
   if (field_ && field_->holds(patch, place, 2)) {
     Reaction reaction = field_->press(patch, given, value);
     if (by_linear_) {  // the field is valid again
@@ -465,10 +465,10 @@ Reaction NearModel::press_by_field_or_linear(const Patch& patch, const Vec3& pla
   return kept(handover_, 1, linear_press(patch, given, value));
 }
 
-Reaction NearModel::press(const Patch& patch, Given given, double value) {
+Reaction NearModel::press(const Patch& patch, Prescribed given, double value) {
   if (patch.nodes.empty()) return {};
   const Vec3 place = place_of(solid_.mesh(), patch);
-  const double depth = given == Given::kForce ? last_.felt.depth : value;
+  const double depth = given == Prescribed::kForce ? last_.felt.depth : value;
   faded_ += std::hypot((place - last_.place).norm(), depth - last_.felt.depth);
   make_or_take(patch, place, depth, 0);
   Reaction reaction;

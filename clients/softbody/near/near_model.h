@@ -76,7 +76,7 @@ class NearModel : public Model {
   /// Must be called before the body is cut.
   void make_no_more_fields();
 
-  Reaction press(const Patch& patch, Given given, double value) override;
+  Reaction press(const Patch& patch, Prescribed given, double value) override;
   /// Must be called if a level has answered. `room` is 0 at the border of the level, and 1 if the border is far. If
   /// there is no background thread, a field is built while `room` is less than 1, so that it is complete at 0.
   void follow(const Patch& patch, const Reaction& felt, double room);
@@ -127,9 +127,9 @@ class NearModel : public Model {
   void take_made(const Patch& patch, const Vec3& place, double depth);
   void ask();
   /// Uses linear_press() if the field does not contain the patch.
-  Reaction press_by_field_or_linear(const Patch& patch, const Vec3& place, Given given, double value);
+  Reaction press_by_field_or_linear(const Patch& patch, const Vec3& place, Prescribed given, double value);
   /// Uses the linear body and one Newton step.
-  Reaction linear_press(const Patch& patch, Given given, double value) const;
+  Reaction linear_press(const Patch& patch, Prescribed given, double value) const;
   /// Returns the difference between the last answer and linear_press().
   Handover beyond_linear() const;
 

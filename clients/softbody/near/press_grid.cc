@@ -68,7 +68,7 @@ class Presser {
       if (wasted_ >= kStepsOfFactor) model_.renew_factor();
     }
     SolvedPress solved;
-    solved.reaction = model_.press(patch, Given::kDepth, depth);
+    solved.reaction = model_.press(patch, Prescribed::kDepth, depth);
     solved.energy = model_.forces().energy;
     solved.good = solved.reaction.force > 0 && solved.reaction.error <= kSolvedWellEnough * solved.reaction.force &&
                   (solved.reaction.knows_glide || patch.curvatures.size() == 0) && std::isfinite(solved.energy);

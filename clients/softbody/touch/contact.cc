@@ -32,7 +32,7 @@ Feel PatchContact::at(const Vec3& tool) {
   if (!patch) {
     stuck_ = false;
     if (friction_) friction_->let_go();
-    if (!model_.still()) model_.press({}, Given::kForce, 0);
+    if (!model_.still()) model_.press({}, Prescribed::kForce, 0);
     return feel;
   }
   const Vec3& n = surface_.normal();
@@ -50,7 +50,7 @@ Feel PatchContact::at(const Vec3& tool) {
   Reaction reaction;
   feel.touching = stuck_;
   if (feel.gap < 0 || stuck_ || !model_.still()) {
-    reaction = model_.press(*patch, stuck_ ? Given::kDepth : Given::kLeastDepth, -feel.gap);
+    reaction = model_.press(*patch, stuck_ ? Prescribed::kDepth : Prescribed::kLeastDepth, -feel.gap);
     feel.touching = stuck_ || reaction.force > 0;
   }
   if (!feel.touching) {

@@ -39,13 +39,13 @@ inline bool matrix_of(std::span<const double> entries, Mat3& to) noexcept {
 /// Constructs the value in place without zeroing it first, as emplace() would do.
 template <class Value>
 Value& made(std::optional<Value>& value) {
-  struct Made {
+  struct Parsed {
     operator Value() const noexcept {
       Value one;
       return one;
     }
   };
-  return value.emplace(Made{});
+  return value.emplace(Parsed{});
 }
 
 /// Decodes fields in the order of their numbers. If a field is not next, it is absent. There are two kinds of errors:

@@ -27,7 +27,7 @@ namespace {
 
 template <class AnyBody>
 void answer_with(benchmark::State& state, AnyBody& body) {
-  const Reaction rest = body.settle(Given::kForce, 0.3);
+  const Reaction rest = body.settle(Prescribed::kForce, 0.3);
   const int steps = body.step() > 0 ? static_cast<int>(std::lround(0.01 / body.step())) : 1;
   double time = 0;
   for (auto _ : state) {
@@ -240,7 +240,7 @@ void cut(benchmark::State& state, Law law, bool anew) {
     state.PauseTiming();
     Solid solid = whole;
     std::unique_ptr<Model> model = construct(solid, top);
-    model->press(*top.patch(Vec2::Zero()), Given::kDepth, 1e-3);
+    model->press(*top.patch(Vec2::Zero()), Prescribed::kDepth, 1e-3);
     solid = parted;
     state.ResumeTiming();
     if (anew) {
@@ -248,7 +248,7 @@ void cut(benchmark::State& state, Law law, bool anew) {
     } else {
       model->cut(division, {});
     }
-    force = model->press(*parted_top.patch(Vec2::Zero()), Given::kDepth, 1e-3).force;
+    force = model->press(*parted_top.patch(Vec2::Zero()), Prescribed::kDepth, 1e-3).force;
   }
   state.counters["force_n"] = force;
   state.counters["twins"] = static_cast<double>(twins(parted, division).size());

@@ -59,8 +59,8 @@ ErrorsSaid errors_said(double deepest, const BlockOf& block_of) {
       place = Vec2(moved(place.x(), -0.03, 0.03), moved(place.y(), -0.03, 0.03));
       depth = moved(depth + widest / 3, 2e-4, deepest);
       const Patch patch = *block->top.patch(place);
-      const Reaction found = block->asked->press(patch, Given::kDepth, depth);
-      const double truth = block->exact.press(patch, Given::kDepth, depth).force;
+      const Reaction found = block->asked->press(patch, Prescribed::kDepth, depth);
+      const double truth = block->exact.press(patch, Prescribed::kDepth, depth).force;
       const double wrong = std::abs(found.force - truth);
       ++said.answers;
       said.covered += wrong <= found.error + 1e-9 * std::abs(truth) ? 1 : 0;

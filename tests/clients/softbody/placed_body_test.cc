@@ -229,7 +229,7 @@ TEST(PlacedBody, AnswersForEveryModelThatASceneCanName) {
       stiffness = -body.answer(hand_at(1e-4, std::chrono::milliseconds(10 * i))).force.x() / 1e-4;
     }
     const double expected =
-        Body(parse_scene(scene_of(model), "s.toml", ".").body).settle(Given::kDepth, 1e-4).force / 1e-4;
+        Body(parse_scene(scene_of(model), "s.toml", ".").body).settle(Prescribed::kDepth, 1e-4).force / 1e-4;
     EXPECT_NEAR(stiffness / expected, 1, 2e-3) << model.name;
     EXPECT_NEAR(stiffness, 470, 3) << model.name;
   }

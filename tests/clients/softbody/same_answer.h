@@ -13,7 +13,7 @@ namespace tendon::softbody::testing {
 class SameAnswer : public Model {
  public:
   explicit SameAnswer(Reaction reaction) : reaction_(std::move(reaction)) {}
-  Reaction press(const Patch&, Given, double) override { return reaction_; }
+  Reaction press(const Patch&, Prescribed, double) override { return reaction_; }
   bool glides() const noexcept override { return true; }
   std::size_t bytes() const noexcept override { return 0; }
 

@@ -55,7 +55,7 @@ TEST(SoftbodyScene, ThoseThatAreShippedMakeBodiesThatNobodyHasToBeWarnedOf) {
     const Scene scene = read_scene(std::filesystem::path(TENDON_SCENES) / name);
     EXPECT_EQ(warnings(scene.body), std::vector<std::string>{}) << name;
     Body body(scene.body);
-    EXPECT_GT(body.press(Given::kLeastDepth, 0.001).force, 0.1) << name;
+    EXPECT_GT(body.press(Prescribed::kLeastDepth, 0.001).force, 0.1) << name;
   }
 }
 

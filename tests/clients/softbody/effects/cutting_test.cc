@@ -54,7 +54,7 @@ struct Cuttable {
     patch = *top.patch(middle);
     model.cut(division, effects);
   }
-  Reaction press(double depth) { return model.press(patch, Given::kDepth, depth); }
+  Reaction press(double depth) { return model.press(patch, Prescribed::kDepth, depth); }
 
   Solid solid;
   TouchSurface top;
@@ -73,7 +73,7 @@ Reaction cut_from_the_start(Element element, int n, Law law, const std::vector<C
   const Solid whole = pressed_block(element, n, 0.45, law);
   const Solid solid = after(whole, divide(whole.mesh(), whole.fixed(), cuts));
   const TouchSurface top(solid.mesh(), Vec3::UnitZ(), kB1PatchRadius);
-  return PressedModel(solid, top, options...).press(*top.patch(Vec2::Zero()), Given::kDepth, depth);
+  return PressedModel(solid, top, options...).press(*top.patch(Vec2::Zero()), Prescribed::kDepth, depth);
 }
 
 TEST(Divide, OpensTheFacesBetweenAndPartsTheNodesOnThemButThoseAtTheTip) {
@@ -144,7 +144,7 @@ TEST(CutUnderLoad, AHalfThatIsCutOffGivesWayAsOneThatWasAlwaysAlone) {
     const Fixed fixed = fix_where(half, [](const Vec3& node) { return node.z() < 1e-9; });
     const Solid alone(std::move(half), element, body.solid.material(), Law::kLinear, fixed);
     const TouchSurface top(alone.mesh(), Vec3::UnitZ(), kB1PatchRadius);
-    const double expected = LinearModel(alone, top).press(*top.patch(where), Given::kDepth, 1e-3).force;
+    const double expected = LinearModel(alone, top).press(*top.patch(where), Prescribed::kDepth, 1e-3).force;
     EXPECT_NEAR(body.press(1e-3).force / expected, 1, 1e-9);
     EXPECT_LT(expected, 0.99 * whole);
   }
@@ -158,7 +158,7 @@ TEST(CutUnderLoad, WhatIsLeftBelowALostPieceGivesWayAsOneThatWasAlwaysAlone) {
   const Fixed fixed = fix_where(low, [](const Vec3& node) { return node.z() < 1e-9; });
   const Solid alone(std::move(low), Element::kHex8Sri, body.solid.material(), Law::kLinear, fixed);
   const TouchSurface top(alone.mesh(), Vec3::UnitZ(), kB1PatchRadius);
-  const double expected = LinearModel(alone, top).press(*top.patch(Vec2::Zero()), Given::kDepth, 1e-3).force;
+  const double expected = LinearModel(alone, top).press(*top.patch(Vec2::Zero()), Prescribed::kDepth, 1e-3).force;
   EXPECT_NEAR(body.press(1e-3).force / expected, 1, 1e-9);
   CutNewton large(Element::kHex8Sri, 4, Law::kNeoHookean, {});
   large.press(3e-3);
@@ -233,12 +233,12 @@ TEST(CutUnderLoad, ABodyThatSagsSagsMoreWhenItIsCut) {
     Body body(config);
     Body cut(config);
     cut.tick(2);
-    body.press(Given::kForce, 0.1);
+    body.press(Prescribed::kForce, 0.1);
     body.tick(1);
-    const double depth = body.press(Given::kForce, 0.1).depth;
-    EXPECT_NEAR(depth / cut.press(Given::kForce, 0.1).depth, 1, 1e-6);
+    const double depth = body.press(Prescribed::kForce, 0.1).depth;
+    EXPECT_NEAR(depth / cut.press(Prescribed::kForce, 0.1).depth, 1, 1e-6);
     config.cuts.clear();
-    EXPECT_GT(depth, 1.001 * Body(config).press(Given::kForce, 0.1).depth);
+    EXPECT_GT(depth, 1.001 * Body(config).press(Prescribed::kForce, 0.1).depth);
   }
 }
 
@@ -396,7 +396,7 @@ TEST(PreparedCut, PutsInNoEnergy) {
     const Solid whole = pressed_block(Element::kHex8Sri, 4, 0.45, law);
     const TouchSurface top(whole.mesh(), Vec3::UnitZ(), kB1PatchRadius);
     QuasiStaticModel before(whole, top, {});
-    const double force = before.press(*top.patch(Vec2::Zero()), Given::kDepth, 4e-3).force;
+    const double force = before.press(*top.patch(Vec2::Zero()), Prescribed::kDepth, 4e-3).force;
     const std::vector<Cut> cut{across(0, 0.025)};
     const Division division = divide(whole.mesh(), whole.fixed(), cut);
     const Solid parted = after(whole, division);
@@ -405,7 +405,7 @@ TEST(PreparedCut, PutsInNoEnergy) {
     const int factors = model.factors();
     model.go_on_from(before, division.node_before);
     EXPECT_NEAR(parted.energy(model.displacements()) / whole.energy(before.displacements()), 1, 1e-12);
-    EXPECT_LT(model.press(*there.patch(Vec2::Zero()), Given::kDepth, 4e-3).force, 0.99 * force);
+    EXPECT_LT(model.press(*there.patch(Vec2::Zero()), Prescribed::kDepth, 4e-3).force, 0.99 * force);
     EXPECT_EQ(model.factors(), factors);  // the factorization of the cut body at rest is used
     EXPECT_LT(parted.energy(model.displacements()), whole.energy(before.displacements()));
   }

@@ -43,7 +43,7 @@ TEST(Gravity, AColumnSagsUnderItsOwnWeightAsMuchAsItShould) {
     config.material.poisson = 0;
     config.effects.density = 1000;
     config.effects.gravity = Vec3(0, 0, -0.1);  // so small that all models are linear
-    const Reaction untouched = Body(config).press(Given::kForce, 0);
+    const Reaction untouched = Body(config).press(Prescribed::kForce, 0);
     EXPECT_NEAR(untouched.depth, 1000 * 0.1 * 0.05 * 0.05 / 2e4, 1e-3 * untouched.depth) << static_cast<int>(model);
     EXPECT_EQ(untouched.force, 0);
   }
@@ -55,7 +55,7 @@ TEST(Gravity, TheToolMeetsTheSurfaceWhereItHasSunkTo) {
     config.effects.density = 1000;
     config.effects.gravity = Vec3(0, 0, -9.81);
     Body body(config);
-    const double sunk = body.settle(Given::kForce, 0).depth;
+    const double sunk = body.settle(Prescribed::kForce, 0).depth;
     EXPECT_GT(sunk, 1e-4);
     const Feel above = body.touch(Vec3(0, 0, 0.05 - 0.9 * sunk));
     EXPECT_FALSE(above.touching) << static_cast<int>(model);
@@ -104,17 +104,17 @@ TEST(Inertia, OneMassSwingsDampedAndViscousAndUnderItsWeightAsOnPaper) {
         (weight + force + kMass / (dt * dt) * (2 * now - before) + slow * now) / (kMass / (dt * dt) + slow + kSpring);
     before = now;
     now = next;
-    EXPECT_NEAR(linear.press(patch, Given::kForce, force).depth, now, 1e-9);
-    EXPECT_NEAR(newton.press(patch, Given::kForce, force).depth, now, 1e-9);
+    EXPECT_NEAR(linear.press(patch, Prescribed::kForce, force).depth, now, 1e-9);
+    EXPECT_NEAR(newton.press(patch, Prescribed::kForce, force).depth, now, 1e-9);
   }
 }
 
 TEST(Inertia, AFastPushMeetsTheMassFirst) {
   BodyConfig config = pressed_body(ModelKind::kLinear, Element::kHex8Sri, 4);
-  const double still = Body(config).press(Given::kDepth, 1e-4).force;
+  const double still = Body(config).press(Prescribed::kDepth, 1e-4).force;
   config.effects = {.density = 1000, .step = 1e-3, .inertia = true};
   Body body(config);
-  EXPECT_GT(body.press(Given::kDepth, 1e-4).force, 3 * still);
+  EXPECT_GT(body.press(Prescribed::kDepth, 1e-4).force, 3 * still);
 }
 
 TEST(Damping, TakesTheEnergyThatASwingHas) {
@@ -125,10 +125,10 @@ TEST(Damping, TakesTheEnergyThatASwingHas) {
       config.effects = {.density = 1000, .step = 5e-4, .inertia = true};
       if (damped) config.effects.damping = 100;
       Body body(config);
-      for (int i = 0; i < 50; ++i) body.press(Given::kForce, 0.3);
+      for (int i = 0; i < 50; ++i) body.press(Prescribed::kForce, 0.3);
       double largest = 0;
       for (int i = 0; i < 400; ++i) {
-        const double depth = body.press(Given::kForce, 0).depth;
+        const double depth = body.press(Prescribed::kForce, 0).depth;
         if (i > 200) largest = std::max(largest, std::abs(depth));
       }
       left[damped ? 1 : 0] = largest;
@@ -141,11 +141,11 @@ TEST(Viscosity, ABodyCreepsWithTheRelaxationTimeOfItsMaterial) {
   // K (u + τ u̇) = f. With implicit Euler, u = u∞ (1 − (1 + dt/τ)⁻ⁿ) after n steps, for every shape.
   for (const ModelKind model : kImplicit) {
     BodyConfig config = pressed_body(model, Element::kTet4, 4);
-    const double in_the_end = Body(config).press(Given::kForce, 1e-3).depth;
+    const double in_the_end = Body(config).press(Prescribed::kForce, 1e-3).depth;
     config.effects = {.step = 0.01, .viscosity = 0.05};
     Body body(config);
     for (int n = 1; n <= 20; ++n) {
-      EXPECT_NEAR(body.press(Given::kForce, 1e-3).depth / in_the_end, 1 - std::pow(1.2, -n), 1e-3)
+      EXPECT_NEAR(body.press(Prescribed::kForce, 1e-3).depth / in_the_end, 1 - std::pow(1.2, -n), 1e-3)
           << static_cast<int>(model);
     }
   }
@@ -157,11 +157,11 @@ TEST(Viscosity, AQuickPressIsStifferThanASlowOne) {
   const auto force_at_5_mm = [&](int steps) {
     Body body(config);
     Reaction reaction;
-    for (int i = 1; i <= steps; ++i) reaction = body.press(Given::kDepth, 0.005 * i / steps);
+    for (int i = 1; i <= steps; ++i) reaction = body.press(Prescribed::kDepth, 0.005 * i / steps);
     return reaction.force;
   };
   const double still =
-      Body(pressed_body(ModelKind::kNeoHookean, Element::kHex8Sri, 4)).press(Given::kDepth, 0.005).force;
+      Body(pressed_body(ModelKind::kNeoHookean, Element::kHex8Sri, 4)).press(Prescribed::kDepth, 0.005).force;
   EXPECT_GT(force_at_5_mm(5), 1.8 * still);
   EXPECT_NEAR(force_at_5_mm(500) / still, 1, 0.05);
 }

@@ -51,7 +51,7 @@ void check(const StiffnessOverTime&) {}
 // NOLINTNEXTLINE(performance-unnecessary-value-param): as it is declared
 StiffeningModel::StiffeningModel(std::unique_ptr<Model>, StiffnessOverTime) { abort_with(factor_); }
 void StiffeningModel::go_on_from(const Model&, std::span<const int>) { std::abort(); }
-Reaction StiffeningModel::press(const Patch&, Given, double) { std::abort(); }
+Reaction StiffeningModel::press(const Patch&, Prescribed, double) { std::abort(); }
 std::size_t StiffeningModel::bytes() const noexcept { return 0; }
 
 }  // namespace tendon::softbody

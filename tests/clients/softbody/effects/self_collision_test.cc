@@ -57,7 +57,7 @@ struct Jaws {
     for (std::size_t i = 0; i < fixed.size(); ++i) fixed[i] = fixed[i] || !used[i / 3];
     return {std::move(mesh), element, {.young = kYoung, .poisson = 0.3}, law, fixed};
   }
-  Reaction press(double depth) { return model.press(patch, Given::kDepth, depth); }
+  Reaction press(double depth) { return model.press(patch, Prescribed::kDepth, depth); }
 
   /// Largest penetration of the slot's roof below its floor, m. The floor is the line through its nodes with the same
   /// y at rest.
@@ -251,8 +251,8 @@ TEST(SelfCollision, ASlitPressedShutIsAsNoneAndADrawnOneGapes) {
   const double pressure = 250;  // Pa: 2.5 % strain
   const double bed = kYoung / 1e-6;
   const auto depth = [](SlitBar& bar, double newton) {
-    bar.model.press(bar.patch, Given::kForce, 0.2 * newton);
-    return bar.model.press(bar.patch, Given::kForce, newton).depth;
+    bar.model.press(bar.patch, Prescribed::kForce, 0.2 * newton);
+    return bar.model.press(bar.patch, Prescribed::kForce, newton).depth;
   };
   SlitBar whole(std::nullopt, false);
   SlitBar gaping(std::nullopt, true);
@@ -323,7 +323,7 @@ TEST(SelfCollision, AHeavyJawFallsOnTheOtherAndStaysThere) {
   falling.model.set_displacements(VectorXd::Zero(falling.solid.size()));  // the jaw begins at its undeformed position
   double deepest = 0;
   for (int i = 0; i < 40; ++i) {
-    falling.model.press({}, Given::kForce, 0);
+    falling.model.press({}, Prescribed::kForce, 0);
     deepest = std::max(deepest, falling.overlap());
   }
   EXPECT_LT(deepest, 5e-4);

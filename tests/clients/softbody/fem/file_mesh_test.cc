@@ -84,7 +84,7 @@ class MeshOfAFile : public ::testing::Test {
     config.patch_radius = 0.02;
     return config;
   }
-  static double stiffness(const BodyConfig& body) { return Body(body).settle(Given::kForce, 4e-3).stiffness; }
+  static double stiffness(const BodyConfig& body) { return Body(body).settle(Prescribed::kForce, 4e-3).stiffness; }
   static std::string refusal(const BodyConfig& body) {
     try {
       Body made(body);

@@ -34,9 +34,9 @@ TEST(Regions, OfEqualMaterialsAreOneBodyForEveryModel) {
     Body two(config);
     for (int i = 0; i < 5; ++i) {
       const double depth = 1e-4 * (1 + i);
-      const double expected = one.press(Given::kDepth, depth).force;
+      const double expected = one.press(Prescribed::kDepth, depth).force;
       EXPECT_GT(expected, 0) << model.name;
-      EXPECT_NEAR(two.press(Given::kDepth, depth).force / expected, 1, 1e-12) << model.name;
+      EXPECT_NEAR(two.press(Prescribed::kDepth, depth).force / expected, 1, 1e-12) << model.name;
     }
   }
 }
@@ -44,12 +44,12 @@ TEST(Regions, OfEqualMaterialsAreOneBodyForEveryModel) {
 TEST(Regions, AStiffHalfMakesEveryModelStiffer) {
   for (const ModelInfo& model : models()) {
     BodyConfig config = of_model(model);
-    const double soft = Body(config).settle(Given::kDepth, 1e-4).force;
+    const double soft = Body(config).settle(Prescribed::kDepth, 1e-4).force;
     config.regions = {half_with({.young = 4 * config.material.young, .poisson = config.material.poisson})};
-    const double mixed = Body(config).settle(Given::kDepth, 1e-4).force;
+    const double mixed = Body(config).settle(Prescribed::kDepth, 1e-4).force;
     config.regions = {};
     config.material.young *= 4;
-    const double stiff = Body(config).settle(Given::kDepth, 1e-4).force;
+    const double stiff = Body(config).settle(Prescribed::kDepth, 1e-4).force;
     EXPECT_GT(mixed, 1.2 * soft) << model.name;
     EXPECT_LT(mixed, 0.9 * stiff) << model.name;
   }
@@ -104,13 +104,13 @@ TEST(Regions, AfterACutEveryElementThatIsLeftIsOfItsMaterial) {
   config.regions = {half_with(stiff)};
   for (const Cut& cut : around) config.cuts.push_back({cut, PlannedCut::When::kTime, 1});
   Body body(config);
-  const double before = body.press(Given::kDepth, 1e-3).force;
+  const double before = body.press(Prescribed::kDepth, 1e-3).force;
   body.tick(1);
   const Solid parted(division.mesh, Element::kHex8Sri, config.material, Law::kLinear, division.fixed,
                      materials_of(division.mesh, config.material, config.regions));
   const TouchSurface top(parted.mesh(), Vec3::UnitZ(), config.patch_radius);
-  const double expected = LinearModel(parted, top).press(*top.patch(Vec2::Zero()), Given::kDepth, 1e-3).force;
-  EXPECT_NEAR(body.press(Given::kDepth, 1e-3).force / expected, 1, 1e-9);
+  const double expected = LinearModel(parted, top).press(*top.patch(Vec2::Zero()), Prescribed::kDepth, 1e-3).force;
+  EXPECT_NEAR(body.press(Prescribed::kDepth, 1e-3).force / expected, 1, 1e-9);
   EXPECT_LT(expected, 0.999 * before);
 }
 

@@ -67,15 +67,15 @@ TEST(HardPress, EightMillimetresDeepIsTheSameAtOnceAndInSteps) {
   for (const int n : {8, 12}) {
     Side side(testing::pressed_block(Element::kHex8Sri, n, 0.45, Law::kCorotational), Vec3::UnitZ(), Vec3::Zero());
     const Patch patch = *side.surface.patch(Vec2::Zero());
-    const Reaction at_once = side.whole.press(patch, Given::kDepth, 0.008);
+    const Reaction at_once = side.whole.press(patch, Prescribed::kDepth, 0.008);
     EXPECT_LT(at_once.stiffness, 0.7 * at_once.force / 0.008);  // softening: close to the patch's limit load
     EXPECT_LT(at_once.error, 1e-6 * at_once.force);
     QuasiStaticModel slow(side.solid, side.surface, {.tolerance = 1e-9});
-    for (double depth = 0.0005; depth < 0.0096; depth += 0.0005) slow.press(patch, Given::kDepth, depth);
-    const Reaction from_above = slow.press(patch, Given::kDepth, 0.008);
+    for (double depth = 0.0005; depth < 0.0096; depth += 0.0005) slow.press(patch, Prescribed::kDepth, depth);
+    const Reaction from_above = slow.press(patch, Prescribed::kDepth, 0.008);
     EXPECT_NEAR(from_above.force, at_once.force, 1e-6 * at_once.force) << n;
     EXPECT_NEAR(from_above.stiffness, at_once.stiffness, 0.01 * at_once.stiffness) << n;
-    const Reaction near = side.near.press(patch, Given::kDepth, 0.008);
+    const Reaction near = side.near.press(patch, Prescribed::kDepth, 0.008);
     EXPECT_LT(std::abs(near.force - at_once.force), near.error) << n;
     EXPECT_NEAR(near.force, at_once.force, 0.01 * at_once.force) << n;
   }
@@ -99,13 +99,13 @@ TEST(HardPress, AMillionTimesStifferFarFieldIsCoveredByTheErrorSaid) {
                 Vec3::Zero());
       for (const double depth : {1e-3, 3e-3}) {
         const Patch patch = *side.surface.patch(Vec2::Zero());
-        const Reaction whole = side.whole.press(patch, Given::kDepth, depth);
-        const Reaction near = side.near.press(patch, Given::kDepth, depth);
+        const Reaction whole = side.whole.press(patch, Prescribed::kDepth, depth);
+        const Reaction near = side.near.press(patch, Prescribed::kDepth, depth);
         // Rounding errors of the stiff part affect the soft part.
         EXPECT_LT(whole.error, 1e-3 * whole.force) << ratio << ' ' << depth;
         EXPECT_LE(std::abs(near.force - whole.force), near.error) << ratio << ' ' << depth;
-        // With a rigid far field, the first answer is exact. A far field softer than the near field moves as much as the near field,
-        // and rotates.
+        // With a rigid far field, the first answer is exact. A far field softer than the near field moves as much as
+        // the near field, and rotates.
         const double share = ratio > 1 ? 1e-5 : 0.05;
         EXPECT_LT(std::abs(near.force - whole.force), share * whole.force) << ratio << ' ' << depth;
         EXPECT_LT(near.error, 0.2 * near.force) << ratio << ' ' << depth;
@@ -119,17 +119,17 @@ TEST(HardPress, NearlyIncompressibleAtOnceIsTheSameAsInSteps) {
     for (const int n : {8, 12}) {
       Side side(testing::pressed_block(Element::kHex8Sri, n, 0.499, law), Vec3::UnitZ(), Vec3::Zero());
       const Patch patch = *side.surface.patch(Vec2::Zero());
-      const Reaction at_once = side.whole.press(patch, Given::kDepth, 0.005);
+      const Reaction at_once = side.whole.press(patch, Prescribed::kDepth, 0.005);
       EXPECT_EQ(side.solid.inverted(side.whole.displacements()), 0) << n;
       QuasiStaticModel slow(side.solid, side.surface, {.tolerance = 1e-9});
       Reaction in_steps;
       for (double depth = 0.0005; depth < 0.00501; depth += 0.0005) {
-        in_steps = slow.press(patch, Given::kDepth, depth);
+        in_steps = slow.press(patch, Prescribed::kDepth, depth);
       }
       EXPECT_LT(in_steps.error, 1e-6 * in_steps.force) << n;
       EXPECT_LE(std::abs(at_once.force - in_steps.force), at_once.error + in_steps.error) << n;
       EXPECT_LT(at_once.error, 2e-3 * at_once.force) << n;  // the iteration limit ends the solver
-      const Reaction near = side.near.press(patch, Given::kDepth, 0.005);
+      const Reaction near = side.near.press(patch, Prescribed::kDepth, 0.005);
       EXPECT_LE(std::abs(near.force - in_steps.force), near.error) << n;
       EXPECT_NEAR(near.force, in_steps.force, 0.01 * in_steps.force) << n;
     }

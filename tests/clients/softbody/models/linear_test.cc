@@ -23,7 +23,7 @@ using testing::pressed_block;
 double stiffness(Element element, int n, double poisson) {
   const Solid solid = pressed_block(element, n, poisson);
   const TouchSurface top(solid.mesh(), Vec3::UnitZ(), kB1PatchRadius);
-  return LinearModel(solid, top).press(*top.patch(Vec2::Zero()), Given::kForce, 0.3).stiffness;
+  return LinearModel(solid, top).press(*top.patch(Vec2::Zero()), Prescribed::kForce, 0.3).stiffness;
 }
 
 double error_percent(Element element, int n, double poisson, double truth) {
@@ -69,7 +69,7 @@ TEST(Reference, AHalfSpaceGivesWayUnderThePatchAsBoussinesqSays) {
   const Solid quarter = testing::quarter_of_half_space(Element::kHex27, testing::graded(a / 3, 60 * a, 7), material);
   const TouchSurface top(quarter.mesh(), Vec3::UnitZ(), a);
   const Patch patch = *top.patch(Vec2::Zero(), 0.2);
-  const double quarter_stiffness = LinearModel(quarter, top).press(patch, Given::kForce, 1).stiffness;
+  const double quarter_stiffness = LinearModel(quarter, top).press(patch, Prescribed::kForce, 1).stiffness;
   EXPECT_NEAR(4 * quarter_stiffness * compliance, 1, 0.03);
 }
 
@@ -81,13 +81,13 @@ TEST(Condensed, EqualsTheLinearModelItComesFromAllOverTheTop) {
     CondensedModel condensed(solid, top, top.nodes());
     for (const Vec2& middle : {Vec2(0, 0), Vec2(0.013, -0.007), Vec2(-0.04, 0.045)}) {
       const Patch patch = *top.patch(middle);
-      const Reaction expected = parent.press(patch, Given::kDepth, 2e-3);
-      const Reaction found = condensed.press(patch, Given::kDepth, 2e-3);
+      const Reaction expected = parent.press(patch, Prescribed::kDepth, 2e-3);
+      const Reaction found = condensed.press(patch, Prescribed::kDepth, 2e-3);
       EXPECT_NEAR(found.force / expected.force, 1, 1e-9);
       EXPECT_NEAR(found.stiffness / expected.stiffness, 1, 1e-9);
       EXPECT_LT((found.slope - expected.slope).norm(), 1e-9);
       EXPECT_EQ(found.depth, 2e-3);
-      EXPECT_NEAR(condensed.press(patch, Given::kForce, found.force).depth, 2e-3, 1e-14);
+      EXPECT_NEAR(condensed.press(patch, Prescribed::kForce, found.force).depth, 2e-3, 1e-14);
     }
   }
 }
@@ -96,8 +96,8 @@ TEST(Condensed, RefusesAPatchThatLeavesItsTable) {
   const Solid solid = pressed_block(Element::kHex8Sri, 8, 0.45);
   const TouchSurface top(solid.mesh(), Vec3::UnitZ(), kB1PatchRadius);
   CondensedModel condensed(solid, top, top.nodes_of_patches(Vec2::Zero(), 0.001));
-  EXPECT_NO_THROW(condensed.press(*top.patch(Vec2::Zero()), Given::kForce, 1));
-  EXPECT_THROW(condensed.press(*top.patch(Vec2(0.04, 0)), Given::kForce, 1), std::out_of_range);
+  EXPECT_NO_THROW(condensed.press(*top.patch(Vec2::Zero()), Prescribed::kForce, 1));
+  EXPECT_THROW(condensed.press(*top.patch(Vec2(0.04, 0)), Prescribed::kForce, 1), std::out_of_range);
 }
 
 TEST(Patches, WeightsAreAMeanAndTheirSlopesTheirChange) {

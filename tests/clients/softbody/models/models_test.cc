@@ -14,13 +14,13 @@ using testing::pressed_body;
 TEST(Models, EachGivesTheSameStiffnessWhetherDepthOrForceIsGiven) {
   for (const ModelInfo& model : models()) {
     const BodyConfig config = pressed_body(model.kind, Element::kTet4, 4);
-    const Reaction by_force = Body(config).settle(Given::kForce, 0.3);
-    const Reaction by_depth = Body(config).settle(Given::kDepth, by_force.depth);
+    const Reaction by_force = Body(config).settle(Prescribed::kForce, 0.3);
+    const Reaction by_depth = Body(config).settle(Prescribed::kDepth, by_force.depth);
     EXPECT_NEAR(by_depth.force, 0.3, 5e-4) << model.name;
     EXPECT_LT((by_depth.slope - by_force.slope).norm(), 1e-3) << model.name;
-    const Reaction pulled = Body(config).settle(Given::kDepth, -by_force.depth);
+    const Reaction pulled = Body(config).settle(Prescribed::kDepth, -by_force.depth);
     EXPECT_LT(pulled.force, -0.2) << model.name;
-    const Reaction left = Body(config).settle(Given::kLeastDepth, -by_force.depth);
+    const Reaction left = Body(config).settle(Prescribed::kLeastDepth, -by_force.depth);
     EXPECT_EQ(left.force, 0) << model.name;
     EXPECT_NEAR(left.depth, 0, 1e-8) << model.name;
   }

@@ -46,9 +46,9 @@ struct Bar {
     return {std::move(mesh), element, {.young = kYoung, .poisson = 0.3}, law, fixed};
   }
   double stress_at(double strain) {  // Pa, tension positive
-    return -model.press(patch, Given::kDepth, -strain * kLength).force / kArea;
+    return -model.press(patch, Prescribed::kDepth, -strain * kLength).force / kArea;
   }
-  double strain_without_force() { return -model.press(patch, Given::kForce, 0).depth / kLength; }
+  double strain_without_force() { return -model.press(patch, Prescribed::kForce, 0).depth / kLength; }
 
   static constexpr double kYoung = 1e4;
   static constexpr double kLength = 0.04;
@@ -149,14 +149,14 @@ TEST(Plasticity, BelowTheYieldTheAnswersAreThoseOfTheElasticBody) {
     PlasticModel plastic(solid, top, {}, {}, far);
     EXPECT_TRUE(plastic.still());
     for (const double depth : {1e-3, 4e-3, 2e-3, 6e-3, 0.0}) {
-      const Reaction a = elastic.press(patch, Given::kDepth, depth);
-      const Reaction b = plastic.press(patch, Given::kDepth, depth);
+      const Reaction a = elastic.press(patch, Prescribed::kDepth, depth);
+      const Reaction b = plastic.press(patch, Prescribed::kDepth, depth);
       EXPECT_EQ(a.force, b.force);
       EXPECT_EQ(a.stiffness, b.stiffness);
       EXPECT_EQ(a.depth, b.depth);
       EXPECT_EQ(elastic.displacements(), plastic.displacements());
       if (law == Law::kLinear && depth > 0) {
-        EXPECT_NEAR(b.force / LinearModel(solid, top).press(patch, Given::kDepth, depth).force, 1, 1e-10);
+        EXPECT_NEAR(b.force / LinearModel(solid, top).press(patch, Prescribed::kDepth, depth).force, 1, 1e-10);
       }
     }
     EXPECT_TRUE(plastic.still());
@@ -260,7 +260,7 @@ TEST(Plasticity, OnEveryClosedWayTheHandGivesMoreThanItGets) {
         const double from = depth;
         for (int i = 1; i <= 10; ++i) {
           const double next = from + (turn - from) * i / 10;
-          const Reaction reaction = body.press(Given::kLeastDepth, next);
+          const Reaction reaction = body.press(Prescribed::kLeastDepth, next);
           EXPECT_LE(reaction.error, 1e-4 * reaction.force + 1e-7);
           given += 0.5 * (force + reaction.force) * (next - depth);
           force = reaction.force;
@@ -281,7 +281,7 @@ TEST(Plasticity, UnderItsOwnWeightABodyYieldsBeforeItIsTouched) {
   config.effects.gravity = Vec3(0, 0, -9.81);
   Body body(config);
   config.plasticity.reset();
-  EXPECT_GT(body.press(Given::kForce, 0).depth, 1.1 * Body(config).press(Given::kForce, 0).depth);
+  EXPECT_GT(body.press(Prescribed::kForce, 0).depth, 1.1 * Body(config).press(Prescribed::kForce, 0).depth);
 }
 
 TEST(Plasticity, NonsenseIsRefusedByName) {

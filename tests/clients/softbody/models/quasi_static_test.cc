@@ -26,10 +26,10 @@ TEST(QuasiStatic, SmallPressesAreAnsweredAsByTheLinearModel) {
   for (const Element element : {Element::kTet4, Element::kHex8Sri}) {
     const Solid linear = pressed_block(element, 4, 0.45);
     const TouchSurface top(linear.mesh(), Vec3::UnitZ(), kB1PatchRadius);
-    const double expected = LinearModel(linear, top).press(*top.patch(Vec2::Zero()), Given::kDepth, 1e-6).force;
+    const double expected = LinearModel(linear, top).press(*top.patch(Vec2::Zero()), Prescribed::kDepth, 1e-6).force;
     for (const Law law : kLaws) {
       PressedByNewton pressed(element, 4, law);
-      const Reaction found = pressed.model.press(pressed.patch, Given::kDepth, 1e-6);
+      const Reaction found = pressed.model.press(pressed.patch, Prescribed::kDepth, 1e-6);
       EXPECT_NEAR(found.force / expected, 1, 2e-4) << static_cast<int>(law);
       EXPECT_NEAR(found.depth, 1e-6, 1e-12);
     }
@@ -41,7 +41,7 @@ TEST(QuasiStatic, ForceIsTheSlopeOfTheEnergyAndStiffnessThatOfTheForce) {
     PressedByNewton pressed(Element::kHex8Sri, 4, law);
     const double h = 1e-5;
     const auto press = [&](double depth) {
-      const Reaction reaction = pressed.model.press(pressed.patch, Given::kDepth, depth);
+      const Reaction reaction = pressed.model.press(pressed.patch, Prescribed::kDepth, depth);
       return std::pair(reaction, pressed.solid.energy(pressed.model.displacements()));
     };
     const auto [low, energy_low] = press(0.004 - h);
@@ -56,11 +56,11 @@ TEST(QuasiStatic, ForceIsTheSlopeOfTheEnergyAndStiffnessThatOfTheForce) {
 TEST(QuasiStatic, DepthAndForceOneStepAndManyGiveTheSameForce) {
   for (const Law law : {Law::kCorotational, Law::kNeoHookean}) {
     PressedByNewton at_once(Element::kHex8Sri, 4, law);
-    const Reaction deep = at_once.model.press(at_once.patch, Given::kDepth, 0.01);
+    const Reaction deep = at_once.model.press(at_once.patch, Prescribed::kDepth, 0.01);
     PressedByNewton slowly(Element::kHex8Sri, 4, law);
-    for (const double depth : {0.002, 0.004, 0.006, 0.008}) slowly.model.press(slowly.patch, Given::kDepth, depth);
-    EXPECT_NEAR(slowly.model.press(slowly.patch, Given::kDepth, 0.01).force / deep.force, 1, 1e-6);
-    EXPECT_NEAR(slowly.model.press(slowly.patch, Given::kForce, deep.force).depth, 0.01, 1e-7);
+    for (const double depth : {0.002, 0.004, 0.006, 0.008}) slowly.model.press(slowly.patch, Prescribed::kDepth, depth);
+    EXPECT_NEAR(slowly.model.press(slowly.patch, Prescribed::kDepth, 0.01).force / deep.force, 1, 1e-6);
+    EXPECT_NEAR(slowly.model.press(slowly.patch, Prescribed::kForce, deep.force).depth, 0.01, 1e-7);
   }
 }
 
@@ -70,15 +70,15 @@ TEST(QuasiStatic, AFactorServesManyAnswersOfAHandThatMovesAsHandsDo) {
     int answers = 0;
     for (double time = 0; time < 2; time += 0.01) {  // 100 answers per second, 0.5 to 2.5 mm deep
       const double depth = 0.0015 + 0.001 * std::sin(5 * time);
-      const Reaction found = kept.model.press(kept.patch, Given::kDepth, depth);
+      const Reaction found = kept.model.press(kept.patch, Prescribed::kDepth, depth);
       EXPECT_LE(kept.model.iterations(), 12);
       EXPECT_LE(found.error, 1e-5 * found.force);
       if (++answers % 20 != 0) continue;
       PressedByNewton anew(Element::kHex8Sri, 4, law);
-      EXPECT_NEAR(found.force / anew.model.press(anew.patch, Given::kDepth, depth).force, 1, 1e-6);
+      EXPECT_NEAR(found.force / anew.model.press(anew.patch, Prescribed::kDepth, depth).force, 1, 1e-6);
       const double h = 1e-6;
-      const double high = anew.model.press(anew.patch, Given::kDepth, depth + h).force;
-      const double low = anew.model.press(anew.patch, Given::kDepth, depth - h).force;
+      const double high = anew.model.press(anew.patch, Prescribed::kDepth, depth + h).force;
+      const double low = anew.model.press(anew.patch, Prescribed::kDepth, depth - h).force;
       EXPECT_NEAR((high - low) / (2 * h) / found.stiffness, 1, 5e-3);
     }
     EXPECT_LT(kept.model.factors(), answers / 10);
@@ -90,8 +90,8 @@ TEST(QuasiStatic, OneIterationPerAnswerFollowsTheToolAndTellsItsError) {
   PressedByNewton hasty(Element::kHex8Sri, 4, Law::kNeoHookean, 1);
   for (int i = 1; i <= 20; ++i) {
     const double depth = 5e-4 * i;
-    const double truth = exact.model.press(exact.patch, Given::kDepth, depth).force;
-    const Reaction found = hasty.model.press(hasty.patch, Given::kDepth, depth);
+    const double truth = exact.model.press(exact.patch, Prescribed::kDepth, depth).force;
+    const Reaction found = hasty.model.press(hasty.patch, Prescribed::kDepth, depth);
     EXPECT_EQ(hasty.model.iterations(), 1);
     EXPECT_NEAR(found.force, truth, 0.03 * truth + 1e-9);
     EXPECT_GE(found.error, std::abs(found.force - truth));
@@ -113,12 +113,12 @@ TEST(QuasiStatic, HalfAPercentIsWorthFewStepsAndNoFactorOnAHardPath) {
       const double depth = 1e-3 * std::min(i, 5);
       const double aside = 1e-3 * (i <= 25 ? std::max(0, i - 5) : 45 - i);
       const Patch patch = *top.patch(Vec2(aside, 0));
-      const double truth = exact.press(patch, Given::kDepth, depth).force;
-      const Reaction found = asked.press(patch, Given::kDepth, depth);
+      const double truth = exact.press(patch, Prescribed::kDepth, depth).force;
+      const Reaction found = asked.press(patch, Prescribed::kDepth, depth);
       EXPECT_NEAR(found.force, truth, 5e-3 * truth) << i;
       EXPECT_LE(std::abs(found.force - truth), found.error) << i;
       EXPECT_LE(found.error, 5e-3 * found.force) << i;
-      EXPECT_NEAR(usual.press(patch, Given::kDepth, depth).force, truth, 1e-6 * truth) << i;
+      EXPECT_NEAR(usual.press(patch, Prescribed::kDepth, depth).force, truth, 1e-6 * truth) << i;
       steps += asked.iterations();
       ++answers;
     }

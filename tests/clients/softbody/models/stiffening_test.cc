@@ -38,13 +38,13 @@ TEST(Stiffening, EveryAnswerIsThatOfABodyOfThatModulus) {
       stiffer.material.young = config.material.young * (1 + 0.2 * time);
       Body expected(stiffer);
       for (const double depth : {1e-4, 2e-3}) {
-        const Reaction a = body.settle(Given::kDepth, depth);
-        const Reaction b = expected.settle(Given::kDepth, depth);
+        const Reaction a = body.settle(Prescribed::kDepth, depth);
+        const Reaction b = expected.settle(Prescribed::kDepth, depth);
         EXPECT_NEAR(a.force / b.force, 1, 1e-5) << model.name;
         EXPECT_NEAR(a.stiffness / b.stiffness, 1, 3e-3) << model.name;
         EXPECT_LT((a.slope - b.slope).norm(), 1e-5) << model.name;
       }
-      EXPECT_NEAR(body.settle(Given::kForce, 0.3).depth / expected.settle(Given::kForce, 0.3).depth, 1, 1e-4)
+      EXPECT_NEAR(body.settle(Prescribed::kForce, 0.3).depth / expected.settle(Prescribed::kForce, 0.3).depth, 1, 1e-4)
           << model.name;
     }
     EXPECT_GT(body.size().bytes, Body(stiffer).size().bytes);
@@ -60,7 +60,7 @@ TEST(Stiffening, AViscousBodyCreepsAsOneOfThatModulusAndTheSameRelaxation) {
   Body body(config);
   Body expected(stiffer);
   for (int i = 0; i < 20; ++i) {
-    EXPECT_NEAR(body.press(Given::kForce, 0.1).depth / expected.press(Given::kForce, 0.1).depth, 1, 1e-9);
+    EXPECT_NEAR(body.press(Prescribed::kForce, 0.1).depth / expected.press(Prescribed::kForce, 0.1).depth, 1, 1e-9);
   }
 }
 
@@ -69,7 +69,7 @@ TEST(Stiffening, ATensedBodyGivesOutWhatTensingPutInAndNoMore) {
   BodyConfig config = pressed_body(ModelKind::kCondensed, Element::kHex8Sri, 4);
   config.stiffening = StiffnessOverTime{.at = {0, 1}, .factor = {1, 2}};
   Body body(config);
-  const double k = body.press(Given::kDepth, 1e-3).stiffness;
+  const double k = body.press(Prescribed::kDepth, 1e-3).stiffness;
   const auto work = [&](double from, double to) {
     double sum = 0;
     for (int i = 0; i < 100; ++i) {

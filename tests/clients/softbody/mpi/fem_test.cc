@@ -93,7 +93,7 @@ TEST_F(Fem, ABodyAnswersFromATableOfTwoRanks) {
   Body made(config);
   config.table_file = path("t.table");
   Body read(config);
-  EXPECT_NEAR(read.press(Given::kDepth, 0.002).force / made.press(Given::kDepth, 0.002).force, 1, 1e-9);
+  EXPECT_NEAR(read.press(Prescribed::kDepth, 0.002).force / made.press(Prescribed::kDepth, 0.002).force, 1, 1e-9);
 }
 
 TEST_F(Fem, AsManyRanksGiveTheSameBytes) {

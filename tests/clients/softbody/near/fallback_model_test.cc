@@ -36,7 +36,7 @@ std::unique_ptr<FallbackModel> fallbacks_with(const PressedBefore& block, bool t
 }
 
 Reaction press(const PressedBefore& block, Model& model, const Vec2& place, double depth) {
-  return model.press(*block.top.patch_with_curvatures(place), Given::kLeastDepth, depth);
+  return model.press(*block.top.patch_with_curvatures(place), Prescribed::kLeastDepth, depth);
 }
 
 /// Energy balance of the hand on a closed path, J.
@@ -74,7 +74,7 @@ class Knows : public FallbackLevel {
   std::optional<Answer> press(const Patch& patch, double depth) const override {
     const double share = 1 + cells_left(patch.middle, depth);
     if (!(share > 0)) return std::nullopt;
-    Answer answer{block_.exact.press(patch, Given::kDepth, depth), std::min(1.0, share)};
+    Answer answer{block_.exact.press(patch, Prescribed::kDepth, depth), std::min(1.0, share)};
     answer.reaction.force *= times_;
     answer.reaction.stiffness *= times_;
     return answer;
@@ -105,9 +105,11 @@ struct KnownBlock : AskedAndExact {
     fallbacks = std::make_unique<FallbackModel>(std::move(levels), std::move(made));
   }
   Reaction press(const Vec2& place, double depth) {
-    return fallbacks->press(*top.patch_with_curvatures(place), Given::kLeastDepth, depth);
+    return fallbacks->press(*top.patch_with_curvatures(place), Prescribed::kLeastDepth, depth);
   }
-  double truth(const Vec2& place, double depth) { return exact.press(*top.patch(place), Given::kDepth, depth).force; }
+  double truth(const Vec2& place, double depth) {
+    return exact.press(*top.patch(place), Prescribed::kDepth, depth).force;
+  }
   std::unique_ptr<FallbackModel> fallbacks;
   NearModel* near = nullptr;
 };
@@ -136,7 +138,7 @@ TEST(Levels, TheFirstLevelThatIsGoodEnoughAnswers) {
 TEST(Levels, AGivenForceIsAnsweredByTheNearField) {
   PressedBefore& block = small_block(Law::kNeoHookean);
   const auto fallbacks = fallbacks_with(block, true, 0.02);
-  const Reaction found = fallbacks->press(*block.top.patch(Vec2::Zero()), Given::kForce, 1);
+  const Reaction found = fallbacks->press(*block.top.patch(Vec2::Zero()), Prescribed::kForce, 1);
   EXPECT_NEAR(block.truth(Vec2::Zero(), found.depth), 1, 0.02);
   EXPECT_EQ(fallbacks->steps()[0].answers + fallbacks->steps()[1].answers, 0);
 }

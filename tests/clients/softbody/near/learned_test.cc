@@ -61,7 +61,7 @@ TEST(LearnedShapes, ASmallPressIsThatOfTheWholeLinearBody) {
   const auto fallback_level = block.learned(0.02);
   const Vec2 place(0.0013, -0.0021);
   const Reaction found = fallback_level->press(*block.top.patch_with_curvatures(place), 1e-7)->reaction;
-  const Reaction truth = block.exact.press(*block.top.patch_with_curvatures(place), Given::kDepth, 1e-7);
+  const Reaction truth = block.exact.press(*block.top.patch_with_curvatures(place), Prescribed::kDepth, 1e-7);
   EXPECT_NEAR(found.stiffness, truth.stiffness, 3e-3 * truth.stiffness);
   EXPECT_NEAR(found.force, truth.force, 3e-3 * truth.force);
 }

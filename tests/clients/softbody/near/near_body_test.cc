@@ -51,7 +51,7 @@ struct AtRest {
 struct Pressed : AtRest {
   Pressed(Law law, double radius, int modes)
       : AtRest(8, 0.45, law), whole(solid, top, {.max_iterations = 100, .tolerance = 1e-10, .glides = false}) {
-    force = whole.press(*top.patch(Vec2::Zero()), Given::kDepth, kDepth).force;
+    force = whole.press(*top.patch(Vec2::Zero()), Prescribed::kDepth, kDepth).force;
     if (!whole.renew_factor()) throw std::runtime_error("not definite");
     body = made({.middle = Vec3(0, 0, 0.05),
                  .radius = radius,
@@ -150,7 +150,7 @@ TEST(NearBody, AboutAPressedShapeNothingIsLeftOutThereAndFarFromItMuch) {
   for (int& node : patch.nodes) node = body.own_node(node);
   double before = 0;
   for (const double depth : {3.5e-3, 2e-3, 1e-5}) {
-    model.press(patch, Given::kDepth, depth);
+    model.press(patch, Prescribed::kDepth, depth);
     const double left_out = std::abs(body.left_out(model.displacements(), depth));
     EXPECT_GT(left_out, before) << depth;
     before = left_out;

@@ -53,7 +53,7 @@ struct Truth : AskedAndExact {
   Truth(Law law, const std::vector<Cut>& cuts)
       : AskedAndExact(with_cuts(pressed_block(Element::kHex8Sri, 8, 0.45, law), cuts)) {}
   double at(const Vec3& tool) {
-    return exact.press(*top.patch(tool.head<2>()), Given::kLeastDepth, 0.05 - tool.z()).force;
+    return exact.press(*top.patch(tool.head<2>()), Prescribed::kLeastDepth, 0.05 - tool.z()).force;
   }
 };
 
@@ -193,7 +193,7 @@ TEST(NearCut, AModelThatIsCutInPlaceTakesNoFieldOfTheBodyBefore) {
   NearModel model(solid, top, *top.patch(Vec2::Zero()), {.newton = newton});
   Elsewhere thread;
   model.make_fields_by(thread.background());
-  const auto press = [&] { return model.press(*top.patch(Vec2::Zero()), Given::kDepth, 4e-3); };
+  const auto press = [&] { return model.press(*top.patch(Vec2::Zero()), Prescribed::kDepth, 4e-3); };
   press();
   ASSERT_EQ(thread.given.size(), 1U);
   const std::vector<Cut> cuts{slit(0.025, 0.0375)};
@@ -202,7 +202,7 @@ TEST(NearCut, AModelThatIsCutInPlaceTakesNoFieldOfTheBodyBefore) {
   top = TouchSurface(solid.mesh(), Vec3::UnitZ(), kB1PatchRadius);
   model.cut(division, {});
   const double truth = QuasiStaticModel(solid, top, {.max_iterations = 200, .tolerance = 1e-9})
-                           .press(*top.patch(Vec2::Zero()), Given::kDepth, 4e-3)
+                           .press(*top.patch(Vec2::Zero()), Prescribed::kDepth, 4e-3)
                            .force;
   const int made = model.size().made;
   thread.given[0]();
@@ -292,7 +292,7 @@ TEST(NearCut, WhatWasLearnedOfTheUncutBodyAnswersNoCutOne) {
     thread.work();
     for (int i = 0; i < 5; ++i) {
       const Feel feel = body.touch(tool);
-      const double expected = truth.exact.press(*truth.top.patch(tool.head<2>()), Given::kDepth, 3e-3).force;
+      const double expected = truth.exact.press(*truth.top.patch(tool.head<2>()), Prescribed::kDepth, 3e-3).force;
       EXPECT_EQ(feel.topology_changed, i == 0);
       EXPECT_TRUE(body.fallbacks().empty());
       EXPECT_LT(feel.force.z(), 0.99 * whole);
@@ -315,7 +315,7 @@ class CutMeanwhile : public Model {
         at_(at) {
     before_.make_fields_by(thread_.background());
   }
-  Reaction press(const Patch& patch, Given given, double value) override {
+  Reaction press(const Patch& patch, Prescribed given, double value) override {
     Reaction reaction;
     if (answers_ < at_) {
       Vec3 place = Vec3::Zero();

@@ -29,7 +29,7 @@ struct Near : AskedAndExact {
       : AskedAndExact(pressed_block(Element::kHex8Sri, n, poisson, law)),
         model(solid, top, *top.patch(Vec2::Zero()), {{.max_iterations = 100, .tolerance = tolerance}, modes}) {}
   Reaction press(const Vec2& place, double depth) {
-    return model.press(*top.patch_with_curvatures(place), Given::kDepth, depth);
+    return model.press(*top.patch_with_curvatures(place), Prescribed::kDepth, depth);
   }
   NearModel model;
 };
@@ -41,7 +41,7 @@ TEST(Near, PressesAreThoseOfTheWholeMeshWithinTwoPercentAndTheErrorSaid) {
       ASSERT_GT(near.model.size().radius, 0);
       for (const double depth : {1e-3, 3e-3, 5e-3}) {
         if (law == Law::kStVenantKirchhoff && depth > 4e-3) continue;  // the block collapses
-        const double truth = near.exact.press(*near.top.patch(Vec2::Zero()), Given::kDepth, depth).force;
+        const double truth = near.exact.press(*near.top.patch(Vec2::Zero()), Prescribed::kDepth, depth).force;
         const Reaction found = near.press(Vec2::Zero(), depth);
         EXPECT_NEAR(found.force, truth, 0.02 * truth) << n << ' ' << static_cast<int>(law) << ' ' << depth;
         EXPECT_GE(found.error, std::abs(found.force - truth)) << n << ' ' << static_cast<int>(law) << ' ' << depth;
@@ -57,8 +57,8 @@ TEST(Near, ABodySmallerThanItsNearFieldIsTheWholeModelBitByBit) {
   QuasiStaticModel whole(near.solid, near.top, {.max_iterations = 100, .tolerance = 1e-6});
   for (const double depth : {1e-3, 4e-3, 2e-3}) {
     const Patch patch = *near.top.patch_with_curvatures(Vec2(depth, 0.01));
-    const Reaction expected = whole.press(patch, Given::kDepth, depth);
-    const Reaction found = near.model.press(patch, Given::kDepth, depth);
+    const Reaction expected = whole.press(patch, Prescribed::kDepth, depth);
+    const Reaction found = near.model.press(patch, Prescribed::kDepth, depth);
     EXPECT_EQ(found.force, expected.force);
     EXPECT_EQ(found.stiffness, expected.stiffness);
     EXPECT_EQ(found.error, expected.error);
@@ -101,7 +101,7 @@ TEST(Near, AFarFieldThatIsNotLinearIsSaid) {
   Near near(12, 0.45, Law::kNeoHookean, 1e-9);
   double before = 0;
   for (const double depth : {1e-3, 3e-3, 5e-3, 8e-3}) {
-    const double truth = near.exact.press(*near.top.patch(Vec2::Zero()), Given::kDepth, depth).force;
+    const double truth = near.exact.press(*near.top.patch(Vec2::Zero()), Prescribed::kDepth, depth).force;
     const Reaction found = near.press(Vec2::Zero(), depth);
     EXPECT_GT(found.error, before);
     EXPECT_GE(found.error, std::abs(found.force - truth));
@@ -115,7 +115,7 @@ TEST(Near, OnItsWayAsideItFollowsTheWholeMeshThroughSeveralCentres) {
     double last = 0;
     for (int i = 0; i <= 40; ++i) {
       const Vec2 place(5e-4 * i, 0);
-      const double truth = near.exact.press(*near.top.patch(place), Given::kDepth, 4e-3).force;
+      const double truth = near.exact.press(*near.top.patch(place), Prescribed::kDepth, 4e-3).force;
       const Reaction found = near.press(place, 4e-3);
       EXPECT_NEAR(found.force, truth, 0.02 * truth) << i;
       EXPECT_GE(found.error, std::abs(found.force - truth)) << i;
@@ -187,7 +187,7 @@ TEST(Near, AFieldThatTheHandHasLeftBeforeItIsWholeIsNotMadeToItsEnd) {
   near.press(Vec2(0.005, 0), 3e-3);
   const int pieces = near.model.size().pieces;
   const Vec2 place(-0.02, 0.01);
-  const double truth = near.exact.press(*near.top.patch(place), Given::kDepth, 3e-3).force;
+  const double truth = near.exact.press(*near.top.patch(place), Prescribed::kDepth, 3e-3).force;
   EXPECT_NEAR(near.press(place, 3e-3).force, truth, 0.02 * truth);
   EXPECT_EQ(near.model.size().made, 2);
   EXPECT_LE(near.model.size().pieces - pieces, 31);
@@ -223,8 +223,8 @@ TEST(Near, AHandThatJumpsFarIsAnsweredAtOnce) {
   for (const Vec2& place : {Vec2(0.025, 0.01), Vec2(0.045, 0.045)}) {  // far away, and a corner that is half outside
     const auto patch = near.top.patch(place, 0.2);
     ASSERT_TRUE(patch);
-    const double truth = near.exact.press(*patch, Given::kDepth, 3e-3).force;
-    const Reaction found = near.model.press(*patch, Given::kDepth, 3e-3);
+    const double truth = near.exact.press(*patch, Prescribed::kDepth, 3e-3).force;
+    const Reaction found = near.model.press(*patch, Prescribed::kDepth, 3e-3);
     EXPECT_NEAR(found.force, truth, 0.02 * truth);
     EXPECT_GE(found.error, std::abs(found.force - truth));
   }

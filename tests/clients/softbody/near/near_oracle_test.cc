@@ -35,9 +35,11 @@ struct NearBeside : AskedAndExact {
     model.make_fields_by(thread.background());
   }
   Reaction press(const Vec2& place, double depth) {
-    return model.press(*top.patch_with_curvatures(place), Given::kDepth, depth);
+    return model.press(*top.patch_with_curvatures(place), Prescribed::kDepth, depth);
   }
-  double truth(const Vec2& place, double depth) { return exact.press(*top.patch(place), Given::kDepth, depth).force; }
+  double truth(const Vec2& place, double depth) {
+    return exact.press(*top.patch(place), Prescribed::kDepth, depth).force;
+  }
   Elsewhere thread;
   NearModel model;
 };
@@ -155,8 +157,10 @@ struct NoField : AskedAndExact {
   NoField(int n, Law law, double poisson)
       : AskedAndExact(pressed_block(Element::kHex8Sri, n, poisson, law)),
         model(solid, top, {.newton = {.max_iterations = 100, .tolerance = 1e-6}}, [](auto) {}) {}
-  Reaction press(const Vec2& place, double depth) { return model.press(*top.patch(place), Given::kDepth, depth); }
-  double truth(const Vec2& place, double depth) { return exact.press(*top.patch(place), Given::kDepth, depth).force; }
+  Reaction press(const Vec2& place, double depth) { return model.press(*top.patch(place), Prescribed::kDepth, depth); }
+  double truth(const Vec2& place, double depth) {
+    return exact.press(*top.patch(place), Prescribed::kDepth, depth).force;
+  }
   NearModel model;
 };
 
@@ -166,7 +170,7 @@ TEST(NearOracle, WithoutAFieldAnswersAreNearTheLawsToAQuarterOfTheRadius) {
     NoField near(8, law, 0.45);
     for (const Vec2& place : {Vec2(0, 0), Vec2(0.004, 0.011), Vec2(-0.03, 0.02)}) {
       for (const auto& [depth, share] : {std::pair(1e-3, 1e-3), std::pair(3e-3, 2e-3), std::pair(5e-3, 1e-2)}) {
-        const Reaction truth = near.exact.press(*near.top.patch(place), Given::kDepth, depth);
+        const Reaction truth = near.exact.press(*near.top.patch(place), Prescribed::kDepth, depth);
         const Reaction found = near.press(place, depth);
         EXPECT_NEAR(found.force, truth.force, share * truth.force) << static_cast<int>(law) << ' ' << depth;
         EXPECT_NEAR(found.stiffness, truth.stiffness, 0.1 * truth.stiffness) << static_cast<int>(law) << ' ' << depth;
@@ -205,15 +209,15 @@ TEST(NearOracle, AHandThatJumpsFarIsAnsweredByTheLinearBodyAndSoonByAField) {
     const auto patch = near.top.patch_with_curvatures(Vec2(0.025, -0.025));
     const double truth = near.truth(Vec2(0.025, -0.025), 3e-3);
     near.thread.work();
-    const Reaction at_once = near.model.press(*patch, Given::kDepth, 3e-3);
+    const Reaction at_once = near.model.press(*patch, Prescribed::kDepth, 3e-3);
     EXPECT_GT(at_once.force, 0.5 * truth);
     EXPECT_GE(at_once.error, std::abs(at_once.force - truth));
     EXPECT_GE(near.model.size().linear, 1);
     EXPECT_EQ(at_once.way, Way::kLinear);
     near.thread.work();  // too late: for the previous position
-    near.model.press(*patch, Given::kDepth, 3e-3);
+    near.model.press(*patch, Prescribed::kDepth, 3e-3);
     near.thread.work();
-    EXPECT_NEAR(near.model.press(*patch, Given::kDepth, 3e-3).force, at_once.force, 1e-3 * truth) << "no jump";
+    EXPECT_NEAR(near.model.press(*patch, Prescribed::kDepth, 3e-3).force, at_once.force, 1e-3 * truth) << "no jump";
     EXPECT_GE(near.model.size().made, 2);
     EXPECT_EQ(near.press(Vec2(0.025, -0.025), 3e-3).way, Way::kNear);
     double depth = 3e-3;
@@ -257,7 +261,7 @@ TEST(NearOracle, AToolThatIsLiftedMeanwhileComesBackToTheBodyAtRest) {
   NearBeside near(8, Law::kNeoHookean);
   near.press(Vec2::Zero(), 5e-3);
   ASSERT_EQ(near.thread.given.size(), 1U);
-  const double least = near.model.press(*near.top.patch(Vec2::Zero()), Given::kLeastDepth, 1e-5).force;
+  const double least = near.model.press(*near.top.patch(Vec2::Zero()), Prescribed::kLeastDepth, 1e-5).force;
   near.thread.work();  // for a shape that no longer exists
   for (int i = 0; i < 10; ++i) {
     const double truth = near.truth(Vec2::Zero(), 1e-4);
@@ -310,7 +314,7 @@ TEST(NearOracle, TheErrorSaidCoversTheTrueOneOfDrawnAnswers) {
         : model_(std::move(model)), thread_(thread), slow_(slow) {
       model_->make_fields_by(thread.background());
     }
-    Reaction press(const Patch& patch, Given given, double value) override {
+    Reaction press(const Patch& patch, Prescribed given, double value) override {
       const Reaction reaction = model_->press(patch, given, value);
       if (++answers_ % slow_ == 0) thread_.work();
       return reaction;
@@ -351,9 +355,9 @@ TEST(NearOracle, AFarFieldThatTurnsIsRefusedAtRestAndRightAboutTheShapeThere) {
   refreshed.make_fields_by(thread.background());
   double worst_at_rest = 0;
   for (double depth = 1.5e-3; depth < 0.07; depth += 1.5e-3) {
-    const double truth = exact.press(end, Given::kDepth, depth).force;
-    const Reaction straight = at_rest.press(end, Given::kDepth, depth);
-    const Reaction bent = refreshed.press(end, Given::kDepth, depth);
+    const double truth = exact.press(end, Prescribed::kDepth, depth).force;
+    const Reaction straight = at_rest.press(end, Prescribed::kDepth, depth);
+    const Reaction bent = refreshed.press(end, Prescribed::kDepth, depth);
     thread.work();
     EXPECT_GE(straight.error, std::abs(straight.force - truth)) << depth;
     EXPECT_GE(bent.error, std::abs(bent.force - truth)) << depth;
@@ -362,7 +366,7 @@ TEST(NearOracle, AFarFieldThatTurnsIsRefusedAtRestAndRightAboutTheShapeThere) {
   }
   EXPECT_GT(beam.largest_turn(exact.displacements()), 1);  // rad
   EXPECT_GT(worst_at_rest, 0.1);
-  const Reaction straight = at_rest.press(end, Given::kDepth, 0.07);
+  const Reaction straight = at_rest.press(end, Prescribed::kDepth, 0.07);
   EXPECT_GT(straight.error, 0.1 * std::abs(straight.force)) << "refused";
 }
 

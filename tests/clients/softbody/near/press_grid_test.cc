@@ -44,9 +44,9 @@ TEST(SolvedPresses, ForceStiffnessGlideAndEnergyAreThoseByAFactorOfTheirOwn) {
         const SolvedPress& press = block.presses.knots[at(grid.knot(i, 1, level))];
         ASSERT_TRUE(press.good);
         exact.set_displacements(displaced(block.solid, press.shape));
-        exact.press(patch, Given::kDepth, level * grid.step);
+        exact.press(patch, Prescribed::kDepth, level * grid.step);
         exact.renew_factor();
-        const Reaction truth = exact.press(patch, Given::kDepth, level * grid.step);
+        const Reaction truth = exact.press(patch, Prescribed::kDepth, level * grid.step);
         EXPECT_NEAR(press.reaction.force, truth.force, 5e-6 * truth.force);
         EXPECT_NEAR(press.energy, exact.forces().energy, 1e-9 * press.energy);
         EXPECT_NEAR(press.reaction.stiffness, truth.stiffness, 1e-4 * truth.stiffness);
@@ -65,7 +65,7 @@ TEST(SolvedPresses, WhereTheBodyFallsToAnotherShapeNoneIsGood) {
   QuasiStaticModel plain(solid, top, {.max_iterations = 200});
   Reaction above;
   for (int level = 1; level <= 4; ++level) {
-    const Reaction here = plain.press(*top.patch(Vec2::Zero()), Given::kDepth, level * grid.step);
+    const Reaction here = plain.press(*top.patch(Vec2::Zero()), Prescribed::kDepth, level * grid.step);
     EXPECT_EQ(here.force > above.force, level < 4);
     above = here;
   }

@@ -212,7 +212,7 @@ TEST(ExactStiffness, IsNotPaidForOnAFlatSideUnlessItIsAskedFor) {
   EXPECT_FALSE(TouchSurface(flat.mesh(), Vec3(0.1, 0, 1).normalized(), kB1PatchRadius).curved());
   const LinearModel still(flat, top);
   LinearModel asked(flat, top, {}, true);
-  asked.press(*top.patch_with_curvatures(Vec2::Zero()), Given::kDepth, 1e-3);
+  asked.press(*top.patch_with_curvatures(Vec2::Zero()), Prescribed::kDepth, 1e-3);
   EXPECT_GT(asked.bytes(), still.bytes());
 }
 

@@ -69,7 +69,7 @@ class OnMesh {
     }
     std::array<Stiffness, 2> result;
     for (std::size_t i = 0; i < result.size(); ++i) {
-      const Reaction reaction = model->press(patch, Given::kForce, block_.loads[i]);
+      const Reaction reaction = model->press(patch, Prescribed::kForce, block_.loads[i]);
       result[i] = {reaction.force / reaction.depth, reaction.stiffness};
     }
     return result;

@@ -60,7 +60,7 @@ TEST(AccuracyTruth, ChangesUnderAHardPressAsANeoHookeanSolidOfAnotherElement) {
     config.model = model;
     config.patch_radius = truth().block().patch_radius;
     const double load = truth().block().loads[1];
-    return load / softbody::Body(config).press(softbody::Given::kForce, load).depth;
+    return load / softbody::Body(config).press(softbody::Prescribed::kForce, load).depth;
   };
   const double ratio = press(ModelKind::kNeoHookean) / press(ModelKind::kLinear);
   EXPECT_NEAR(truth().stiffness(1).secant / truth().limit(Law::kLinear, 1)->secant, ratio, 0.01);

@@ -72,7 +72,7 @@ Patch patch_of(const TouchSurface& top, const PressedBlock& block) {
 double linear_stiffness(const PressedBlock& block, double cells) {
   const Solid solid = graded(block, softbody::Law::kLinear, cells);
   const TouchSurface top(solid.mesh(), Vec3::UnitZ(), block.patch_radius);
-  return LinearModel(solid, top).press(patch_of(top, block), Given::kForce, block.loads[0]).stiffness;
+  return LinearModel(solid, top).press(patch_of(top, block), Prescribed::kForce, block.loads[0]).stiffness;
 }
 
 }  // namespace
@@ -113,7 +113,7 @@ Truth::Truth(const PressedBlock& block, const Config& config) : block_(block), c
     throw std::invalid_argument("the reference requires 1.5 cells or more per radius of the patch");
   }
   fine_ = std::make_unique<Fine>(block, config.cells);
-  linear_ = fine_->model.press(patch_of(fine_->top, block), Given::kForce, block.loads[0]).stiffness;
+  linear_ = fine_->model.press(patch_of(fine_->top, block), Prescribed::kForce, block.loads[0]).stiffness;
 }
 
 Stiffness Truth::stiffness(std::size_t load) {
@@ -168,7 +168,7 @@ Truth::AtLoads Truth::ratios(softbody::Law law, const Material& material, double
   QuasiStaticModel model(solid, top, {});
   AtLoads result;
   for (std::size_t load = 0; load < result.size(); ++load) {
-    const Reaction reaction = model.press(patch_of(top, block), Given::kForce, block.loads[load]);
+    const Reaction reaction = model.press(patch_of(top, block), Prescribed::kForce, block.loads[load]);
     if (!(reaction.error <= 1e-3 * reaction.force) || solid.inverted(model.displacements()) > 0) break;
     result[load] = Stiffness{reaction.force / reaction.depth / linear, reaction.stiffness / linear};
   }

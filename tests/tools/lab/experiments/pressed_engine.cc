@@ -26,7 +26,7 @@ template <class AnyBody>
 Reaction pressed(AnyBody& body, double load) {
   Reaction reaction;
   for (int i = 0; i < kMostPresses && !(i > 0 && reaction.error <= 1e-4 * load); ++i) {
-    reaction = body.press(Given::kForce, load);
+    reaction = body.press(Prescribed::kForce, load);
   }
   return reaction;
 }
@@ -37,7 +37,7 @@ class OwnEngine final : public PressedEngine {
 
   Feel touch(const Vec3& tool) override { return body_.touch(tool); }
   Reaction under(double load) override {
-    if (body_.step() > 0) return body_.settle(Given::kForce, load);
+    if (body_.step() > 0) return body_.settle(Prescribed::kForce, load);
     return learned_ ? learned_under(load) : pressed(body_, load);
   }
   double step() const override { return body_.step(); }
@@ -47,9 +47,9 @@ class OwnEngine final : public PressedEngine {
  private:
   /// Learned models only answer depths, so the depth for the load is found by iteration.
   Reaction learned_under(double load) {
-    Reaction reaction = body_.press(Given::kDepth, kFirstDepth);
+    Reaction reaction = body_.press(Prescribed::kDepth, kFirstDepth);
     for (int i = 0; i < kMostPresses && std::abs(reaction.force - load) > 1e-9 * load; ++i) {
-      reaction = body_.press(Given::kDepth, reaction.depth + (load - reaction.force) / reaction.stiffness);
+      reaction = body_.press(Prescribed::kDepth, reaction.depth + (load - reaction.force) / reaction.stiffness);
     }
     return reaction;
   }
@@ -68,7 +68,7 @@ class ComparedEngine final : public PressedEngine {
   /// Models with time steps or a fixed number of iterations need several presses to come to rest.
   Reaction under(double load) override {
     const bool settles = body_.step() > 0 || kind_ == compared::Kind::kProjective;
-    return settles ? body_.settle(Given::kForce, load) : pressed(body_, load);
+    return settles ? body_.settle(Prescribed::kForce, load) : pressed(body_, load);
   }
   double step() const override { return body_.step(); }
   Body::Size size() const override { return body_.size(); }

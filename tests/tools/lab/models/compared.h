@@ -51,8 +51,8 @@ class PressedBody {
   PressedBody& operator=(const PressedBody&) = delete;
 
   Feel touch(const Vec3& tool) { return contact_.at(tool); }
-  Reaction press(Given given, double value) { return model_->press(patch_, given, value); }
-  Reaction settle(Given given, double value) { return softbody::settle(*model_, patch_, given, value); }
+  Reaction press(Prescribed given, double value) { return model_->press(patch_, given, value); }
+  Reaction settle(Prescribed given, double value) { return softbody::settle(*model_, patch_, given, value); }
   double step() const noexcept { return model_->step(); }
   Body::Size size() const;
 

@@ -22,7 +22,7 @@ TEST(ComparedEffects, TheToolMeetsTheSurfaceWhereTheWeightHasSunkItTo) {
     config.effects.density = 1000;
     config.effects.gravity = Vec3(0, 0, -9.81);
     PressedBody body = pressed_b1(kind, Element::kTet4, 4, config);
-    const double sunk = body.settle(Given::kForce, 0).depth;
+    const double sunk = body.settle(Prescribed::kForce, 0).depth;
     EXPECT_GT(sunk, 1e-4);
     const Feel above = body.touch(Vec3(0, 0, 0.05 - 0.9 * sunk));
     EXPECT_FALSE(above.touching) << info(kind).name;
@@ -55,7 +55,7 @@ TEST(TensorMass, OneMassSwingsDampedAndUnderItsWeightAsOnPaper) {
     const double force = i < 200 ? 2 : 0;
     velocity = (velocity + dt * (weight + force - kSpring * depth) / kMass) / (1 + damping * dt);
     depth += dt * velocity;
-    EXPECT_NEAR(model.press(patch, Given::kForce, force).depth, depth, 1e-9);
+    EXPECT_NEAR(model.press(patch, Prescribed::kForce, force).depth, depth, 1e-9);
   }
   EXPECT_NEAR(largest_step(solid, 1000), 2 / std::sqrt(kSpring / kMass), 1e-6);
 }
@@ -68,10 +68,10 @@ TEST(ComparedEffects, DampingTakesTheEnergyThatASwingHas) {
       config.effects = {.density = 1000, .step = 5e-4, .inertia = true};
       if (damped) config.effects.damping = 100;
       PressedBody body = pressed_b1(kind, Element::kTet4, 4, config);
-      for (int i = 0; i < 50; ++i) body.press(Given::kForce, 0.3);
+      for (int i = 0; i < 50; ++i) body.press(Prescribed::kForce, 0.3);
       double largest = 0;
       for (int i = 0; i < 400; ++i) {
-        const double depth = body.press(Given::kForce, 0).depth;
+        const double depth = body.press(Prescribed::kForce, 0).depth;
         if (i > 200) largest = std::max(largest, std::abs(depth));
       }
       left[damped ? 1 : 0] = largest;
@@ -82,21 +82,21 @@ TEST(ComparedEffects, DampingTakesTheEnergyThatASwingHas) {
 
 TEST(MassSpring, ABodyCreepsWithTheRelaxationTimeOfItsMaterial) {
   // K (u + τ u̇) = f; with implicit Euler, u after n steps is u∞ (1 − (1 + dt/τ)⁻ⁿ) for all shapes.
-  const double in_the_end = pressed_b1(Kind::kMassSpring, Element::kTet4, 4).press(Given::kForce, 1e-3).depth;
+  const double in_the_end = pressed_b1(Kind::kMassSpring, Element::kTet4, 4).press(Prescribed::kForce, 1e-3).depth;
   Config config;
   config.effects = {.step = 0.01, .viscosity = 0.05};
   PressedBody body = pressed_b1(Kind::kMassSpring, Element::kTet4, 4, config);
   for (int n = 1; n <= 20; ++n) {
-    EXPECT_NEAR(body.press(Given::kForce, 1e-3).depth / in_the_end, 1 - std::pow(1.2, -n), 1e-3);
+    EXPECT_NEAR(body.press(Prescribed::kForce, 1e-3).depth / in_the_end, 1 - std::pow(1.2, -n), 1e-3);
   }
 }
 
 TEST(MassSpring, ItsRestDoesNotDependOnTheStep) {
-  const Reaction still = pressed_b1(Kind::kMassSpring, Element::kTet4, 4).press(Given::kForce, 0.3);
+  const Reaction still = pressed_b1(Kind::kMassSpring, Element::kTet4, 4).press(Prescribed::kForce, 0.3);
   for (const double step : {1e-3, 1e-2, 0.2}) {
     Config config;
     config.effects = {.density = 1000, .step = step, .inertia = true, .damping = 40};
-    const Reaction found = pressed_b1(Kind::kMassSpring, Element::kTet4, 4, config).settle(Given::kForce, 0.3);
+    const Reaction found = pressed_b1(Kind::kMassSpring, Element::kTet4, 4, config).settle(Prescribed::kForce, 0.3);
     EXPECT_NEAR(found.depth / still.depth, 1, 1e-3) << step;
     EXPECT_NEAR(found.stiffness * still.depth / 0.3, 1, 1e-3) << step;
   }

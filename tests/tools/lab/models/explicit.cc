@@ -58,7 +58,7 @@ VectorXd ExplicitModel::internal() const {
   return tensors_ ? all_of(solid_, tensors_->times(solid_.to_free(u_))) : solid_.forces(u_).force;
 }
 
-Reaction ExplicitModel::press(const Patch& patch, Given given, double value) {
+Reaction ExplicitModel::press(const Patch& patch, Prescribed given, double value) {
   VectorXd force = -internal();
   if (weight_.size() > 0) force += weight_;
   velocity_ += dt_ * per_mass_.cwiseProduct(force);

@@ -25,7 +25,7 @@ class ExplicitModel : public Model {
   /// gravity, if set.
   ExplicitModel(const Solid& solid, const TouchSurface& surface, const EffectsConfig& effects);
 
-  Reaction press(const Patch& patch, Given given, double value) override;
+  Reaction press(const Patch& patch, Prescribed given, double value) override;
   double step() const noexcept override { return dt_; }
   bool still() const noexcept override { return false; }
   std::size_t bytes() const noexcept override;

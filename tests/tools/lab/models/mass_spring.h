@@ -47,7 +47,9 @@ class MassSpringModel : public Model {
   MassSpringModel(const Solid& solid, const TouchSurface& surface, const QuasiStaticModel::Config& config,
                   const EffectsConfig& effects = {});
 
-  Reaction press(const Patch& patch, Given given, double value) override { return newton_.press(patch, given, value); }
+  Reaction press(const Patch& patch, Prescribed given, double value) override {
+    return newton_.press(patch, given, value);
+  }
   double step() const noexcept override { return newton_.step(); }
   bool still() const noexcept override { return newton_.still(); }
   bool glides() const noexcept override { return newton_.glides(); }

@@ -45,7 +45,7 @@ ModalModel::ModalModel(const Solid& solid, const TouchSurface& surface, const Co
   for (std::size_t i = 0; i < surface.nodes().size(); ++i) row_of_[at(surface.nodes()[i])] = static_cast<int>(i);
 }
 
-Reaction ModalModel::press(const Patch& patch, Given given, double value) {
+Reaction ModalModel::press(const Patch& patch, Prescribed given, double value) {
   VectorXd shares = VectorXd::Zero(surface_.cols());  // modal coordinates under 1 N
   for (Eigen::Index i = 0; i < patch.weights.size(); ++i) {
     shares += patch.weights[i] * surface_.row(row_of_[at(patch.nodes[static_cast<std::size_t>(i)])]);

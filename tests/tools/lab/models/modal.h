@@ -24,7 +24,7 @@ class ModalModel : public Model {
   /// has at least `swings` modes. Keeps no reference to solid or surface.
   ModalModel(const Solid& solid, const TouchSurface& surface, const Config& config);
 
-  Reaction press(const Patch& patch, Given given, double value) override;
+  Reaction press(const Patch& patch, Prescribed given, double value) override;
   bool glides() const noexcept override { return glides_; }
   std::size_t bytes() const noexcept override;
 

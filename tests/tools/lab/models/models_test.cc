@@ -30,7 +30,7 @@ using softbody::testing::pressed_block;
 
 /// Returns the error of the stiffness of block B1 with tetrahedra, at rest under 0.3 N.
 double error_percent(Kind kind, int n, const Config& config) {
-  const Reaction reaction = pressed_b1(kind, Element::kTet4, n, config).settle(Given::kForce, 0.3);
+  const Reaction reaction = pressed_b1(kind, Element::kTet4, n, config).settle(Prescribed::kForce, 0.3);
   return 100 * (reaction.force / reaction.depth / kB1 - 1);
 }
 double error_percent(Kind kind, int n) { return error_percent(kind, n, soon_at_rest(kind)); }
@@ -103,10 +103,10 @@ TEST(Projective, GivesThePressedBlockTheKnownStiffnessWithAnyNumberOfRounds) {
 TEST(Projective, IsAtRestWhereItsEnergyIsLeast) {
   // With ν = 0 it is the corotational material.
   for (const Element element : {Element::kTet4, Element::kHex8Sri}) {
-    const Reaction found = pressed_b1(Kind::kProjective, element, 4, {}, 0).settle(Given::kDepth, 0.004);
+    const Reaction found = pressed_b1(Kind::kProjective, element, 4, {}, 0).settle(Prescribed::kDepth, 0.004);
     BodyConfig config = softbody::testing::pressed_body(ModelKind::kCorotational, element, 4);
     config.material.poisson = 0;
-    const Reaction expected = Body(config).press(Given::kDepth, 0.004);
+    const Reaction expected = Body(config).press(Prescribed::kDepth, 0.004);
     EXPECT_NEAR(found.force / expected.force, 1, 1e-3);
     EXPECT_LT((found.slope - expected.slope).norm(), 1e-3);
   }
@@ -129,7 +129,7 @@ TEST(Modal, AStaticModeOfThePatchMakesItExactThereAndCloseBetweenTwo) {
   LinearModel linear(solid, top);
   const auto ratio = [&](const Vec2& middle) {
     const Patch patch = *top.patch(middle);
-    return modal.press(patch, Given::kDepth, 1e-3).force / linear.press(patch, Given::kDepth, 1e-3).force;
+    return modal.press(patch, Prescribed::kDepth, 1e-3).force / linear.press(patch, Prescribed::kDepth, 1e-3).force;
   };
   EXPECT_NEAR(ratio(Vec2(0.005, 0)), 1, 1e-9);
   EXPECT_GT(ratio(Vec2(0, 0)), 1);
@@ -175,18 +175,18 @@ TEST(Modal, OnAFlatSideItsWholeStiffnessIsTheForcesOwnSlopeWhenAsked) {
 
 TEST(ComparedModels, EachGivesTheSameStiffnessWhetherDepthOrForceIsGiven) {
   for (const Info& model : models()) {
-    const auto settled = [&](Given given, double value) {
+    const auto settled = [&](Prescribed given, double value) {
       return pressed_b1(model.kind, Element::kTet4, 4).settle(given, value);
     };
-    const Reaction by_force = settled(Given::kForce, 0.3);
-    const Reaction by_depth = settled(Given::kDepth, by_force.depth);
+    const Reaction by_force = settled(Prescribed::kForce, 0.3);
+    const Reaction by_depth = settled(Prescribed::kDepth, by_force.depth);
     // With xpbd, the order of the constraints changes the result slightly, and the rest shape differs from the mesh.
     const bool rough = model.kind == Kind::kXpbd;
     EXPECT_NEAR(by_depth.force, 0.3, rough ? 5e-3 : 5e-4) << model.name;
     EXPECT_LT((by_depth.slope - by_force.slope).norm(), 1e-3) << model.name;
-    const Reaction pulled = settled(Given::kDepth, -by_force.depth);
+    const Reaction pulled = settled(Prescribed::kDepth, -by_force.depth);
     EXPECT_LT(pulled.force, -0.2) << model.name;
-    const Reaction left = settled(Given::kLeastDepth, -by_force.depth);
+    const Reaction left = settled(Prescribed::kLeastDepth, -by_force.depth);
     EXPECT_EQ(left.force, 0) << model.name;
     EXPECT_NEAR(left.depth, 0, rough ? 3e-5 : 1e-8) << model.name;
   }
@@ -242,9 +242,9 @@ TEST(ComparedModels, RegionsOfEqualMaterialsAreOneBodyForEach) {
     PressedBody two(model.kind, half_stiff(model, 1e4), kB1PatchRadius, Vec3::Zero(), config);
     for (int i = 0; i < 5; ++i) {
       const double depth = 1e-4 * (1 + i);
-      const double expected = one.press(Given::kDepth, depth).force;
+      const double expected = one.press(Prescribed::kDepth, depth).force;
       EXPECT_GT(expected, 0) << model.name;
-      EXPECT_NEAR(two.press(Given::kDepth, depth).force / expected, 1, 1e-12) << model.name;
+      EXPECT_NEAR(two.press(Prescribed::kDepth, depth).force / expected, 1, 1e-12) << model.name;
     }
   }
 }
@@ -254,7 +254,7 @@ TEST(ComparedModels, AStiffHalfMakesEachStiffer) {
     const Config config = soon_at_rest(model.kind);
     const auto force = [&](Solid solid) {
       PressedBody body(model.kind, std::move(solid), kB1PatchRadius, Vec3::Zero(), config);
-      return body.settle(Given::kDepth, 1e-4).force;
+      return body.settle(Prescribed::kDepth, 1e-4).force;
     };
     const double soft = force(half_stiff(model, 1e4));
     const double mixed = force(half_stiff(model, 4e4));

@@ -74,7 +74,7 @@ ProjectiveModel::ProjectiveModel(const Solid& solid, const TouchSurface& surface
   if (effects.viscosity) throw std::invalid_argument("this model does not simulate viscosity");
   const bool among_effects = effects.gravity || effects.has_time();
   if (!among_effects) return;
-  for (int i = 0; i < kRoundsToRest && !effects_.empty(); ++i) press({}, Given::kForce, 0);
+  for (int i = 0; i < kRoundsToRest && !effects_.empty(); ++i) press({}, Prescribed::kForce, 0);
   rest_ = u_;
   if (!effects.has_time()) return;
   add_effects_of_time(effects_, effects, solid, solid.to_free(u_));
@@ -103,7 +103,7 @@ VectorXd ProjectiveModel::rotation_force() const {
   return solid_.to_free(all);
 }
 
-Reaction ProjectiveModel::press(const Patch& patch, Given given, double value) {
+Reaction ProjectiveModel::press(const Patch& patch, Prescribed given, double value) {
   const VectorXd zero = VectorXd::Zero(solid_.free_count());
   VectorXd constant = zero;
   for (const auto& effect : effects_) effect->add_force(zero, constant);

@@ -21,7 +21,7 @@ class ProjectiveModel : public Model {
   /// outlive this object. Starts at rest under gravity, if set.
   ProjectiveModel(const Solid& solid, const TouchSurface& surface, int iterations, const EffectsConfig& effects = {});
 
-  Reaction press(const Patch& patch, Given given, double value) override;
+  Reaction press(const Patch& patch, Prescribed given, double value) override;
   double step() const noexcept override { return step_; }
   bool still() const noexcept override { return effects_.empty(); }
   std::size_t bytes() const noexcept override;

@@ -67,7 +67,7 @@ void XpbdModel::relax(Tet& tet) {
   for (int i = 0; i < 4; ++i) u_.segment<3>(3 * tet.nodes[at(i)]) = local.col(i);
 }
 
-Reaction XpbdModel::press(const Patch& patch, Given given, double value) {
+Reaction XpbdModel::press(const Patch& patch, Prescribed given, double value) {
   const VectorXd start = u_;
   const auto push = [&](double force) {
     for (Eigen::Index i = 0; i < patch.weights.size(); ++i) {
@@ -87,14 +87,14 @@ Reaction XpbdModel::press(const Patch& patch, Given given, double value) {
   if (slowing_ < 1) velocity_ *= slowing_;
   u_ += dt_ * velocity_;
   Reaction reaction;
-  if (given == Given::kForce) {
+  if (given == Prescribed::kForce) {
     reaction.force = value;
     push(value);
   }
   for (Tet& tet : tets_) tet.lambda_shape = tet.lambda_volume = 0;
   for (int i = 0; i < iterations_; ++i) {
     for (Tet& tet : tets_) relax(tet);
-    if (given == Given::kForce) continue;
+    if (given == Prescribed::kForce) continue;
     // The tool may take back impulses of earlier iterations of this step.
     const double untouched = depth_below(patch, normal_, u_) - reaction.force * compliance;
     const double force = constrained_force(given, value, untouched, compliance);

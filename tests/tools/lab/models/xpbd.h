@@ -23,7 +23,7 @@ class XpbdModel : public Model {
   /// has viscosity. The solid must outlive this object.
   XpbdModel(const Solid& solid, const TouchSurface& surface, int iterations, const EffectsConfig& effects);
 
-  Reaction press(const Patch& patch, Given given, double value) override;
+  Reaction press(const Patch& patch, Prescribed given, double value) override;
   double step() const noexcept override { return dt_; }
   bool still() const noexcept override { return false; }
   std::size_t bytes() const noexcept override;
