@@ -13,11 +13,11 @@
 #include <vector>
 
 #include "clients/cpp/touch.h"
+#include "protocol/bandwidth/deadband.h"
 #include "protocol/connection.h"
 #include "protocol/lease_request.h"
 #include "protocol/link.h"
 #include "protocol/messages.h"
-#include "protocol/narrow/deadband.h"
 #include "protocol/secrets/crypto.h"
 #include "protocol/session.h"
 

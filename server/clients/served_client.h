@@ -8,12 +8,12 @@
 #include <string>
 #include <vector>
 
+#include "protocol/bandwidth/deadband.h"
+#include "protocol/bandwidth/link_meter.h"
+#include "protocol/bandwidth/rate_adaptation.h"
 #include "protocol/handshake.h"
 #include "protocol/link.h"
 #include "protocol/messages.h"
-#include "protocol/narrow/deadband.h"
-#include "protocol/narrow/link_meter.h"
-#include "protocol/narrow/rate_adaptation.h"
 #include "protocol/session.h"
 #include "server/clients/features.h"
 #include "server/clients/health.h"

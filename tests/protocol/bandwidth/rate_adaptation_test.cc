@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "protocol/narrow/rate_adaptation.h"
+#include "protocol/bandwidth/rate_adaptation.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "protocol/narrow/deadband.h"
+#include "protocol/bandwidth/deadband.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "protocol/narrow/link_meter.h"
+#include "protocol/bandwidth/link_meter.h"
 
 #include <algorithm>
 #include <utility>
