@@ -19,8 +19,8 @@
 #include "server/clients/health.h"
 #include "server/clients/outputs.h"
 #include "server/recording/records.h"
+#include "server/recording/solver_paths.h"
 #include "server/recording/step_flight.h"
-#include "server/recording/ways.h"
 
 namespace tendon {
 
@@ -113,7 +113,7 @@ struct Mailboxes {
   std::atomic<std::uint64_t> ports_lost{0};
   StepFlight flight;
   Latest<Health> health;
-  Ways ways;
+  SolverPaths ways;
   SpscRing<DatagramRecord> datagrams;
   std::atomic<std::uint64_t> datagrams_lost{0};            ///< because the queue was full
   std::atomic<std::uint64_t> unauthenticated_left_out{0};  ///< of unauthenticated senders, beyond the sample

@@ -17,7 +17,7 @@ void add_dropped(NetworkStats::Dropped& sum, const Counts& more, const RefusedFo
   sum.forces.old_sequence += forces.old_sequence;
 }
 
-std::vector<std::pair<std::string, std::uint64_t>> counts_of(const ServedChannel& channel, const Ways& ways) {
+std::vector<std::pair<std::string, std::uint64_t>> counts_of(const ServedChannel& channel, const SolverPaths& ways) {
   std::vector<std::pair<std::string, std::uint64_t>> counts;
   for (std::size_t way = 1; way < channel.by_way.size(); ++way) {
     if (channel.by_way[way] > 0) counts.emplace_back(ways.name_of(static_cast<std::uint8_t>(way)), channel.by_way[way]);

@@ -203,7 +203,7 @@ int main(int argc, char** argv) {
     softbody::PlacedBody body(scene);
     prepare_beside(scene, thread, body);
     if (scene.body.model == softbody::ModelKind::kNear) {
-      options.client.ways.assign(softbody::kWayNames.begin(), softbody::kWayNames.end());
+      options.client.ways.assign(softbody::kSolverPathNames.begin(), softbody::kSolverPathNames.end());
     }
     const int exit_code = answer(scene, options, body);
     const softbody::Answered answered{body.fallbacks(), thread ? body.near_field() : std::nullopt};

@@ -18,7 +18,7 @@ _HEAD = """\
 # Messages whose code is written by hand.
 _BY_HAND = ("Datagram", "Frame", "DeviceStates", "Vec3", "Quat")
 
-# Constants of ways/field.h. They say what the Writer does with a length of time out of bounds.
+# Constants of fields/field.h. They say what the Writer does with a length of time out of bounds.
 _PERIODS = {
     "valid_for_us": "kValidity", "period_us": "kValidity", "max_silence_us": "kMaxSilence", "duration_ms": "kPulse",
     "wait_ms": "kWait", "lease_ms": "kWait", "timeout_ms": "kTimeout",
@@ -296,7 +296,7 @@ def _in_order(wire: Wire, roots: list[str]) -> list[Message]:
 
 def _lists(wire: Wire, what: str, includes: list[str], messages: list[Message]) -> str:
     out = _HEAD + "\n" + "".join(f'#include "{name}"\n' for name in includes)
-    out += f"\n// Lists of fields for {what}; see ways/field.h.\n\nnamespace tendon::wire {{\n"
+    out += f"\n// Lists of fields for {what}; see fields/field.h.\n\nnamespace tendon::wire {{\n"
     for message in messages:
         fields = _List(wire, message)
         out += fields.wrappers() + fields.text()
@@ -338,7 +338,7 @@ def _made(wire: Wire) -> dict[str, str]:
 
     def lists(what: str, messages: list[Message], *includes: str) -> str:
         known = [one for one in messages if one.name not in _BY_HAND]
-        return _lists(wire, what, sorted(["protocol/messages.h", "protocol/wire/ways/field.h", *includes]), known)
+        return _lists(wire, what, sorted(["protocol/messages.h", "protocol/wire/fields/field.h", *includes]), known)
 
     folder, frame = "protocol/wire/generated/", "protocol/wire/frame.h"
     return {

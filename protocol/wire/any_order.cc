@@ -5,8 +5,8 @@
 #include <array>
 #include <string_view>
 
+#include "protocol/wire/fields/field.h"
 #include "protocol/wire/text.h"
-#include "protocol/wire/ways/field.h"
 
 namespace tendon::wire {
 namespace {

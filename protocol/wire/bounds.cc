@@ -9,9 +9,9 @@
 
 #include "core/base/rotation.h"
 #include "protocol/limits.h"
+#include "protocol/wire/fields/reader.h"
+#include "protocol/wire/fields/writer.h"
 #include "protocol/wire/generated/request_fields.h"
-#include "protocol/wire/ways/reader.h"
-#include "protocol/wire/ways/writer.h"
 
 namespace tendon {
 namespace {

@@ -9,11 +9,11 @@
 #include "protocol/limits.h"
 #include "protocol/wire/bounds.h"
 #include "protocol/wire/columns.h"
+#include "protocol/wire/fields/reader.h"
+#include "protocol/wire/fields/writer.h"
 #include "protocol/wire/generated/frame_fields.h"
 #include "protocol/wire/generated/request_fields.h"
 #include "protocol/wire/generated/schema.h"
-#include "protocol/wire/ways/reader.h"
-#include "protocol/wire/ways/writer.h"
 
 namespace tendon {
 namespace {

@@ -7,8 +7,8 @@
 #include <span>
 
 #include "protocol/messages.h"
-#include "protocol/wire/ways/reader.h"
-#include "protocol/wire/ways/writer.h"
+#include "protocol/wire/fields/reader.h"
+#include "protocol/wire/fields/writer.h"
 
 // Encodes and decodes DeviceStates: the states of several devices at the same step, in columns. Does not use a list of
 // fields, since a column contains values of several states and the number of states is limited by the size of the

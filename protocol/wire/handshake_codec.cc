@@ -6,10 +6,10 @@
 #include <span>
 
 #include "core/base/bytes.h"
+#include "protocol/wire/fields/reader.h"
+#include "protocol/wire/fields/writer.h"
 #include "protocol/wire/generated/handshake_fields.h"
 #include "protocol/wire/generated/schema.h"
-#include "protocol/wire/ways/reader.h"
-#include "protocol/wire/ways/writer.h"
 
 namespace tendon {
 namespace {

@@ -166,29 +166,29 @@ void Lateness::blame(Duration late_by, Cause cause, const Parts& parts) noexcept
   report_.stood_still = cause == Cause::kServerStood ? paused_ : stood_still_;
 }
 
-Lateness::Cause Lateness::cause_of(const Way& way, const Parts& parts, Duration late_by) const noexcept {
-  if (is_our_pause(way.received, late_by)) return Cause::kServerStood;
+Lateness::Cause Lateness::cause_of(const RoundTrip& trip, const Parts& parts, Duration late_by) const noexcept {
+  if (is_our_pause(trip.received, late_by)) return Cause::kServerStood;
   if (refused_for_ != Cause::kNone) return refused_for_;
   if (2 * stood_still_ >= late_by && stood_still_ > kStandsStill) return Cause::kEngineStood;
   const Duration ours = parts.ours - usual_.ours;
   const Duration network = parts.network - usual_.network;
   const Duration engine = parts.engine - usual_.engine;
-  if (2 * std::max({ours, network, engine}) < late_by) return way.lost ? Cause::kLost : Cause::kEngineMissing;
+  if (2 * std::max({ours, network, engine}) < late_by) return trip.lost ? Cause::kLost : Cause::kEngineMissing;
   if (ours >= network && ours >= engine) return Cause::kStateWaited;
   return network >= engine ? Cause::kRoundTrip : Cause::kEngineTook;
 }
 
-void Lateness::observe(const Way& way) noexcept {
+void Lateness::observe(const RoundTrip& trip) noexcept {
   ++report_.forces;
-  paused_ = paused(way.received);
+  paused_ = paused(trip.received);
   Parts parts;
-  parts.ours = std::max(way.sent - way.sampled, Duration::zero());
-  parts.network = std::max(way.round_trip, Duration::zero());
-  parts.engine = std::max(way.received - way.sent - parts.network, Duration::zero());
+  parts.ours = std::max(trip.sent - trip.sampled, Duration::zero());
+  parts.network = std::max(trip.round_trip, Duration::zero());
+  parts.engine = std::max(trip.received - trip.sent - parts.network, Duration::zero());
 
-  if (way.received > valid_until_ && usual_known_) {
-    const Duration late_by = way.received - valid_until_;
-    blame(late_by, cause_of(way, parts, late_by), parts);
+  if (trip.received > valid_until_ && usual_known_) {
+    const Duration late_by = trip.received - valid_until_;
+    blame(late_by, cause_of(trip, parts, late_by), parts);
   } else if (!usual_known_) {
     usual_ = parts;
     usual_known_ = true;
@@ -197,8 +197,8 @@ void Lateness::observe(const Way& way) noexcept {
     track_median(usual_.network, parts.network);
     track_median(usual_.engine, parts.engine);
   }
-  heard_ = std::max(heard_, way.received);
-  valid_until_ = way.received + way.valid_for;
+  heard_ = std::max(heard_, trip.received);
+  valid_until_ = trip.received + trip.valid_for;
   stood_still_ = {};
   paused_ = {};
   refused_for_ = Cause::kNone;

@@ -67,7 +67,7 @@ class Lateness {
   };
   static Part part(Cause cause) noexcept;
 
-  struct Way {
+  struct RoundTrip {
     LocalTime sampled;
     LocalTime sent;
     LocalTime received;
@@ -114,7 +114,7 @@ class Lateness {
   /// engine, if available. `lost` is the total number of lost datagrams.
   void heard(LocalTime now, std::optional<PeerTime> sent, std::uint64_t lost) noexcept;
   void took_state(LocalTime now) noexcept;
-  void observe(const Way& way) noexcept;
+  void observe(const RoundTrip& trip) noexcept;
   void cut() noexcept { ++report_.cut; }
   /// Must be called if forces were refused. `cause` must be one of the last four causes.
   void refused(Cause cause, std::uint64_t count) noexcept;
@@ -129,7 +129,7 @@ class Lateness {
   };
   Duration paused(LocalTime now) const noexcept;
   bool is_our_pause(LocalTime now, Duration late_by) const noexcept;
-  Cause cause_of(const Way& way, const Parts& parts, Duration late_by) const noexcept;
+  Cause cause_of(const RoundTrip& trip, const Parts& parts, Duration late_by) const noexcept;
   void blame(Duration late_by, Cause cause, const Parts& parts) noexcept;
 
   bool attending_ = false;

@@ -26,7 +26,7 @@ std::unique_ptr<FileSink> open_flight(const std::optional<std::filesystem::path>
   }
 }
 
-void write_flight(const StepFlight& flight, const Recorder::Config& config, const Ways& ways, ByteSink& sink) {
+void write_flight(const StepFlight& flight, const Recorder::Config& config, const SolverPaths& ways, ByteSink& sink) {
   Recorder recorder(config, sink);
   for (std::size_t i = 0; i < flight.size(); ++i) {
     const StepRecord& step = flight[i];

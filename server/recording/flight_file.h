@@ -25,6 +25,6 @@ std::unique_ptr<FileSink> open_flight(const std::optional<std::filesystem::path>
 
 /// Writes the steps before a fault to a new recording. `flight` must be frozen. Throws std::runtime_error if an error
 /// occurs in the sink. Log thread only.
-void write_flight(const StepFlight& flight, const Recorder::Config& config, const Ways& ways, ByteSink& sink);
+void write_flight(const StepFlight& flight, const Recorder::Config& config, const SolverPaths& ways, ByteSink& sink);
 
 }  // namespace tendon

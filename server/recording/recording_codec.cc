@@ -336,7 +336,7 @@ SceneRecord decode_scene(std::string_view message) {
           .first_part = in.first_part()};
 }
 
-StepRecord decode_step(std::string_view message, LocalTime at, Ways& ways) {
+StepRecord decode_step(std::string_view message, LocalTime at, SolverPaths& ways) {
   const auto in = parse<pb::Step>(message);
   if (in.mode() == pb::MODE_UNSPECIFIED || !pb::Mode_IsValid(in.mode()))
     throw std::invalid_argument("step " + std::to_string(in.tick()) + " has the unknown mode " +

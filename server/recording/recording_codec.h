@@ -7,7 +7,7 @@
 
 #include "core/base/time.h"
 #include "server/recording/records.h"
-#include "server/recording/ways.h"
+#include "server/recording/solver_paths.h"
 
 // Converts records to messages of recording.proto, and back. Protobuf must not be used anywhere else in the server.
 
@@ -75,7 +75,7 @@ std::string encode(const LossRecord& loss);
 // NaN. Throws std::invalid_argument if the message is not valid.
 SceneRecord decode_scene(std::string_view message);
 /// The name of Step::force_way is added to `ways`.
-StepRecord decode_step(std::string_view message, LocalTime at, Ways& ways);
+StepRecord decode_step(std::string_view message, LocalTime at, SolverPaths& ways);
 PortRecord decode_port(std::string_view message, LocalTime at);
 DatagramRecord decode_datagram(std::string_view message, LocalTime at);
 LossRecord decode_loss(std::string_view message, LocalTime at);

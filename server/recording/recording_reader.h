@@ -14,7 +14,7 @@
 #include "server/recording/mcap_reader.h"
 #include "server/recording/recording_codec.h"
 #include "server/recording/records.h"
-#include "server/recording/ways.h"
+#include "server/recording/solver_paths.h"
 
 namespace tendon {
 
@@ -52,7 +52,7 @@ class RecordingReader {
 
   std::vector<std::string> damage() const { return mcap_.damage(); }
 
-  const Ways& ways() const noexcept { return ways_; }
+  const SolverPaths& ways() const noexcept { return ways_; }
 
  private:
   bool belongs(const McapReader::Channel& channel, const recording::Channel& kind);
@@ -65,7 +65,7 @@ class RecordingReader {
   LocalTime newest_{};
   std::optional<Record> held_back_;  ///< the record after a LossRecord
   bool ended_ = false;
-  Ways ways_;
+  SolverPaths ways_;
   Devices wanted_;
   std::vector<std::string> devices_{""};
   std::size_t device_ = 0;

@@ -15,13 +15,13 @@ using namespace tendon;
 
 namespace {
 
-void require_same_again(const RecordingReader::Record& record, const Ways& ways) {
+void require_same_again(const RecordingReader::Record& record, const SolverPaths& ways) {
   if (const auto* scene = std::get_if<SceneRecord>(&record)) {
     fuzz::require(recording::decode_scene(recording::encode(*scene)) == *scene);
   } else if (const auto* step = std::get_if<StepRecord>(&record)) {
     // Compares bytes, because NaN differs from itself.
     const auto bytes = recording::encode(*step, ways.name_of(step->force_way));
-    Ways own;
+    SolverPaths own;
     const StepRecord again = recording::decode_step(bytes, step->hand.at, own);
     fuzz::require(recording::encode(again, own.name_of(again.force_way)) == bytes);
   } else if (const auto* datagram = std::get_if<DatagramRecord>(&record)) {

@@ -96,7 +96,7 @@ TEST(HardArithmetic, FastMathStopsTheBuildOfEveryRoomThatCatchesNaN) {
   }
   const std::vector<std::string> files = {
       "core/ledger/energy_ledger.cc",     "core/ledger/robust_ledger.cc", "protocol/wire/bounds.h",
-      "protocol/wire/ways/reader.h",      "server/haptic_loop.cc",        "clients/cpp/force_client.cc",
+      "protocol/wire/fields/reader.h",    "server/haptic_loop.cc",        "clients/cpp/force_client.cc",
       "clients/softbody/touch/contact.cc"};
   for (const std::string& file : files) {
     const auto [failed, why] = run(preprocess + "-ffast-math -x c++ " TENDON_SOURCES "/" + file);

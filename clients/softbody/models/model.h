@@ -21,8 +21,8 @@ enum class Prescribed : std::uint8_t {
   kForce,       ///< force on the body, N
 };
 
-/// How a kNear body has answered. The server receives these values and kWayNames.
-enum class Way : std::uint8_t {
+/// How a kNear body has answered. The server receives these values and kSolverPathNames.
+enum class SolverPath : std::uint8_t {
   kOnly = 0,
   kTabulated,
   kLearned,
@@ -31,9 +31,9 @@ enum class Way : std::uint8_t {
   kLinear,  ///< linear body, if there is no near field
 };
 
-inline constexpr std::array<std::string_view, 5> kWayNames = {"tabulated", "learned", "near", "whole", "linear"};
-constexpr std::string_view name_of(Way way) {
-  return way == Way::kOnly ? "" : kWayNames.at(static_cast<std::size_t>(way) - 1);
+inline constexpr std::array<std::string_view, 5> kSolverPathNames = {"tabulated", "learned", "near", "whole", "linear"};
+constexpr std::string_view name_of(SolverPath path) {
+  return path == SolverPath::kOnly ? "" : kSolverPathNames.at(static_cast<std::size_t>(path) - 1);
 }
 
 /// The answer of a body to a patch.
@@ -52,9 +52,9 @@ struct Reaction {
     Mat2 giving = Mat2::Zero();   ///< 1/(N m), Wᵀ A⁻¹ W at constant depth
   };
   Glide glide;
-  bool knows_glide = false;  ///< see Model::glides()
-  double error = 0;          ///< N, estimated error of the solution; the error of the mesh is not included
-  Way way = Way::kOnly;      ///< the way with the larger share if two are blended
+  bool knows_glide = false;            ///< see Model::glides()
+  double error = 0;                    ///< N, estimated error of the solution; the error of the mesh is not included
+  SolverPath way = SolverPath::kOnly;  ///< the one with the larger share if two are blended
 };
 
 /// Returns the force (N) of the tool. `untouched` is the depth without the tool (m), and `compliance` is the change of

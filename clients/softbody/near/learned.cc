@@ -438,7 +438,7 @@ std::optional<Reaction> LearnedBody::press(const Patch& patch, double depth, con
   VectorXd slope(size);
   double energy = this->energy(q, slope);
   Reaction reaction;
-  reaction.way = Way::kLearned;
+  reaction.way = SolverPath::kLearned;
   for (int step = 0;; ++step) {
     reaction.force = by_tool.dot(slope) / compliance;
     const VectorXd move = reaction.force * by_tool - inverse * slope;
@@ -524,7 +524,7 @@ double LearnedLevel::room(const Vec2& middle, double depth) const {
 }
 
 FallbackLevel::Size LearnedLevel::size() const {
-  Size size{.name = name_of(Way::kLearned),
+  Size size{.name = name_of(SolverPath::kLearned),
             .shapes = body_.shapes(),
             .elements = body_.elements(),
             .bytes = body_.bytes(),

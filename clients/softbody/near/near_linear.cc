@@ -45,7 +45,7 @@ Reaction NearModel::linear_press(const Patch& patch, Prescribed given, double va
   u.setZero();
   solid_.add_free(shape, u);
   Reaction reaction;
-  reaction.way = Way::kLinear;
+  reaction.way = SolverPath::kLinear;
   reaction.force = linear;
   if (leads) {
     const double length = 1 / (1 - left);

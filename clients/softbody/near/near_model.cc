@@ -129,7 +129,7 @@ struct NearModel::Field {
   Reaction press(const Patch& patch, Prescribed given, double value) {
     if (body == nullptr) {
       Reaction reaction = model->press(patch, given, value);
-      reaction.way = Way::kWhole;
+      reaction.way = SolverPath::kWhole;
       return reaction;
     }
     const Patch here = own(patch);
@@ -140,7 +140,7 @@ struct NearModel::Field {
     }
     const double far = body->left_out(model->displacements(), std::abs(reaction.depth));
     reaction.error += kFarSafety * std::abs(far) + missed * std::abs(reaction.force);
-    reaction.way = Way::kNear;
+    reaction.way = SolverPath::kNear;
     return reaction;
   }
 

@@ -212,7 +212,7 @@ std::optional<FallbackLevel::Answer> TabulatedLevel::press(const Patch& patch, d
   if (!(share > 0)) return std::nullopt;
   const TabulatedEnergy e = energy_at(table_, *point);
   Reaction reaction;
-  reaction.way = Way::kTabulated;
+  reaction.way = SolverPath::kTabulated;
   reaction.force = e.force;
   reaction.depth = depth;
   reaction.stiffness = e.stiffness;
@@ -237,7 +237,7 @@ double TabulatedLevel::room(const Vec2& middle, double depth) const {
 }
 
 FallbackLevel::Size TabulatedLevel::size() const {
-  Size size{.name = name_of(Way::kTabulated),
+  Size size{.name = name_of(SolverPath::kTabulated),
             .bytes = (table_.numbers.size() + table_.errors.size()) * sizeof(double),
             .cells = allowed_.cells(),
             .of_cells = static_cast<int>(table_.errors.size())};

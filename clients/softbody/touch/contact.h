@@ -35,7 +35,7 @@ struct Feel {
   /// The tool may move by this distance (m) before `force` and `stiffness` are invalid. It does not consider `gap`.
   double valid_radius = 0;
   double error = 0;  ///< N, estimated by the solver
-  Way way = Way::kOnly;
+  SolverPath way = SolverPath::kOnly;
   bool touching = false;
   std::optional<Vec3> normal{};        ///< unit vector; empty: the scene's direction to the tool
   bool topology_changed = false;       ///< true after a cut

@@ -3,10 +3,10 @@
 #pragma once
 
 #include "protocol/messages.h"
+#include "protocol/wire/fields/field.h"
 #include "protocol/wire/frame.h"
-#include "protocol/wire/ways/field.h"
 
-// Lists of fields for frames; see ways/field.h.
+// Lists of fields for frames; see fields/field.h.
 
 namespace tendon::wire {
 

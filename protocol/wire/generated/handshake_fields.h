@@ -3,10 +3,10 @@
 #pragma once
 
 #include "protocol/messages.h"
+#include "protocol/wire/fields/field.h"
 #include "protocol/wire/handshake_codec.h"
-#include "protocol/wire/ways/field.h"
 
-// Lists of fields for the handshake; see ways/field.h.
+// Lists of fields for the handshake; see fields/field.h.
 
 namespace tendon::wire {
 

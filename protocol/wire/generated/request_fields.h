@@ -3,10 +3,10 @@
 #pragma once
 
 #include "protocol/messages.h"
+#include "protocol/wire/fields/field.h"
 #include "protocol/wire/frame.h"
-#include "protocol/wire/ways/field.h"
 
-// Lists of fields for requests and their answers; see ways/field.h.
+// Lists of fields for requests and their answers; see fields/field.h.
 
 namespace tendon::wire {
 

@@ -241,7 +241,7 @@ TEST(PlacedBody, ABodyOfSeveralWaysSaysWhichOneItWas) {
   hand.position = Vec3(0.012, 0, 0);
   const std::uint32_t way = body.answer(hand).way;
   ASSERT_GT(way, 0U);
-  const std::string_view name = kWayNames.at(way - 1);
+  const std::string_view name = kSolverPathNames.at(way - 1);
   EXPECT_TRUE(name == "near" || name == "whole") << name;
   hand.position = Vec3(0.009, 0, 0);
   EXPECT_EQ(body.answer(hand).way, 0U) << "nothing touches the body";

@@ -44,14 +44,14 @@ TEST(FlightFile, OfAnEarlierRunStays) {
   for (int fault = 1; fault <= 3; ++fault) {
     const auto sink = open_flight(recording, "");
     EXPECT_EQ(sink->path(), flight_path(recording, "", fault));
-    write_flight(StepFlight(2), testing::sample_config(), Ways(), *sink);
+    write_flight(StepFlight(2), testing::sample_config(), SolverPaths(), *sink);
   }
   EXPECT_EQ(open_flight(recording, "left")->path(), flight_path(recording, "left", 1));
 }
 
 TEST(FlightFile, ThatDoesNotTakeItAllIsAnErrorWithTheReason) {
   StepFlight flight(128);
-  Ways ways;
+  SolverPaths ways;
   ways.number_of("linear");
   for (std::uint64_t tick = 0; tick < 100; ++tick) {
     StepRecord step = testing::sample_step(tick);
@@ -60,7 +60,7 @@ TEST(FlightFile, ThatDoesNotTakeItAllIsAnErrorWithTheReason) {
   }
   flight.freeze();
   FileSink full("/dev/full");
-  EXPECT_EQ(thrown_by<std::runtime_error>([&] { write_flight(flight, testing::sample_config(), Ways(), full); }),
+  EXPECT_EQ(thrown_by<std::runtime_error>([&] { write_flight(flight, testing::sample_config(), SolverPaths(), full); }),
             "cannot write recording /dev/full: No space left on device");
   MemorySink memory;
   write_flight(flight, testing::sample_config(), ways, memory);

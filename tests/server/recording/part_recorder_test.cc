@@ -245,7 +245,7 @@ TEST_F(PartRecorderTest, ABudgetDeletesItsOwnOldestPartsAndNothingElse) {
     const auto fault = open_flight(path, "");
     StepFlight flight(8);
     for (std::uint64_t tick = 0; tick < 5; ++tick) flight.record(sample_step(tick));
-    write_flight(flight, config_at(path).run, Ways(), *fault);
+    write_flight(flight, config_at(path).run, SolverPaths(), *fault);
   }
   std::ofstream(folder.path() / "run-notes.mcap") << "somebody's";
   const auto other = folder.path() / "run-7.mcap";  // not a part of run.mcap

@@ -152,7 +152,7 @@ TEST(RecordingReader, GivesTheRecordsOfEveryDeviceWhenAllAreAskedFor) {
 }
 
 TEST(RecordingReader, AWayWhoseNameIsTooLongForOneIsReadAsNone) {
-  Ways ways;
+  SolverPaths ways;
   const std::string bytes = recording::encode(sample_step(1), std::string(limits::kMaxLabel + 1, 'w'));
   EXPECT_EQ(recording::decode_step(bytes, LocalTime{}, ways).force_way, 0);
 }
@@ -287,7 +287,7 @@ Chunked chunked() {
       file.chunks.push_back({message->offset, message->offset + 9 + length, {}});
     }
     if (message->channel.topic == recording::kStep.topic) {
-      Ways ways;
+      SolverPaths ways;
       file.chunks.back().ticks.push_back(recording::decode_step(message->data, LocalTime{}, ways).tick);
     }
   }

@@ -117,13 +117,13 @@ struct KnownBlock : AskedAndExact {
 TEST(Levels, TheFirstLevelThatIsGoodEnoughAnswers) {
   PressedBefore& block = small_block(Law::kNeoHookean);
   const auto both = fallbacks_with(block, true, 0.02);
-  EXPECT_EQ(press(block, *both, Vec2::Zero(), 0.003).way, Way::kTabulated);
+  EXPECT_EQ(press(block, *both, Vec2::Zero(), 0.003).way, SolverPath::kTabulated);
   EXPECT_EQ(both->steps()[0].answers, 1);
   EXPECT_EQ(both->steps()[1].answers, 0);
   EXPECT_EQ(both->steps()[0].size.name, "tabulated");
   // A tolerance between the error of the table and that of the shapes.
   const auto exact = fallbacks_with(block, true, 1e-3);
-  EXPECT_EQ(press(block, *exact, Vec2(0.001, 0.002), 0.003).way, Way::kLearned);
+  EXPECT_EQ(press(block, *exact, Vec2(0.001, 0.002), 0.003).way, SolverPath::kLearned);
   EXPECT_EQ(exact->steps()[0].answers, 0);
   EXPECT_EQ(exact->steps()[1].answers, 1);
   const auto none = fallbacks_with(block, true, 1e-6);
@@ -131,7 +131,7 @@ TEST(Levels, TheFirstLevelThatIsGoodEnoughAnswers) {
                  {.newton = {.max_iterations = 100, .tolerance = 1e-6}});
   const Reaction by_field = press(block, *none, Vec2::Zero(), 0.003);
   EXPECT_EQ(by_field.force, press(block, near, Vec2::Zero(), 0.003).force);
-  EXPECT_TRUE(by_field.way == Way::kNear || by_field.way == Way::kWhole);
+  EXPECT_TRUE(by_field.way == SolverPath::kNear || by_field.way == SolverPath::kWhole);
   EXPECT_EQ(none->steps()[0].answers + none->steps()[1].answers, 0);
 }
 
@@ -461,20 +461,20 @@ TEST(Levels, BlendedAnswersAreBetweenTheTwoInForceAndInStiffness) {
 TEST(Levels, ABlendedAnswerSaysTheWayThatHasTheGreaterShare) {
   Reaction one = testing::whole_answer();
   Reaction other = one;
-  one.way = Way::kNear;
-  other.way = Way::kTabulated;
-  EXPECT_EQ(blended(one, other, 0.49).way, Way::kNear);
-  EXPECT_EQ(blended(one, other, 0.51).way, Way::kTabulated);
+  one.way = SolverPath::kNear;
+  other.way = SolverPath::kTabulated;
+  EXPECT_EQ(blended(one, other, 0.49).way, SolverPath::kNear);
+  EXPECT_EQ(blended(one, other, 0.51).way, SolverPath::kTabulated);
   one.force = other.force = 0;
-  EXPECT_EQ(blended(one, other, 0.51).way, Way::kTabulated) << "of no force, too";
+  EXPECT_EQ(blended(one, other, 0.51).way, SolverPath::kTabulated) << "of no force, too";
 }
 
 TEST(Levels, EachWayHasANameThatTheWireTakes) {
-  EXPECT_EQ(name_of(Way::kOnly), "");
-  EXPECT_EQ(name_of(Way::kTabulated), "tabulated");
-  EXPECT_EQ(name_of(Way::kLinear), "linear");
-  EXPECT_LE(kWayNames.size(), limits::kMaxWays);
-  for (const std::string_view name : kWayNames) EXPECT_LE(name.size(), limits::kMaxLabel);
+  EXPECT_EQ(name_of(SolverPath::kOnly), "");
+  EXPECT_EQ(name_of(SolverPath::kTabulated), "tabulated");
+  EXPECT_EQ(name_of(SolverPath::kLinear), "linear");
+  EXPECT_LE(kSolverPathNames.size(), limits::kMaxWays);
+  for (const std::string_view name : kSolverPathNames) EXPECT_LE(name.size(), limits::kMaxLabel);
 }
 
 TEST(Levels, ABodyThatListsNothingHasNoFallbacks) {

@@ -62,8 +62,8 @@ TEST(Near, ABodySmallerThanItsNearFieldIsTheWholeModelBitByBit) {
     EXPECT_EQ(found.force, expected.force);
     EXPECT_EQ(found.stiffness, expected.stiffness);
     EXPECT_EQ(found.error, expected.error);
-    EXPECT_EQ(found.way, Way::kWhole);
-    EXPECT_EQ(expected.way, Way::kOnly);
+    EXPECT_EQ(found.way, SolverPath::kWhole);
+    EXPECT_EQ(expected.way, SolverPath::kOnly);
   }
   EXPECT_EQ(near.model.size().made, 1);
 }

@@ -213,13 +213,13 @@ TEST(NearOracle, AHandThatJumpsFarIsAnsweredByTheLinearBodyAndSoonByAField) {
     EXPECT_GT(at_once.force, 0.5 * truth);
     EXPECT_GE(at_once.error, std::abs(at_once.force - truth));
     EXPECT_GE(near.model.size().linear, 1);
-    EXPECT_EQ(at_once.way, Way::kLinear);
+    EXPECT_EQ(at_once.way, SolverPath::kLinear);
     near.thread.work();  // too late: for the previous position
     near.model.press(*patch, Prescribed::kDepth, 3e-3);
     near.thread.work();
     EXPECT_NEAR(near.model.press(*patch, Prescribed::kDepth, 3e-3).force, at_once.force, 1e-3 * truth) << "no jump";
     EXPECT_GE(near.model.size().made, 2);
-    EXPECT_EQ(near.press(Vec2(0.025, -0.025), 3e-3).way, Way::kNear);
+    EXPECT_EQ(near.press(Vec2(0.025, -0.025), 3e-3).way, SolverPath::kNear);
     double depth = 3e-3;
     for (int i = 0; i < 60; ++i) depth = near.press(Vec2(0.025, -0.025 + 1e-4 * i), 3e-3).depth;
     EXPECT_NEAR(near.press(Vec2(0.025, -0.019), depth).force, near.truth(Vec2(0.025, -0.019), depth), 5e-3 * truth);

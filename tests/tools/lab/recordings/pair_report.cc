@@ -56,7 +56,7 @@ std::vector<double> ledger(const Steps& steps, const Ports& ports) {
 PairRun read_pair(const std::filesystem::path& path) {
   McapReader reader(std::make_unique<std::ifstream>(open_regular_file(path, "recording")), path.string());
   PairObserver observer;
-  Ways ways;
+  SolverPaths ways;
   bool merged = false;
   while (const auto message = reader.next()) {
     std::string topic = message->channel.topic;

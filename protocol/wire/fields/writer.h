@@ -12,8 +12,8 @@
 
 #include "core/base/bytes.h"
 #include "protocol/messages.h"
+#include "protocol/wire/fields/field.h"
 #include "protocol/wire/text.h"
-#include "protocol/wire/ways/field.h"
 
 namespace tendon::wire {
 

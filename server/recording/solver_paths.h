@@ -16,7 +16,7 @@ namespace tendon {
 /// Thread-safe: only one thread may call `number_of`. Other threads may call `name_of` for a number that they have
 /// received with synchronization, for example through a mailbox.
 /// Realtime-safe: yes.
-class Ways {
+class SolverPaths {
  public:
   /// Typical engines have about five names. 1.6 kB.
   static constexpr std::size_t kMost = 63;

@@ -14,8 +14,8 @@
 #include "core/base/bytes.h"
 #include "core/base/rotation.h"
 #include "protocol/messages.h"
+#include "protocol/wire/fields/field.h"
 #include "protocol/wire/text.h"
-#include "protocol/wire/ways/field.h"
 
 namespace tendon::wire {
 
