@@ -22,7 +22,7 @@ namespace {
 /// This must be higher than the priority of the haptic thread, which waits for the USB thread.
 constexpr int kUsbPriority = kHapticPriority + 5;
 
-std::function<void(int)> tell_guardian(Guardian& guardian, const Scene& scene, const Driver& driver) {
+std::function<void(int)> notify_guardian(Guardian& guardian, const Scene& scene, const Driver& driver) {
   static_assert(limits::kMaxDevices <= Guardian::kDevices);
   const ZeroPacket zero = ZeroPacket::usb(driver.out, std::as_bytes(std::span(driver.zero_packet)));
   return [&guardian, zero, device = scene.loop.device, name = scene.name](int node) {
@@ -44,7 +44,7 @@ std::unique_ptr<usb::Pipe> open_pipe(const Scene& scene, const Driver& driver, c
     enter_realtime(kUsbPriority);  // the haptic thread reports refusals
   };
   pipe.tell = [name = scene.name](const std::string& why) { log::warn(name + ": " + why); };
-  if (driver.moves_a_hand) pipe.opened = tell_guardian(*guardian, scene, driver);
+  if (driver.moves_a_hand) pipe.opened = notify_guardian(*guardian, scene, driver);
   return usb::open_pipe(pipe);
 }
 

@@ -101,7 +101,7 @@ LogLoop::LogLoop(const std::vector<Watched>& devices, const std::vector<Mailboxe
   devices_.reserve(devices.size());  // threads_ points to its elements
   for (const Watched& device : devices) {
     DeviceLog& log = devices_.emplace_back(DeviceLog{.of = device});
-    log.told.phase.fill(PortPhase::kAlone);
+    log.reported.phase.fill(PortPhase::kAlone);
     threads_.resize(std::max(threads_.size(), device.thread + 1));
     threads_[device.thread].devices.push_back(&log);
   }
@@ -159,8 +159,8 @@ std::uint64_t LogLoop::record_steps(std::size_t number) {
     if (recorder_) recorder_->record(*step, number, mail.ways.name_of(step->force_way));
     mail.steps.pop();
   }
-  const std::uint64_t steps = news(mail.steps_lost, device.told.steps_lost);
-  return steps + news(mail.ports_lost, device.told.ports_lost);
+  const std::uint64_t steps = news(mail.steps_lost, device.reported.steps_lost);
+  return steps + news(mail.ports_lost, device.reported.ports_lost);
 }
 
 void LogLoop::record_all(LocalTime now) {
@@ -209,7 +209,7 @@ void LogLoop::take_notices_of_recorder() {
 void LogLoop::report_health(LocalTime now, std::uint64_t unsent, DeviceLog& device) {
   Health health = device.of.haptic.health();
   health.at = now;
-  health.steps_lost = device.told.steps_lost + device.told.ports_lost;
+  health.steps_lost = device.reported.steps_lost + device.reported.ports_lost;
   const HapticLoop::Stats haptic = device.of.haptic.stats();
   if (haptic.fault != HapticController::Fault::kNone) health.fault = describe(haptic.fault);
   if (device.of.safe != nullptr) {
@@ -234,7 +234,7 @@ void LogLoop::report_overruns(LocalTime now, ThreadLog& thread) {
   Duration longest{};
   for (const DeviceLog* device : thread.devices) {
     const HapticLoop::Stats haptic = device->of.haptic.stats();
-    most = std::max(most, haptic.overruns - device->told.haptic.overruns);
+    most = std::max(most, haptic.overruns - device->reported.haptic.overruns);
     longest = std::max(longest, haptic.longest_interval);
   }
   const auto due = thread.overruns.add(now, most);
@@ -251,7 +251,7 @@ void LogLoop::report_trouble(DeviceLog& device) {
   report_safety(device);
   report_counts(device);
   const HapticLoop::Stats now = device.of.haptic.stats();
-  if (now.device != device.told.haptic.device) say(Level::kInfo, device, describe(now.device, device.of.scene));
+  if (now.device != device.reported.haptic.device) say(Level::kInfo, device, describe(now.device, device.of.scene));
   // Each fault of the controller or of the safety layer freezes the flight recorder once, and saving thaws it.
   // report_safety names the faults of the safety layer.
   if (takes_records_ && device.of.mail.flight.frozen()) {
@@ -261,13 +261,13 @@ void LogLoop::report_trouble(DeviceLog& device) {
     }
     save_flight(device);
   }
-  device.told.haptic = now;
+  device.reported.haptic = now;
 }
 
 void LogLoop::report_safety(DeviceLog& device) {
   if (device.of.safe == nullptr) return;
   const SafeDevice::Status now = device.of.safe->status();
-  const SafeDevice::Status before = std::exchange(device.told.safety, now);
+  const SafeDevice::Status before = std::exchange(device.reported.safety, now);
   if (now.faults > before.faults) {
     say(Level::kError, device, "fault of the safety layer: " + std::string(to_string(now.last_fault)));
   }
@@ -279,7 +279,7 @@ void LogLoop::report_safety(DeviceLog& device) {
 
 void LogLoop::report_counts(DeviceLog& device) {
   const DeviceCounts now = device.of.device.counts();
-  const DeviceCounts before = std::exchange(device.told.counts, now);
+  const DeviceCounts before = std::exchange(device.reported.counts, now);
   for (const DeviceCounter& row : kDeviceCounters) {
     if (row.degraded.empty() || now[row.count] == before[row.count]) continue;
     say(Level::kWarning, device,
@@ -290,7 +290,7 @@ void LogLoop::report_counts(DeviceLog& device) {
 
 void LogLoop::report_phase(DeviceLog& device, const PortRecord& port) {
   const PortPhase phase = port.sent.phase;
-  if (std::exchange(device.told.phase[port.channel], phase) == phase) return;
+  if (std::exchange(device.reported.phase[port.channel], phase) == phase) return;
   const bool trouble = phase == PortPhase::kLost || phase == PortPhase::kFault;
   const bool several = !device.of.scene.loop.control.leaders.empty();
   const std::string leader = several ? device.of.scene.channels[port.channel].name + ": " : "";

@@ -70,7 +70,7 @@ class LogLoop {
   std::optional<PartRecorder::Status> recording() const;
 
  private:
-  struct Told {
+  struct Reported {
     HapticLoop::Stats haptic{};
     SafeDevice::Status safety{};
     DeviceCounts counts{};
@@ -80,7 +80,7 @@ class LogLoop {
   };
   struct DeviceLog {
     Watched of;
-    Told told{};
+    Reported reported{};
   };
   struct NetworkLog {
     Mailboxes* mail;

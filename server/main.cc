@@ -298,7 +298,7 @@ int run(const std::vector<Scene>& scenes, double duration_s, bool json) {
   Server server(scenes);
   const auto recording = server.recording();
   if (json) {
-    server.tell_sessions([&](const NetworkLoop::SessionChange& change) { lines.add(in_json(change, name_of_run)); });
+    server.on_sessions([&](const NetworkLoop::SessionChange& change) { lines.add(in_json(change, name_of_run)); });
   }
   server.start(duration_s > 0 ? std::optional(from_seconds(duration_s)) : std::nullopt);
   const auto& file = scenes.front().network.unix_path;

@@ -350,12 +350,12 @@ void NetworkLoop::measure(LocalTime now, ServedClient& client) {
 }
 
 void NetworkLoop::report(LocalTime now) {
-  Reports::Told told = reports_.turn(now, devices_, clients_);
-  stats_.late_ours += told.late_ours;
-  stats_.late_network += told.late_network;
-  stats_.late_engine += told.late_engine;
-  stats_.late_unknown += told.late_unknown;
-  for (std::string& warning : told.warnings) notice(true, std::move(warning));
+  Reports::Sums sums = reports_.turn(now, devices_, clients_);
+  stats_.late_ours += sums.late_ours;
+  stats_.late_network += sums.late_network;
+  stats_.late_engine += sums.late_engine;
+  stats_.late_unknown += sums.late_unknown;
+  for (std::string& warning : sums.warnings) notice(true, std::move(warning));
 }
 
 /// The states are sent before the next client is processed to reduce the latency.
@@ -370,7 +370,7 @@ void NetworkLoop::publish(LocalTime now) {
   for (ServedClient& client : clients_) {
     for (Subscription& subscription : client.subscriptions) {
       const DeviceState* const state = states_[subscription.device].fresh;
-      if (state != nullptr && tell_state(client, subscription, *state)) ++stats_.predicted;
+      if (state != nullptr && publish_state(client, subscription, *state)) ++stats_.predicted;
     }
     send_all(now, client);
   }

@@ -325,11 +325,11 @@ void Server::run_network(NetworkThread& network) {
       now = clock::now();
     }
     due = assembly_.turn_network(network.number, now);
-    tell_notices(network);
+    publish_notices(network);
     if (!network.busy) now = clock::now();
   }
   assembly_.network(network.number).close(clock::now());
-  tell_notices(network);
+  publish_notices(network);
 }
 
 /// Polls without sleeping until a datagram is available, the doorbell has rung, or `due` has been reached. Returns the
@@ -343,14 +343,14 @@ LocalTime Server::watch_until(NetworkThread& network, LocalTime due) {
   return clock::now();  // not earlier than the step that rang the bell
 }
 
-void Server::tell_notices(NetworkThread& network) {
+void Server::publish_notices(NetworkThread& network) {
   NetworkLoop& loop = assembly_.network(network.number);
   for (const auto& [warning, text, session] : loop.take_notices()) {
     if (network.unknown_keys.take(text)) continue;
     warning ? log::warn(text) : log::info(text);
-    if (!session || !tell_session_) continue;
-    const std::lock_guard lock(telling_);
-    tell_session_(*session);
+    if (!session || !on_session_) continue;
+    const std::lock_guard lock(publishing_);
+    on_session_(*session);
   }
   if (const LocalTime now = clock::now(); network.unknown_keys.due(now)) {
     log::warn(network.unknown_keys.line(now, loop.stats().hellos.unknown_key));

@@ -59,7 +59,7 @@ class Server {
 
   /// Sets the function that is called if a session is opened or closed, even if it is closed by stop(). It is called
   /// from the network threads, but never concurrently. It should not block. This must be called before `start`.
-  void tell_sessions(std::function<void(const NetworkLoop::SessionChange&)> tell) { tell_session_ = std::move(tell); }
+  void on_sessions(std::function<void(const NetworkLoop::SessionChange&)> tell) { on_session_ = std::move(tell); }
 
   /// Sets all forces to zero and blocks the haptic threads until `resume` is called. Waits at most 100 ms for the
   /// threads. Devices with a safety layer must be armed again.
@@ -119,7 +119,7 @@ class Server {
   void stand_still(const HapticThread& thread);
   void run_network(NetworkThread& network);
   static LocalTime watch_until(NetworkThread& network, LocalTime due);
-  void tell_notices(NetworkThread& network);
+  void publish_notices(NetworkThread& network);
   void run_log();
   std::uint64_t unsent() const;
   void print_log();
@@ -133,8 +133,8 @@ class Server {
   std::vector<std::uint64_t> steps_seen_;  ///< by device, at the last call of turning()
 
   std::optional<Duration> run_for_;
-  std::mutex telling_;  ///< serializes calls of tell_session_
-  std::function<void(const NetworkLoop::SessionChange&)> tell_session_;
+  std::mutex publishing_;  ///< serializes calls of on_session_
+  std::function<void(const NetworkLoop::SessionChange&)> on_session_;
   std::atomic<bool> stop_haptic_{false};
   std::atomic<bool> suspend_{false};
   std::atomic<std::size_t> suspended_{0};

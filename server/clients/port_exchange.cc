@@ -12,7 +12,7 @@ namespace {
 constexpr Duration kShowEvery = std::chrono::milliseconds(20);
 
 /// Adds the scales to the port of the leader because observers do not receive the Couple message.
-void tell_scales(PortState& leader, const Couple& coupling) {
+void write_scales(PortState& leader, const Couple& coupling) {
   if (leader.position_scale == 0) leader.position_scale = coupling.position_scale;
   if (leader.force_scale == 0) leader.force_scale = coupling.force_scale;
 }
@@ -63,7 +63,7 @@ void PortExchange::publish(LocalTime now, std::uint32_t device, std::uint32_t co
 void PortExchange::show(LocalTime now, std::uint32_t place, std::uint32_t coupling, PortFrame mine) {
   ServedDevice& device = devices_[place];
   PortFrame& theirs = device.peer_ports[coupling];
-  tell_scales(device.coupling->role == PortRole::kLeader ? mine : theirs, *device.coupling);
+  write_scales(device.coupling->role == PortRole::kLeader ? mine : theirs, *device.coupling);
   for (ServedClient& client : clients_) {
     Subscription* const subscription = client.sees_ports() && !client.gone ? subscription_to(client, place) : nullptr;
     if (subscription == nullptr || now < subscription->ports[coupling].due) continue;

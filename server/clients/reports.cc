@@ -17,14 +17,14 @@ RefusedForces since(const RefusedForces& before, const RefusedForces& now) {
 }
 
 template <class Report>
-void tell_observers(std::uint32_t device, const Report& report, std::vector<ServedClient>& clients) {
+void publish_to_observers(std::uint32_t device, const Report& report, std::vector<ServedClient>& clients) {
   for (ServedClient& client : clients) {
     if (client.has<kFeatureDiagnostics>() && subscription_to(client, device) != nullptr) client.session.send(report);
   }
 }
 
 /// A device is skipped if there is no update from the log thread.
-void tell_of_devices(std::vector<ServedDevice>& devices, std::vector<ServedClient>& clients) {
+void publish_devices(std::vector<ServedDevice>& devices, std::vector<ServedClient>& clients) {
   for (std::uint32_t place = 0; place < devices.size(); ++place) {
     ServedDevice& device = devices[place];
     const Health* const health = device.mail->health.take();
@@ -33,7 +33,7 @@ void tell_of_devices(std::vector<ServedDevice>& devices, std::vector<ServedClien
       DeviceReport report = tendon::report(*device.told, *health);
       report.number = ++device.reports;
       report.device = device.about.device;
-      tell_observers(place, report, clients);
+      publish_to_observers(place, report, clients);
     }
     device.told = *health;
   }
@@ -41,8 +41,8 @@ void tell_of_devices(std::vector<ServedDevice>& devices, std::vector<ServedClien
 
 }  // namespace
 
-Reports::Told Reports::turn(LocalTime now, std::vector<ServedDevice>& devices, std::vector<ServedClient>& clients) {
-  Told sum;
+Reports::Sums Reports::turn(LocalTime now, std::vector<ServedDevice>& devices, std::vector<ServedClient>& clients) {
+  Sums sum;
   if (now - reported_ < kPeriod) return sum;
   std::map<std::uint32_t, Lateness::Report> of_holder;  // combined for all channels, by connection id
   for (ServedDevice& device : devices) {
@@ -64,21 +64,21 @@ Reports::Told Reports::turn(LocalTime now, std::vector<ServedDevice>& devices, s
   for (ServedClient& client : clients) {
     if (client.gone || !client.meter) continue;
     const LinkMeter::Report link = client.meter->report(now);
-    tell_of_engine(now, client, link, devices, clients);
+    publish_engine(now, client, link, devices, clients);
     const Lateness::Report& forces = of_holder[client.id()];
     if (forces.forces > 0 || !forces.advice.empty()) {
       LinkReport report = link_report(now, client, link, forces);
       report.number = ++client.reports;
       client.session.send(report);
     }
-    client.refused_told = client.refused;
+    client.refused_reported = client.refused;
   }
-  tell_of_devices(devices, clients);
+  publish_devices(devices, clients);
   reported_ = now;
   return sum;
 }
 
-void Reports::tell_of_engine(LocalTime now, const ServedClient& engine, const LinkMeter::Report& link,
+void Reports::publish_engine(LocalTime now, const ServedClient& engine, const LinkMeter::Report& link,
                              std::vector<ServedDevice>& devices, std::vector<ServedClient>& clients) const {
   for (const Slot& slot : engine.slots) {
     ServedChannel& channel = devices[slot.device].channels[slot.channel];
@@ -94,7 +94,7 @@ void Reports::tell_of_engine(LocalTime now, const ServedClient& engine, const Li
     const ServedChannel::Doubt doubt = std::exchange(channel.doubt, {});
     report.error = doubt.error;
     report.way = devices[slot.device].mail->ways.name_of(doubt.way);
-    tell_observers(slot.device, report, clients);
+    publish_to_observers(slot.device, report, clients);
   }
 }
 
@@ -109,7 +109,7 @@ LinkReport Reports::link_report(LocalTime now, const ServedClient& client, const
   report.late_network = forces.late_network;
   report.late_engine = forces.late_engine;
   report.late_unknown = forces.late_unknown;
-  report.refused = since(client.refused_told, client.refused);
+  report.refused = since(client.refused_reported, client.refused);
   report.worst_late = forces.worst;
   report.longest_gap = link.longest_gap;
   report.round_trip = link.round_trip;

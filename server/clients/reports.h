@@ -20,7 +20,7 @@ class Reports {
   /// The cost is negligible compared to 1000 states.
   static constexpr Duration kPeriod = std::chrono::seconds(1);
 
-  struct Told {
+  struct Sums {
     std::uint64_t late_ours = 0;  ///< late or missing forces by cause
     std::uint64_t late_network = 0;
     std::uint64_t late_engine = 0;
@@ -29,12 +29,12 @@ class Reports {
   };
 
   /// Adds reports to the sessions of the clients if the last reports are at least one period old.
-  Told turn(LocalTime now, std::vector<ServedDevice>& devices, std::vector<ServedClient>& clients);
+  Sums turn(LocalTime now, std::vector<ServedDevice>& devices, std::vector<ServedClient>& clients);
 
  private:
   LinkReport link_report(LocalTime now, const ServedClient& client, const LinkMeter::Report& link,
                          const Lateness::Report& forces) const;
-  void tell_of_engine(LocalTime now, const ServedClient& engine, const LinkMeter::Report& link,
+  void publish_engine(LocalTime now, const ServedClient& engine, const LinkMeter::Report& link,
                       std::vector<ServedDevice>& devices, std::vector<ServedClient>& clients) const;
 
   LocalTime reported_{};

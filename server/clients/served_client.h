@@ -91,12 +91,12 @@ struct ServedClient {
   std::optional<RateAdaptation> adaptation{};
   std::optional<LinkMeter> meter{};  ///< only for controllers
   std::uint64_t reports = 0;
-  std::uint64_t lost = 0;         ///< lost datagrams in both directions at the newest force
-  RefusedForces refused{};        ///< since the session was opened
-  RefusedForces refused_told{};   ///< at the time of the last report
-  bool unusable = false;          ///< as last logged
-  std::optional<Slot> coupled{};  ///< set if it is the peer of a coupling
-  bool gone = false;              ///< removed at the end of the turn
+  std::uint64_t lost = 0;            ///< lost datagrams in both directions at the newest force
+  RefusedForces refused{};           ///< since the session was opened
+  RefusedForces refused_reported{};  ///< at the time of the last report
+  bool unusable = false;             ///< as last logged
+  std::optional<Slot> coupled{};     ///< set if it is the peer of a coupling
+  bool gone = false;                 ///< removed at the end of the turn
 
   std::uint32_t id() const noexcept { return session.connection_id(); }
   template <const std::string_view& feature>

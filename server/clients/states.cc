@@ -39,7 +39,7 @@ void leave_out_handle(DeviceState& state) {
 
 }  // namespace
 
-bool tell_state(ServedClient& client, Subscription& subscription, const DeviceState& state) {
+bool publish_state(ServedClient& client, Subscription& subscription, const DeviceState& state) {
   if (client.coupled && client.coupled->device == subscription.device) return false;
   if (client.has<kFeatureHandle>()) subscription.pressed |= state.buttons;
   const std::uint64_t one_in = client.adaptation ? client.adaptation->one_in() : 1;

@@ -9,6 +9,6 @@ namespace tendon {
 /// Sends a state to the client unless the previous state is too recent for its rate, or the client is the peer of a
 /// coupling. Fields that were not requested or do not fit into a frame are removed. Returns true if the client can
 /// predict the state, in which case it is not sent (StateDeadband).
-bool tell_state(ServedClient& client, Subscription& subscription, const DeviceState& state);
+bool publish_state(ServedClient& client, Subscription& subscription, const DeviceState& state);
 
 }  // namespace tendon

@@ -70,7 +70,7 @@ class Queue {
 
   bool finish(std::chrono::duration<double> patience) {
     std::unique_lock lock(mutex_);
-    for (const std::size_t stream : {0U, 1U}) tell_of_dropped(stream);
+    for (const std::size_t stream : {0U, 1U}) report_dropped(stream);
     changed_.notify_all();
     while (!waiting_.empty()) {
       const std::uint64_t before = writes_;
@@ -110,11 +110,11 @@ class Queue {
       s.json = text.starts_with('{');
       return;
     }
-    tell_of_dropped(stream);
+    report_dropped(stream);
     push(stream, text);
   }
 
-  void tell_of_dropped(std::size_t stream) {
+  void report_dropped(std::size_t stream) {
     Stream& s = streams_[stream];
     const std::uint64_t lines = std::exchange(s.dropped, 0);
     if (lines == 0) return;

@@ -194,7 +194,7 @@ class SpreadSolver : public Solver {
     check(VecDuplicate(load_, residual_.address()));
     const std::vector<GridLevel> levels = grid_levels(solid);
     if (levels.empty()) {
-      tell_rigid_motions(solid);
+      send_rigid_motions(solid);
       check(PCSetType(preconditioner, PCGAMG));
       return;
     }
@@ -243,7 +243,7 @@ class SpreadSolver : public Solver {
     check(MatSetValuesCOO(to, values.data(), INSERT_VALUES));
   }
 
-  void tell_rigid_motions(const Solid& solid) {
+  void send_rigid_motions(const Solid& solid) {
     Vector places;
     check(VecCreate(comm_, places.address()));
     check(VecSetSizes(places, rows_, size_));

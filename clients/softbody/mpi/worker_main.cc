@@ -51,9 +51,9 @@ struct Arguments {
   bool json = false;
 };
 
-class Told : public Solver {
+class ReportingSolver : public Solver {
  public:
-  Told(const Solid& solid, Method method) : solver_(on_ranks(solid, method)) {}
+  ReportingSolver(const Solid& solid, Method method) : solver_(on_ranks(solid, method)) {}
   Eigen::MatrixXd solve(const Eigen::MatrixXd& loads) const override {
     Eigen::MatrixXd solution = solver_->solve(loads);
     columns_ += loads.cols();
@@ -73,7 +73,7 @@ int condense_scene(const Arguments& arguments, const Ranks& ranks) {
   const bool tells = ranks.rank() == 0 && isatty(STDERR_FILENO) != 0;
   const Method method = arguments.method;
   const SurfaceTable table = condense(scene.body, [tells, method](const Solid& solid) -> std::unique_ptr<Solver> {
-    if (tells) return std::make_unique<Told>(solid, method);
+    if (tells) return std::make_unique<ReportingSolver>(solid, method);
     return on_ranks(solid, method);
   });
   if (tells) std::cerr << "\n";

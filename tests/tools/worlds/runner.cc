@@ -126,7 +126,7 @@ void tell(const Broken& broken, bool json, std::ostream& out) {
       << "\n  expected: " << oracle.sentence << "\n  repeat with: " << reproduce(broken.seed) << '\n';
 }
 
-void tell_events(const Tally& tally, std::ostream& out) {
+void write_events(const Tally& tally, std::ostream& out) {
   out << tally.steps << " haptic steps, " << tally.datagrams << " datagrams; forces rendered in " << tally.felt
       << " worlds, limited in " << tally.limited << ", torques in " << tally.turned << ", grips in " << tally.gripped
       << "; " << tally.presses << " button presses received; recovery checked in " << tally.recovered
@@ -160,7 +160,7 @@ void tell(const Tally& tally, double elapsed, bool json, std::ostream& out) {
       << elapsed << " s: " << worlds / elapsed << " per second, " << std::setprecision(0) << simulated / elapsed
       << " times real time\n"
       << std::defaultfloat << std::setprecision(6);
-  tell_events(tally, out);
+  write_events(tally, out);
 }
 
 std::string whole(const Outcome& outcome) {
@@ -285,7 +285,7 @@ bool judge(std::istream& lines, std::ostream& out) {
                     .least_energy = end.least_of("least_energy_j")};
   out << tally.worlds << " worlds of " << seconds(DrawnWorld::kLength) << " s, seeds " << end.units.first << " to "
       << end.units.first + end.units.count - 1 << "; digest " << end.digest.text() << '\n';
-  tell_events(tally, out);
+  write_events(tally, out);
   if (end.total("broken") > 0) {
     out << end.total("broken") << " violated a guarantee: tendon-worlds run --seed N --verbose\n";
     return false;
