@@ -361,11 +361,11 @@ void NetworkLoop::report(LocalTime now) {
 /// The states are sent before the next client is processed to reduce the latency.
 void NetworkLoop::publish(LocalTime now) {
   ports_.publish(now);
-  for (std::size_t place = 0; place < states_.size(); ++place) {
-    const DeviceState* const fresh = states_[place].fresh = states_[place].box->take();
+  for (std::size_t index = 0; index < states_.size(); ++index) {
+    const DeviceState* const fresh = states_[index].fresh = states_[index].box->take();
     if (fresh == nullptr) continue;
-    devices_[place].sampled.observe(fresh->tick, LocalTime(fresh->sampled.time_since_epoch()), now);
-    for (ServedChannel& channel : devices_[place].channels) channel.lateness.took_state(now);
+    devices_[index].sampled.observe(fresh->tick, LocalTime(fresh->sampled.time_since_epoch()), now);
+    for (ServedChannel& channel : devices_[index].channels) channel.lateness.took_state(now);
   }
   for (ServedClient& client : clients_) {
     for (Subscription& subscription : client.subscriptions) {
@@ -416,13 +416,13 @@ std::uint8_t NetworkLoop::note(const ForceCommand& command, const ServedClient& 
 }
 
 void NetworkLoop::take_force(LocalTime now, ServedClient& client, const ForceCommand& command) {
-  const std::uint32_t place = client.device_of(command.device);
-  const bool there = place < devices_.size() && command.channel < devices_[place].channels.size();
-  if (!there || leases_.holder(place, command.channel) != client.id()) {
+  const std::uint32_t index = client.device_of(command.device);
+  const bool there = index < devices_.size() && command.channel < devices_[index].channels.size();
+  if (!there || leases_.holder(index, command.channel) != client.id()) {
     ++stats_.denied;
     return;
   }
-  ServedDevice& device = devices_[place];
+  ServedDevice& device = devices_[index];
   ServedChannel& channel = device.channels[command.channel];
   const auto answered = device.sampled.find(command.based_on_tick);
   if (!answered) {
@@ -435,7 +435,7 @@ void NetworkLoop::take_force(LocalTime now, ServedClient& client, const ForceCom
     ++stats_.unusable;
     return;
   }
-  leases_.renew(now, place, command.channel);
+  leases_.renew(now, index, command.channel);
   const double bound = device.about.max_force;  // N; 0 if unknown
   if (bound > 0 && command.force.squaredNorm() > bound * bound) channel.lateness.cut();
   const LinkStats& link = client.session.stats();

@@ -30,7 +30,7 @@ const std::string& name_of(const ChannelDescription& channel) { return channel.n
 
 /// If the name is empty, this is the first entry.
 template <class Named>
-std::optional<std::uint32_t> place_of(const std::vector<Named>& all, const std::string& name) {
+std::optional<std::uint32_t> find_by_name(const std::vector<Named>& all, const std::string& name) {
   if (name.empty()) return 0;
   const auto found = std::find_if(all.begin(), all.end(), [&](const Named& one) { return name_of(one) == name; });
   if (found == all.end()) return std::nullopt;
@@ -62,17 +62,17 @@ std::variant<std::vector<Slot>, Refusal> Admission::slots_of(const Hello& hello,
   std::vector<Slot> slots;
   Role highest = Role::kObserver;
   for (const Claim& claim : hello.claims) {
-    const auto device = place_of(devices, claim.device);
+    const auto device = find_by_name(devices, claim.device);
     if (!device) return not_there("device", claim.device, devices);
     if (!slots.empty() && bank_of(*device) != bank_of(slots.front().device)) {
-      const auto name = [&](std::size_t place) { return "\"" + name_of(devices[place]) + "\""; };
+      const auto name = [&](std::size_t index) { return "\"" + name_of(devices[index]) + "\""; };
       const std::size_t first = slots.front().device - number_of(slots.front().device);
       const std::size_t last = std::min<std::size_t>(first + limits::kMaxDevices, devices.size()) - 1;
       return Refusal{Code::kInvalid, "all devices of a session must be in the same bank: expected " + name(first) +
                                          " to " + name(last) + ", and not " + name(*device)};
     }
     const auto& channels = devices[*device].about.channels;
-    const auto channel = claim.role == Role::kController ? place_of(channels, claim.channel) : 0;
+    const auto channel = claim.role == Role::kController ? find_by_name(channels, claim.channel) : 0;
     if (!channel) return not_there("channel", claim.channel, channels);
     const bool twice = std::any_of(slots.begin(), slots.end(), [&](const Slot& slot) {
       return slot.device == *device && slot.channel == *channel && slot.role == claim.role;

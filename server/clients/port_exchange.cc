@@ -21,8 +21,8 @@ void write_scales(PortState& leader, const Couple& coupling) {
 
 PortExchange::PortExchange(std::vector<ServedDevice>& devices, std::vector<ServedClient>& clients, Leases& leases)
     : devices_(devices), clients_(clients), leases_(leases) {
-  for (std::uint32_t place = 0; place < devices.size(); ++place) {
-    if (devices[place].coupling) coupled_.push_back(place);
+  for (std::uint32_t index = 0; index < devices.size(); ++index) {
+    if (devices[index].coupling) coupled_.push_back(index);
   }
 }
 
@@ -60,12 +60,12 @@ void PortExchange::publish(LocalTime now, std::uint32_t device, std::uint32_t co
 
 /// Sends both ports of a coupling to the observers of the device at the rate of their states. `mine` is our port, with
 /// the channel of the peer.
-void PortExchange::show(LocalTime now, std::uint32_t place, std::uint32_t coupling, PortFrame mine) {
-  ServedDevice& device = devices_[place];
+void PortExchange::show(LocalTime now, std::uint32_t index, std::uint32_t coupling, PortFrame mine) {
+  ServedDevice& device = devices_[index];
   PortFrame& theirs = device.peer_ports[coupling];
   write_scales(device.coupling->role == PortRole::kLeader ? mine : theirs, *device.coupling);
   for (ServedClient& client : clients_) {
-    Subscription* const subscription = client.sees_ports() && !client.gone ? subscription_to(client, place) : nullptr;
+    Subscription* const subscription = client.sees_ports() && !client.gone ? subscription_to(client, index) : nullptr;
     if (subscription == nullptr || now < subscription->ports[coupling].due) continue;
     const std::uint64_t every =
         std::max<std::uint64_t>(subscription->state_every, client.adaptation ? client.adaptation->one_in() : 1);
@@ -78,28 +78,28 @@ void PortExchange::show(LocalTime now, std::uint32_t place, std::uint32_t coupli
 }
 
 bool PortExchange::take(LocalTime now, const ServedClient& client, const PortFrame& port) {
-  const std::uint32_t place = client.device_of(port.device);
-  const bool coupled = client.coupled && client.coupled->device == place && client.coupled->channel == port.channel;
-  if (!coupled || leases_.holder(place, port.channel) != client.id()) return false;
-  leases_.renew(now, place, port.channel);
-  const auto coupling = coupling_by(devices_[place], port.channel);
-  if (coupling) arrived(now, place, *coupling, port.channel, port);
+  const std::uint32_t index = client.device_of(port.device);
+  const bool coupled = client.coupled && client.coupled->device == index && client.coupled->channel == port.channel;
+  if (!coupled || leases_.holder(index, port.channel) != client.id()) return false;
+  leases_.renew(now, index, port.channel);
+  const auto coupling = coupling_by(devices_[index], port.channel);
+  if (coupling) arrived(now, index, *coupling, port.channel, port);
   return true;
 }
 
-void PortExchange::arrived(LocalTime now, std::uint32_t place, std::uint32_t coupling, std::uint32_t channel,
+void PortExchange::arrived(LocalTime now, std::uint32_t index, std::uint32_t coupling, std::uint32_t channel,
                            const PortState& port) {
-  ServedDevice& device = devices_[place];
+  ServedDevice& device = devices_[index];
   device.mail->port_in[coupling].put({port, now, device.peers[coupling]});
   const auto waits = [&](ServedClient& client) {
-    Subscription* const subscription = client.sees_ports() ? subscription_to(client, place) : nullptr;
+    Subscription* const subscription = client.sees_ports() ? subscription_to(client, index) : nullptr;
     if (subscription != nullptr) subscription->ports[coupling].peer_waits = true;
     return subscription != nullptr;
   };
   if (std::count_if(clients_.begin(), clients_.end(), waits) == 0) return;
   PortFrame& frame = device.peer_ports[coupling];
   static_cast<PortState&>(frame) = port;
-  frame.device = number_of(place);
+  frame.device = number_of(index);
   frame.channel = channel;
   frame.of_peer = true;
 }

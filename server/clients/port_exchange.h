@@ -48,10 +48,10 @@ class PortExchange {
   };
 
   void renew(Dialled& dialled);
-  void arrived(LocalTime now, std::uint32_t place, std::uint32_t coupling, std::uint32_t channel,
+  void arrived(LocalTime now, std::uint32_t index, std::uint32_t coupling, std::uint32_t channel,
                const PortState& port);
   void publish(LocalTime now, std::uint32_t device, std::uint32_t coupling, const PortState& port);
-  void show(LocalTime now, std::uint32_t place, std::uint32_t coupling, PortFrame mine);
+  void show(LocalTime now, std::uint32_t index, std::uint32_t coupling, PortFrame mine);
 
   std::vector<ServedDevice>& devices_;
   std::vector<ServedClient>& clients_;

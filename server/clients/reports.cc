@@ -25,15 +25,15 @@ void publish_to_observers(std::uint32_t device, const Report& report, std::vecto
 
 /// A device is skipped if there is no update from the log thread.
 void publish_devices(std::vector<ServedDevice>& devices, std::vector<ServedClient>& clients) {
-  for (std::uint32_t place = 0; place < devices.size(); ++place) {
-    ServedDevice& device = devices[place];
+  for (std::uint32_t index = 0; index < devices.size(); ++index) {
+    ServedDevice& device = devices[index];
     const Health* const health = device.mail->health.take();
     if (health == nullptr) continue;
     if (device.told) {
       DeviceReport report = tendon::report(*device.told, *health);
       report.number = ++device.reports;
       report.device = device.about.device;
-      publish_to_observers(place, report, clients);
+      publish_to_observers(index, report, clients);
     }
     device.told = *health;
   }

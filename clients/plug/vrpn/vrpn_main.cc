@@ -41,9 +41,9 @@ vrpn::Server::Alias alias_of(const std::string& text, std::vector<std::string>& 
   }
   const std::string device = text.substr(equals + 1);
   const auto found = std::ranges::find(devices, device);
-  const auto place = static_cast<std::size_t>(found - devices.begin());
+  const auto index = static_cast<std::size_t>(found - devices.begin());
   if (found == devices.end()) devices.push_back(device);
-  return {name, place};
+  return {name, index};
 }
 
 vrpn::Server::Config config_of(VrpnOptions& options) {
@@ -86,7 +86,7 @@ int run_vrpn(VrpnOptions& options) {
   }
   std::string names;
   for (const auto& alias : config.names)
-    names += (names.empty() ? "" : ", ") + alias.name + " (" + host.name(alias.place) + ")";
+    names += (names.empty() ? "" : ", ") + alias.name + " (" + host.name(alias.index) + ")";
   host.say("VRPN at " + to_string(server.address()) + ": " + names);
   if (!is_loopback(config.listen))
     host.say("anyone who can reach this port can move the motors: VRPN has no authentication");

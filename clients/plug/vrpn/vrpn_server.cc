@@ -140,7 +140,7 @@ Server::Server(BridgeHost& host, Config config, LocalTime now)
 
 Server::~Server() {
   for (const auto& client : clients_) {
-    for (const Alias& alias : config_.names) host_.plug(alias.place).release(client->number);
+    for (const Alias& alias : config_.names) host_.plug(alias.index).release(client->number);
   }
 }
 
@@ -163,7 +163,7 @@ std::span<const BridgeHost::Count> Server::counts() {
 
 void Server::serve_states(const Moment& now) {
   for (std::size_t i = 0; i < stations_.size(); ++i) {
-    const Plug& plug = host_.plug(config_.names[i].place);
+    const Plug& plug = host_.plug(config_.names[i].index);
     if (const auto sentence = stations_[i].learn(plug)) host_.say(*sentence);
     if (plug.lost() != seen_[i].lost) {
       seen_[i].lost = plug.lost();
@@ -313,7 +313,7 @@ void Server::write(Client& client) {
 }
 
 void Server::drop(Client& client, const std::string& why) {
-  for (const Alias& alias : config_.names) host_.plug(alias.place).release(client.number);
+  for (const Alias& alias : config_.names) host_.plug(alias.index).release(client.number);
   host_.say(client.name + " " + why);
   const Peer::Counts& counts = client.peer.counts();
   gone_.messages += counts.messages;
@@ -343,7 +343,7 @@ LocalTime Server::turn(const Moment& now) {
     for (std::size_t i = 0; i < stations_.size(); ++i) {
       Asker& asker = client.askers[i];
       asked =
-          asker.turn(now.at, now.since_1970, host_.plug(config_.names[i].place), stations_[i], client.peer) || asked;
+          asker.turn(now.at, now.since_1970, host_.plug(config_.names[i].index), stations_[i], client.peer) || asked;
       if (const auto sentence = asker.next_sentence()) host_.say(*sentence);
     }
     write(client);

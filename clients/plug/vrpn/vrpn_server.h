@@ -58,7 +58,7 @@ class Server {
 
   struct Alias {
     std::string name;
-    std::size_t place;  ///< index of the device at the BridgeHost
+    std::size_t index;  ///< index of the device at the BridgeHost
   };
   struct Config {
     Address listen;  ///< IPv4; port 0: any
