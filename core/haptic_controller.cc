@@ -152,7 +152,8 @@ void HapticController::step_into(Step& fresh, const Motion& hand, const Vec3& ap
 
 Step HapticController::step(const Motion& hand, const Vec3& applied, const std::optional<Vec3>& hand_force,
                             const ForceChannels::Wanted& wanted, const HandleSample* handle,
-                            const Purse::Settlement& settled, const Purse::Settlement& grip_settled) noexcept {
+                            const EnergyTank::Settlement& settled,
+                            const EnergyTank::Settlement& grip_settled) noexcept {
   if (!believable(hand, handle)) return disbelieve(hand, applied, handle);
   settled_ = settled;
   grip_settled_ = grip_settled;

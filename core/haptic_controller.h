@@ -89,7 +89,7 @@ struct Step : PositionStep {
 ///     F ← the force that makes the handle follow a tool on which F acts     (AdmittanceLoop, when listed)
 ///     F ← ‖F‖ ≤ max_force                                                   (saturate)
 ///     F ← ‖F − F_before‖ ≤ max_slew · T                                     (limit_slew)
-///     account ← energy received from the peers, less energy given           (Couplings::settle, with a purse)
+///     account ← energy received from the peers, less energy given           (Couplings::settle, with an energy tank)
 ///     F ← the bound of the account, e.g. ‖F‖ ≤ f_c + 2 √(b E / T_max)        (Limiter::limit)
 ///     F ← ‖F‖ ≤ max_force again, if the damper of the limiter has added to it
 ///
@@ -133,9 +133,9 @@ class HapticController {
     std::optional<GripLimits> grip{};
     /// For a device with a force sensor. Without it the device is of impedance type.
     std::optional<AdmittanceLoop<3>::Config> admittance{};
-    /// Couples the handle to that of a peer. The limiter has a shared_account if the coupling has a purse. A coupled
-    /// orientation must be measured in every step, and produces a torque only with `rotation`. A coupled gripper needs
-    /// `grip`.
+    /// Couples the handle to that of a peer. The limiter has a shared_account if the coupling has an energy tank. A
+    /// coupled orientation must be measured in every step, and produces a torque only with `rotation`. A coupled
+    /// gripper needs `grip`.
     std::optional<Coupling::Config> coupling{};
     /// For a follower with several leaders: one `coupling` per leader (Couplings). Empty: one leader.
     std::vector<CoupledLeader> leaders{};
@@ -181,10 +181,10 @@ class HapticController {
                  const HandleSample* handle = nullptr) noexcept;
 
   /// Performs a step with a given `wanted` instead of the observed remote forces and the coupling, and with given
-  /// settlements of the purses. Replays recorded steps, of a scene without `coupling`.
+  /// settlements of the tanks. Replays recorded steps, of a scene without `coupling`.
   Step step(const Motion& hand, const Vec3& applied, const std::optional<Vec3>& hand_force,
             const ForceChannels::Wanted& wanted, const HandleSample* handle = nullptr,
-            const Purse::Settlement& settled = {}, const Purse::Settlement& grip_settled = {}) noexcept;
+            const EnergyTank::Settlement& settled = {}, const EnergyTank::Settlement& grip_settled = {}) noexcept;
 
   /// Performs a step without a position measurement. The force to apply is zero. From `handle` the last orientation and
   /// grip are recorded, and the held torque and grip force are booked.
@@ -197,8 +197,8 @@ class HapticController {
     buttons_ = buttons;
     armed_ = armed;
   }
-  /// Returns the settlement of the purse of the grippers in the newest step.
-  const Purse::Settlement& grip_settled() const noexcept { return grip_settled_; }
+  /// Returns the settlement of the tank of the grippers in the newest step.
+  const EnergyTank::Settlement& grip_settled() const noexcept { return grip_settled_; }
 
   Fault fault() const noexcept { return fault_; }
   /// Clears the fault and ends `disarm`. The next fresh force is ramped in.
@@ -234,8 +234,8 @@ class HapticController {
   std::optional<GripPort> grip_;
   ForceChannels held_;
   std::optional<Couplings> couplings_;
-  Purse::Settlement settled_{};
-  Purse::Settlement grip_settled_{};
+  EnergyTank::Settlement settled_{};
+  EnergyTank::Settlement grip_settled_{};
   std::uint32_t buttons_ = 0;
   bool armed_ = true;
   Fault fault_ = Fault::kNone;

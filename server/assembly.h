@@ -47,7 +47,7 @@ class Assembly {
     /// first scene. It removes the suites that this scene does not allow.
     NetworkLoop::Config network{};
     LocalTime now{};
-    std::uint64_t epoch = 1;  ///< must be higher than in all previous runs (Purse)
+    std::uint64_t epoch = 1;  ///< must be higher than in all previous runs (EnergyTank)
     /// If this is set, the mailboxes have this size, and the caller must empty them instead of the LogLoop. There are
     /// datagrams in them if there is space for more than one. Nothing is recorded.
     std::optional<Mailboxes::Capacities> watched{};

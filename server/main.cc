@@ -392,7 +392,7 @@ std::vector<std::string> without_limiter_settings(const Scene& scene) {
   }
   std::vector<std::string> settings = limiter_settings("none", scene.loop.control);
   if (scene.teleoperation) {
-    settings.insert(settings.end(), {"teleoperation.purse=", "teleoperation.coupling.adapt_to_delay=false"});
+    settings.insert(settings.end(), {"teleoperation.energy_tank=", "teleoperation.coupling.adapt_to_delay=false"});
   }
   return settings;
 }

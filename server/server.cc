@@ -107,7 +107,7 @@ Assembly::Config config_of(const Scene::Network& scene, LocalTime now) {
   if (scene.keys) network.keys = read_key_folder(*scene.keys);
   if (scene.unix_path) network.needs_no_key = UnixSocket::is_peer;
   network.server_name = "tendond " + std::string(kVersion);
-  // Nanoseconds of Unix time, so it exceeds the epoch of all earlier runs unless the clock is set back (Purse).
+  // Nanoseconds of Unix time, so it exceeds the epoch of all earlier runs unless the clock is set back (EnergyTank).
   config.epoch = static_cast<std::uint64_t>((now.time_since_epoch() + clock::unix_offset()).count());
   return config;
 }

@@ -206,12 +206,12 @@ void add_handle(Json& json, std::span<const DeviceState> states) {
 
 Json in_json(const PortFrame& port) {
   const auto plain = [](const Vec3& v) -> Json { return {plotted(v.x()), plotted(v.y()), plotted(v.z())}; };
-  const bool has_purse = port.need > 0;
+  const bool has_tank = port.need > 0;
   return {{"phase", name(port.phase)},
           {"position_m", plain(port.position)},
           {"force_n", plain(port.force)},
           {"contact_n", port.contact_force ? plain(*port.contact_force) : Json()},
-          {"account_j", has_purse ? Json(plotted(port.account)) : Json()},
+          {"account_j", has_tank ? Json(plotted(port.account)) : Json()},
           {"round_trip_ms", port.round_trip > Duration::zero() ? Json(milliseconds(port.round_trip)) : Json()},
           {"stiffness_n_per_m", port.surface ? Json(plotted(port.surface->stiffness)) : Json()},
           {"share", port.share ? Json(*port.share) : Json()}};

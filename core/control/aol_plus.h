@@ -34,8 +34,8 @@ namespace tendon {
 /// that are released.
 ///     C ← max(0, C + work),  C ≤ ‖F_wanted‖ · ‖travel since the contact began‖,  C ≤ C_most
 /// A contact ends if no force is wanted, or if the wanted force reverses. C does not decay with time, because this
-/// would weaken the force on a hand that holds a spring still. A shared account (Purse) also keeps ℓ(F_wanted): the C
-/// of a follower is zero, so the cap would discard the energy that its peer paid for the force.
+/// would weaken the force on a hand that holds a spring still. A shared account (EnergyTank) also keeps ℓ(F_wanted):
+/// the C of a follower is zero, so the cap would discard the energy that its peer paid for the force.
 ///
 /// **robust_ledger** uses RobustLedger for positions in counts of Δ.
 ///

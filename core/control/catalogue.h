@@ -80,7 +80,7 @@ struct LimiterConfig {
   /// N·s/m, the largest damping of the passivity controllers and kReferenceEnergy. It must be far below 2m/T, where a
   /// digital damper is unstable. 20 is an eighth of that for 75 g and 1 kHz.
   double max_damping = 20;
-  /// Other ports can credit the account and draw on it (Purse). Refused for laws that cannot share.
+  /// Other ports can credit the account and draw on it (EnergyTank). Refused for laws that cannot share.
   bool shared_account = false;
 };
 

@@ -11,8 +11,9 @@ namespace tendon {
 
 Limiter::Limiter(const LimiterConfig& config) : law_(make_law(config)), longest_hold_(config.longest_hold) {
   if (config.shared_account && !std::visit([]<class L>(const L&) { return SharesAccount<L, 3>; }, law_)) {
-    throw std::invalid_argument("law \"" + std::string(info(config.law).name) +
-                                "\" has no energy account that a purse can share: expected aol, aol-box or aol+");
+    throw std::invalid_argument(
+        "law \"" + std::string(info(config.law).name) +
+        "\" has no energy account that an energy tank can share: expected aol, aol-box or aol+");
   }
   if (!info(config.law).passive) return;
   if (config.follow_holds) holds_.emplace(config.longest_hold, *config.follow_holds);

@@ -35,7 +35,7 @@ concept StabilityController = requires(Law law, const Interval<N>& interval, con
   noexcept->std::convertible_to<double>;
 };
 
-/// A law whose account other ports can credit and draw on (Purse). In J:
+/// A law whose account other ports can credit and draw on (EnergyTank). In J:
 ///
 ///     credit(J)        raises the account by energy that another port gave up. Ignores values that are not positive
 ///     withdraw(J)      lowers the account, by at most `payable`. Ignores values that are not positive

@@ -32,8 +32,9 @@ HandlePort<Blocks, Size>::HandlePort(const Config& config)
         "\" only limits the force on a point: expected aol+, aol or none for a handle with rotation or gripper");
   }
   if (config.shared_account && !limits_) {
-    throw std::invalid_argument("law \"" + std::string(info(config.law).name) +
-                                "\" has no energy account that a purse can share: expected aol or aol+ for a handle");
+    throw std::invalid_argument(
+        "law \"" + std::string(info(config.law).name) +
+        "\" has no energy account that an energy tank can share: expected aol or aol+ for a handle");
   }
   if (limits_ && config.follow_holds) holds_.emplace(config.longest_hold, *config.follow_holds);
 }

@@ -115,7 +115,7 @@ struct GripLimits {
   double max_slew = std::numeric_limits<double>::infinity();  ///< N/s, > 0
 };
 /// The parts energy_cap, fading_contact, knee and latency_reserve of `point` apply to the gripper as well; the others
-/// are specific to the position. The account of the gripper is shared if that of `point` is, through a separate purse.
+/// are specific to the position. The account of the gripper is shared if that of `point` is, through a separate tank.
 GripPort::Config grip_config(const LimiterConfig& point, const GripLimits& grip);
 
 /// A wrench after a memoryless limit, and the reason. `saturate` applies the first s, `limit_slew` the second one to

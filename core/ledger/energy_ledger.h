@@ -48,7 +48,7 @@ class EnergyLedger {
   double observe_unseen(double applied, Duration at_most) noexcept;
 
   /// Adds energy (J) from the account of another port, or subtracts it if the value is negative. E is then a shared
-  /// account (Purse). Ignores a value that is not finite.
+  /// account (EnergyTank). Ignores a value that is not finite.
   void transfer(double energy) noexcept;
 
   /// Sets the lower bounds of friction from the next interval on. Negative values and values that are not finite are

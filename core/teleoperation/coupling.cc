@@ -32,15 +32,15 @@ PositionPosition<3>::Config spring_of(const CouplingConfig& config, const Mapped
   return spring;
 }
 
-std::optional<Purse> purse_of(const CouplingConfig& config, const MappedEnd& frame) {
-  if (!config.purse) return std::nullopt;
-  Purse::Config purse = *config.purse;
-  purse.peers = 1;
-  purse.joule[0] = frame.joule();
+std::optional<EnergyTank> tank_of(const CouplingConfig& config, const MappedEnd& frame) {
+  if (!config.tank) return std::nullopt;
+  EnergyTank::Config tank = *config.tank;
+  tank.peers = 1;
+  tank.joule[0] = frame.joule();
   // Both ends use the same start value. Otherwise the end whose joules are worth less would have too little.
-  purse.start = frame.worth(purse.start);
-  purse.epoch = config.spring.epoch;
-  return Purse(purse);
+  tank.start = frame.worth(tank.start);
+  tank.epoch = config.spring.epoch;
+  return EnergyTank(tank);
 }
 
 std::optional<TurnCoupling> turn_of(const CouplingConfig& config, const MappedEnd& frame) {
@@ -58,8 +58,8 @@ std::optional<TurnCoupling> turn_of(const CouplingConfig& config, const MappedEn
 std::optional<GripCoupling> grip_of(const CouplingConfig& config, const MappedEnd& frame) {
   if (!config.grip) return std::nullopt;
   GripCoupling::End end{.role = config.role, .adapts = config.spring.adapt_to_delay, .period = config.spring.period};
-  end.purse = config.purse;
-  if (end.purse) end.purse->epoch = config.spring.epoch;
+  end.tank = config.tank;
+  if (end.tank) end.tank->epoch = config.spring.epoch;
   return GripCoupling(*config.grip, end, frame.map());
 }
 
@@ -69,7 +69,7 @@ Coupling::Coupling(const Config& config)
     : config_(checked(config)),
       frame_(config.map, config.role),
       spring_(spring_of(config, frame_)),
-      purse_(purse_of(config, frame_)),
+      tank_(tank_of(config, frame_)),
       law_(coupling_law_of(config, frame_)),
       loss_stages_(config.peer_period) {
   if (config.absolute) {
@@ -98,7 +98,7 @@ Coupling::Coupling(const Config& config)
 double Coupling::stiffness() const noexcept {
   return std::visit([this](const auto& law) { return law.stiffness(law_period(), share_, round_trip()); }, law_);
 }
-double Coupling::account() const noexcept { return purse_ ? purse_->account() : 0; }
+double Coupling::account() const noexcept { return tank_ ? tank_->account() : 0; }
 bool Coupling::contact_measured() const noexcept { return newest_.contact_force.has_value(); }
 std::uint64_t Coupling::refused() const noexcept { return refused_; }
 
@@ -114,16 +114,16 @@ void Coupling::receive(const PortState& peer, LocalTime now) noexcept {
     ++refused_;
     return;
   }
-  if (purse_) {
-    const std::uint64_t before = purse_->refused();
-    purse_->receive(0, {.epoch = peer.epoch,
-                        .answers_epoch = peer.answers_epoch,
-                        .sequence = peer.sequence,
-                        .account = peer.account,
-                        .need = peer.need,
-                        .given = peer.given,
-                        .taken = peer.taken});
-    if (purse_->refused() != before) {
+  if (tank_) {
+    const std::uint64_t before = tank_->refused();
+    tank_->receive(0, {.epoch = peer.epoch,
+                       .answers_epoch = peer.answers_epoch,
+                       .sequence = peer.sequence,
+                       .account = peer.account,
+                       .need = peer.need,
+                       .given = peer.given,
+                       .taken = peer.taken});
+    if (tank_->refused() != before) {
       ++refused_;
       return;
     }
@@ -170,19 +170,19 @@ void Coupling::observe(const Interval<3>& interval, double payable) noexcept {
 
 bool Coupling::gives() const noexcept { return live() && !loss_stage_.silent && newest_.phase == PortPhase::kEngaged; }
 
-Purse::Settlement Coupling::settle(double payable, double loss, Duration elapsed) noexcept {
+EnergyTank::Settlement Coupling::settle(double payable, double loss, Duration elapsed) noexcept {
   loss_ = loss;
-  Purse::Settlement settlement{.credit = std::exchange(taken_, 0), .withdraw = std::exchange(given_, 0)};
+  EnergyTank::Settlement settlement{.credit = std::exchange(taken_, 0), .withdraw = std::exchange(given_, 0)};
   settlement.withdraw += (1 - frame_.take_kept()) * std::max(payable, 0.0);
-  if (!purse_) return settlement;
+  if (!tank_) return settlement;
   const double left = payable + settlement.credit - settlement.withdraw;
-  const auto paid = purse_->settle({.payable = left, .loss = loss, .elapsed = elapsed, .giving = gives()});
+  const auto paid = tank_->settle({.payable = left, .loss = loss, .elapsed = elapsed, .giving = gives()});
   settlement.credit += paid.credit;
   settlement.withdraw += paid.withdraw;
   return settlement;
 }
 
-Purse::Settlement Coupling::settle_grip(double payable, double loss, Duration elapsed) noexcept {
+EnergyTank::Settlement Coupling::settle_grip(double payable, double loss, Duration elapsed) noexcept {
   if (!grip_) return {};
   return grip_->settle({.payable = payable, .loss = loss, .elapsed = elapsed, .giving = gives()});
 }
@@ -193,8 +193,8 @@ void Coupling::conclude(const Vec3& applied, const std::optional<Vec3>& contact,
   if (within(applied)) told_.force = applied;
   if (contact && within(*contact)) told_.contact_force = contact;
   std::visit([&](auto& law) { law.conclude(law_period(), frame_.coupled(applied), told_.contact_force); }, law_);
-  if (purse_) {
-    const PurseMessage paid = purse_->message(0);
+  if (tank_) {
+    const EnergyTankMessage paid = tank_->message(0);
     // The account of a leader only covers its share of the follower.
     const double part = leads() ? 1 : share_;
     told_.account = part * paid.account;
@@ -222,7 +222,7 @@ PortState Coupling::message() const noexcept {
   state.velocity = u_velocity_;
   const LawPart part = std::visit([](const auto& law) { return law.part(); }, law_);
   state.surface = part.surface;
-  state.energy_in = std::min(part.energy_in, PurseMessage::kMostTotal);
+  state.energy_in = std::min(part.energy_in, EnergyTankMessage::kMostTotal);
   state.wave_integral = part.wave.integral;
   state.wave_energy = part.wave.energy;
   if (frame_.told()) {

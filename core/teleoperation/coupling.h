@@ -65,10 +65,10 @@ namespace tendon {
 /// **Laws.** The folder methods/ contains one law per method. K, D, and B are the values of the leader, and the
 /// values of the follower are smaller by s_f s_x. The norm of all forces is at most max_force.
 ///
-/// **Purse.** If Config::purse is set, the port exchanges energy with its peer (Purse). It only gives energy if it is
-/// live and the peer is engaged and not silent. A pair is only passive with a purse if the method is
-/// position-position, set-position, or passivity. Without a purse, a limiter at each end keeps this end passive and
-/// the follower cannot move. This is also true for the other methods except for waves.
+/// **Energy tank.** If Config::tank is set, the port exchanges energy with its peer (EnergyTank). It only gives energy
+/// if it is live and the peer is engaged and not silent. A pair is only passive with an energy tank if the method is
+/// position-position, set-position, or passivity. Without an energy tank, a limiter at each end keeps this end passive
+/// and the follower cannot move. This is also true for the other methods except for waves.
 ///
 /// **The rest of a handle.** Config::turn couples the orientations (TurnCoupling), and Config::grip couples the
 /// grippers (GripCoupling). They use the same phases and the same ramp. The force and the torque share one account,
@@ -76,7 +76,7 @@ namespace tendon {
 /// differ by more than 150°.
 ///
 /// **Bad input.** The coupling ignores a state and increments `refused` if one of its values is not finite or out of
-/// bounds, if it answers a state that was never sent, if `energy_in` has decreased within the epoch, or if the purse
+/// bounds, if it answers a state that was never sent, if `energy_in` has decreased within the epoch, or if the tank
 /// refuses it. The coupling ignores a state that is not newer. If the position or the velocity of the hand is not
 /// finite or larger than 10¹², the demand is not finite and the limiter sets the force to 0. The same is true for the
 /// orientation and the opening if they are coupled. A measured force that is not finite is replaced with 0, and a
@@ -135,12 +135,12 @@ class Coupling {
   /// Must be called instead of `command` if there is no position. Updates the phase only; the force is 0.
   void command_unseen(LocalTime now, bool ready) noexcept;
 
-  /// Returns the changes of the account. Must be called after `command` and before the limiter. Without a purse or
-  /// waves, both values are 0.
-  Purse::Settlement settle(double payable, double loss, Duration elapsed) noexcept;
+  /// Returns the changes of the account. Must be called after `command` and before the limiter. Without an energy tank
+  /// or waves, both values are 0.
+  EnergyTank::Settlement settle(double payable, double loss, Duration elapsed) noexcept;
 
   /// Returns the changes of the account of the gripper. Both values are 0 if the grippers are not coupled.
-  Purse::Settlement settle_grip(double payable, double loss, Duration elapsed) noexcept;
+  EnergyTank::Settlement settle_grip(double payable, double loss, Duration elapsed) noexcept;
 
   /// Ends the period. `applied`, `torque`, and `grip` are the values of the device in N, N·m, and N, and `contact` is
   /// the force on the tool in N.
@@ -155,7 +155,7 @@ class Coupling {
   double share() const noexcept { return share_; }
   double stiffness() const noexcept;  ///< N/m, at this end: K, for waves B/d, for surface that of the model
   Duration round_trip() const noexcept { return spring_.round_trip(); }
-  double account() const noexcept;  ///< J; 0 without a purse
+  double account() const noexcept;  ///< J; 0 without an energy tank
   double position_scale() const noexcept { return frame_.map().position_scale(); }
   double force_scale() const noexcept { return frame_.map().force_scale(); }
   const TurnCoupling* turn() const noexcept { return turn_ ? &*turn_ : nullptr; }
@@ -197,7 +197,7 @@ class Coupling {
   Config config_;
   MappedEnd frame_;
   PositionPosition<3> spring_;  ///< All methods use this spring to count the periods.
-  std::optional<Purse> purse_;
+  std::optional<EnergyTank> tank_;
   AnyCouplingLaw law_;
 
   PortPhase phase_ = PortPhase::kAlone;

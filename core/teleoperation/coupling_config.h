@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "core/teleoperation/energy_tank.h"
 #include "core/teleoperation/handle/grip_coupling.h"
 #include "core/teleoperation/handle/turn_coupling.h"
 #include "core/teleoperation/methods/model_mediated.h"
@@ -14,7 +15,6 @@
 #include "core/teleoperation/phases/clutch.h"
 #include "core/teleoperation/port_state.h"
 #include "core/teleoperation/pose_map.h"
-#include "core/teleoperation/purse.h"
 
 namespace tendon {
 
@@ -37,7 +37,7 @@ struct CouplingConfig {
   PositionPosition<3>::Config spring{};
   /// The value of `start` is in joules of the leader. The values of `max_power` and `max_account` are those of this
   /// end. The constructor sets `peers`, `joule`, and `epoch`.
-  std::optional<Purse::Config> purse{};
+  std::optional<EnergyTank::Config> tank{};
   /// Used by the follower if the method is `surface`, in the scale of the follower.
   SurfaceEstimator<3>::Config surface{
       .contact_force = 0.1, .first_stiffness = 200, .max_stiffness = 5000, .least_travel = 2e-4, .memory = 300};

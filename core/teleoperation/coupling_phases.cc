@@ -132,7 +132,7 @@ void Coupling::renew() noexcept {
   take(PhaseInput::kRenew);
   const std::uint64_t epoch = ++config_.spring.epoch;
   spring_.renew(epoch);
-  if (purse_) purse_->renew(epoch);
+  if (tank_) tank_->renew(epoch);
   if (turn_) turn_->receive({});
   if (grip_) grip_->renew(epoch);
   newest_ = {};
@@ -165,7 +165,7 @@ void Coupling::follow_scales() noexcept {
     spring_.become(frame_.stiffness(config_.spring.stiffness), frame_.stiffness(config_.spring.damping),
                    frame_.stiffness(config_.spring.own_damping));
   }
-  if (purse_) purse_->revalue(0, frame_.joule(), frame_.worth(config_.purse->start));
+  if (tank_) tank_->revalue(0, frame_.joule(), frame_.worth(config_.tank->start));
 }
 
 /// Sets the scales of a follower to those of the leader. The energy between two states is only used if both states
@@ -176,8 +176,8 @@ void Coupling::take_scales(const PortState& peer) noexcept {
   if (!leads() && !frame_.tells_ours(peer)) {
     frame_.rescale_as_told(peer);
     follow_scales();
-  } else if (purse_ && (!before || !frame_.tells_ours(peer))) {
-    purse_->forgo(0);
+  } else if (tank_ && (!before || !frame_.tells_ours(peer))) {
+    tank_->forgo(0);
   }
 }
 

@@ -70,8 +70,8 @@ void Couplings::command_unseen(LocalTime now, bool ready) noexcept {
   settled_ = {};
 }
 
-Purse::Settlement Couplings::settle(double payable, double loss, Duration elapsed) noexcept {
-  Purse::Settlement sum;
+EnergyTank::Settlement Couplings::settle(double payable, double loss, Duration elapsed) noexcept {
+  EnergyTank::Settlement sum;
   for (std::size_t i = 0; i < all_.size(); ++i) {
     settled_[i] = all_[i].settle(payable + sum.credit - sum.withdraw, loss, elapsed);
     sum.credit += settled_[i].credit;

@@ -34,8 +34,8 @@ struct CoupledLeader {
 /// holds its position with the part that no leader uses.
 ///
 /// **One account.** All couplings use the account of the device's limiter, one after the other, and each only sees
-/// the remaining energy. This satisfies the condition of the theorem in purse.h: before the bound, coupling j gives
-/// ΔG_j ≤ max(A_j, 0) with A_j = A + Σ_{k≤j} R_k − Σ_{k<j} ΔG_k. Therefore Σ ΔG ≤ max(A + Σ R, 0), and only R
+/// the remaining energy. This satisfies the condition of the theorem in energy_tank.h: before the bound, coupling j
+/// gives ΔG_j ≤ max(A_j, 0) with A_j = A + Σ_{k≤j} R_k − Σ_{k<j} ΔG_k. Therefore Σ ΔG ≤ max(A + Σ R, 0), and only R
 /// increases A. The force is limited once, after all couplings. If α changes while a spring is stretched, the account
 /// pays for the work ½ ΔK δ², and the limiter reduces the force if there is not enough energy.
 ///
@@ -44,7 +44,7 @@ struct CoupledLeader {
 /// missing energy: 2 to 4 leaders that pushed together then exchanged 7 to 17 % more energy without a larger force.
 /// The guarantees do not depend on this.
 ///
-/// **Trust.** Each peer has its own purse with max_power and max_account. If n peers are dishonest, this port still
+/// **Trust.** Each peer has its own tank with max_power and max_account. If n peers are dishonest, this port still
 /// guarantees that L ≥ −n (max_account + max_power · t).
 ///
 /// Thread-safe: no. Realtime-safe: yes, except the constructor.
@@ -72,13 +72,13 @@ class Couplings {
   const Vec3& torque() const noexcept { return all_.front().torque(); }
   double grip_force() const noexcept { return all_.front().grip_force(); }
   void command_unseen(LocalTime now, bool ready) noexcept;
-  Purse::Settlement settle_grip(double payable, double loss, Duration elapsed) noexcept {
+  EnergyTank::Settlement settle_grip(double payable, double loss, Duration elapsed) noexcept {
     return all_.front().settle_grip(payable, loss, elapsed);
   }
   /// Returns the sum of all settlements.
-  Purse::Settlement settle(double payable, double loss, Duration elapsed) noexcept;
+  EnergyTank::Settlement settle(double payable, double loss, Duration elapsed) noexcept;
   /// Returns the newest settlement of one coupling.
-  const Purse::Settlement& settled(std::size_t which) const noexcept { return settled_[which]; }
+  const EnergyTank::Settlement& settled(std::size_t which) const noexcept { return settled_[which]; }
   bool live() const noexcept;  ///< at least one coupling is live
 
  private:
@@ -86,7 +86,7 @@ class Couplings {
 
   std::vector<Coupling> all_;
   Shares shares_;
-  std::array<Purse::Settlement, kMost> settled_{};
+  std::array<EnergyTank::Settlement, kMost> settled_{};
   LocalTime now_{};
   bool began_ = false;
 };

@@ -2,8 +2,8 @@
 #include "core/teleoperation/port_state.h"
 
 #include "core/base/rotation.h"
+#include "core/teleoperation/energy_tank.h"
 #include "core/teleoperation/port_values.h"
-#include "core/teleoperation/purse.h"
 
 namespace tendon {
 
@@ -63,8 +63,8 @@ bool is_sound(const PortTurn& turn) noexcept {
 }
 
 bool is_sound(const PortGrip& grip) noexcept {
-  constexpr double kAccount = PurseMessage::kMostAccount;
-  constexpr double kTotal = PurseMessage::kMostTotal;
+  constexpr double kAccount = EnergyTankMessage::kMostAccount;
+  constexpr double kTotal = EnergyTankMessage::kMostTotal;
   return within(grip.opening, -1e12, 1e12) && within(grip.velocity, -1e12, 1e12) && within(grip.force, -1e12, 1e12) &&
          within(grip.account, -kAccount, kAccount) && within(grip.need, 0, kAccount) && within(grip.given, 0, kTotal) &&
          within(grip.taken, 0, kTotal);
@@ -72,8 +72,8 @@ bool is_sound(const PortGrip& grip) noexcept {
 
 bool is_sound(const PortState& state) noexcept {
   constexpr Duration kMostTime = std::chrono::nanoseconds(std::int64_t{1} << 60);
-  constexpr double kAccount = PurseMessage::kMostAccount;
-  constexpr double kTotal = PurseMessage::kMostTotal;
+  constexpr double kAccount = EnergyTankMessage::kMostAccount;
+  constexpr double kTotal = EnergyTankMessage::kMostTotal;
   return state.epoch > 0 && state.sequence > 0 && state.time >= -kMostTime && state.time <= kMostTime &&
          state.round_trip >= Duration::zero() && state.round_trip <= PortState::kMostRoundTrip &&
          state.phase >= PortPhase::kAlone && state.phase <= PortPhase::kFault && within(state.position) &&

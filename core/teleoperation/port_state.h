@@ -29,7 +29,7 @@ std::string_view to_string(PortPhase phase) noexcept;
 enum class PortRole : std::uint8_t { kLeader, kFollower };
 
 enum class CouplingMethod : std::uint8_t {
-  kPositionPosition = 1,  ///< a spring and a damper at both ends (PositionPosition), with a purse
+  kPositionPosition = 1,  ///< a spring and a damper at both ends (PositionPosition), with an energy tank
   kPositionForce,         ///< spring at the follower; the leader feels the measured contact force
   kWaves,                 ///< wave variables with playout (WavePort)
   kSurface,               ///< as position-force, but the leader feels a model of the surface that the follower has
@@ -79,8 +79,8 @@ constexpr bool can_be_shared(CouplingMethod method) noexcept {
   return method == CouplingMethod::kPositionPosition || method == CouplingMethod::kPositionForce;
 }
 
-/// Returns true if a follower with a limiter can only move when the leader pays for it (Purse).
-constexpr bool needs_purse(CouplingMethod method) noexcept {
+/// Returns true if a follower with a limiter can only move when the leader pays for it (EnergyTank).
+constexpr bool needs_tank(CouplingMethod method) noexcept {
   return method == CouplingMethod::kPositionPosition || method == CouplingMethod::kPassivity ||
          method == CouplingMethod::kSetPosition;
 }
@@ -109,7 +109,7 @@ struct PortGrip {
 struct PortState {
   static constexpr Duration kMostRoundTrip = std::chrono::seconds(10);
 
-  std::uint64_t epoch = 0;          ///< of the sender, > 0; increases with each restart (Purse)
+  std::uint64_t epoch = 0;          ///< of the sender, > 0; increases with each restart (EnergyTank)
   std::uint64_t sequence = 0;       ///< period of the sender in this epoch: 1, 2, …
   std::uint64_t answers_epoch = 0;  ///< epoch of the receiver for `answers`, `given` and `taken`; 0: none
   std::uint64_t answers = 0;        ///< sequence of the receiver's newest state in use; 0: none
@@ -122,13 +122,13 @@ struct PortState {
   Vec3 velocity = Vec3::Zero();          ///< m/s, of u; zero while u is constant
   Vec3 force = Vec3::Zero();             ///< N, applied by the device to the hand
   std::optional<Vec3> contact_force{};   ///< N, measured on the tool; empty: not measured
-  double account = 0;                    ///< J, PurseMessage::account
-  double need = 0;                       ///< J, PurseMessage::need; 0: no purse
-  double given = 0;                      ///< J, PurseMessage::given
-  double taken = 0;                      ///< J, PurseMessage::taken
+  double account = 0;                    ///< J, EnergyTankMessage::account
+  double need = 0;                       ///< J, EnergyTankMessage::need; 0: no tank
+  double given = 0;                      ///< J, EnergyTankMessage::given
+  double taken = 0;                      ///< J, EnergyTankMessage::taken
   std::optional<PortSurface> surface{};  ///< last surface that the tool has touched; empty: none
   Vec3 wave_integral = Vec3::Zero();     ///< √W·s, WaveMessage::integral
-  double wave_energy = 0;                ///< J, WaveMessage::energy; 0 … kMostTotal of PurseMessage
+  double wave_energy = 0;                ///< J, WaveMessage::energy; 0 … kMostTotal of EnergyTankMessage
   std::optional<PortTurn> turn{};        ///< empty: orientations are not coupled
   std::optional<PortGrip> grip{};        ///< empty: grippers are not coupled
   double energy_in = 0;           ///< J, for passivity: total energy received by the port in this epoch; bounds of

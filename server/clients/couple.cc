@@ -64,7 +64,7 @@ Couple couple_of(const Coupling::Config& config) {
   couple.mutual_damping = config.spring.damping;
   couple.damping = config.spring.own_damping;
   couple.adapt_to_delay = config.spring.adapt_to_delay;
-  couple.purse = config.purse.has_value();
+  couple.purse = config.tank.has_value();
   couple.absolute = config.absolute.has_value();
   couple.period = config.spring.period;
   if (config.method == CouplingMethod::kPassivity) couple.drift_rate = config.drift_rate;

@@ -193,7 +193,7 @@ void put_coupling(const Coupling::Config& coupling, const LimiterConfig& limiter
       coupling.method == CouplingMethod::kPositionPosition || coupling.method == CouplingMethod::kSetPosition;
   const auto& spring = coupling.spring;
   text << std::right << "Teleoperation: the " << (leads ? "leader" : "follower") << " of a coupling by "
-       << to_string(coupling.method) << (coupling.purse ? " with shared energy accounts" : "") << ".\n";
+       << to_string(coupling.method) << (coupling.tank ? " with shared energy accounts" : "") << ".\n";
   if (coupling.method == CouplingMethod::kPassivity) {
     text << "  the stiffness of the follower's spring is " << spring.stiffness
          << " N/m at every round trip; in free motion the leader "

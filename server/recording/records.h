@@ -27,12 +27,12 @@ struct StepRecord : Step, LoopStep {};
 /// this tick.
 struct PortRecord {
   std::uint64_t tick = 0;
-  std::uint32_t channel = 0;         ///< used by the leader; 0 if there is one coupling
-  LocalTime at{};                    ///< of the step's position
-  Purse::Settlement settled{};       ///< J, transfers to and from the account of the limiter
-  Purse::Settlement grip_settled{};  ///< J
-  double stiffness = 0;              ///< N/m, current value of K
-  Duration round_trip{};             ///< current value; 0 if unknown
+  std::uint32_t channel = 0;              ///< used by the leader; 0 if there is one coupling
+  LocalTime at{};                         ///< of the step's position
+  EnergyTank::Settlement settled{};       ///< J, transfers to and from the account of the limiter
+  EnergyTank::Settlement grip_settled{};  ///< J
+  double stiffness = 0;                   ///< N/m, current value of K
+  Duration round_trip{};                  ///< current value; 0 if unknown
   PortState sent{};
   std::optional<PortState> peer{};  ///< the newest since the previous step, if any
   LocalTime peer_arrived{};

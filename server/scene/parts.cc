@@ -48,7 +48,7 @@ bool take_out(Scene& scene, std::string_view key) {
   }
   if (limiter.law == Law::kNone) {
     limiter.shared_account = false;
-    if (control.coupling) control.coupling->purse.reset();
+    if (control.coupling) control.coupling->tank.reset();
   }
   if (!limiter.parts.adaptive_friction) control.friction_map.reset();
   if (!limiter.parts.shaping) limiter.parts.bounded_acceleration.reset();

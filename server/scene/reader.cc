@@ -39,6 +39,10 @@ std::string advice(std::string_view unknown, const std::vector<std::string_view>
   return text;
 }
 
+std::string_view new_name_of(std::string_view path) noexcept {
+  return path == "teleoperation.purse" ? "teleoperation.energy_tank" : "";
+}
+
 Place place_of(const toml::node& node) { return {node.source().begin.line, node.source().begin.column}; }
 
 toml::table parse_toml(std::string_view text, const std::string& name) {

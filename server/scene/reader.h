@@ -27,6 +27,9 @@ std::string joined(std::string_view path, std::string_view name);
 /// Returns "; " and the closest known key, or all known keys.
 std::string advice(std::string_view unknown, const std::vector<std::string_view>& known);
 
+/// Returns the present name of a key of an earlier version, or nothing.
+std::string_view new_name_of(std::string_view path) noexcept;
+
 /// A position in the file. If the line is 0, it is unknown.
 struct Place {
   std::uint32_t line = 0;
@@ -195,8 +198,11 @@ class Reader {
     if (table_ == nullptr || !kind_known_) return;
     for (const auto& [name, node] : *table_) {
       if (std::find(known_.begin(), known_.end(), name.str()) != known_.end()) continue;
-      problems_.wrong(place_of(node), joined(path_, name.str()),
-                      (node.is_table() ? "unknown table" : "unknown key") + advice(name.str(), known_));
+      const std::string path = joined(path_, name.str());
+      const std::string_view now = new_name_of(path);
+      problems_.wrong(place_of(node), path,
+                      now.empty() ? (node.is_table() ? "unknown table" : "unknown key") + advice(name.str(), known_)
+                                  : "renamed to " + std::string(now));
     }
   }
 

@@ -393,13 +393,13 @@ class SceneResolver : SceneErrors {
     resolve_leaders(coupling);
     resolve_method(coupling);
     blame_rules(coupling);
-    if (needs_purse(coupling.method) && law != Law::kNone && !coupling.purse) {
-      blame("teleoperation.purse", {"teleoperation"},
+    if (needs_tank(coupling.method) && law != Law::kNone && !coupling.tank) {
+      blame("teleoperation.energy_tank", {"teleoperation"},
             "missing, expected this table: with its own limiter, a follower can only move with energy from the leader");
     }
     const bool waves = coupling.method == CouplingMethod::kWaves;
-    const bool shares = coupling.purse || (waves && law != Law::kNone);
-    const std::string what = coupling.purse ? "teleoperation.purse" : "teleoperation.method";
+    const bool shares = coupling.tank || (waves && law != Law::kNone);
+    const std::string what = coupling.tank ? "teleoperation.energy_tank" : "teleoperation.method";
     if (shares && law != Law::kAolPlus && law != Law::kAol && law != Law::kAolBox) {
       blame(what, {"limiter.kind"},
             "expected the limiter \"aol+\", \"aol\" or \"aol-box\": other limiters have no energy account that ports "
@@ -425,9 +425,10 @@ class SceneResolver : SceneErrors {
       blame("teleoperation.engage.within_mm", {},
             "expected no within_mm, except for a leader with map.absolute: only this leader is aligned");
     }
-    if (draft_.align_energy > 0 && !(aligns && coupling.purse)) {
-      blame("teleoperation.engage.align_energy_mj", {},
-            "expected 0, except for a leader with map.absolute and a purse: the energy is paid into its account");
+    if (draft_.align_energy > 0 && !(aligns && coupling.tank)) {
+      blame(
+          "teleoperation.engage.align_energy_mj", {},
+          "expected 0, except for a leader with map.absolute and an energy tank: the energy is paid into its account");
     }
   }
 
@@ -525,8 +526,8 @@ class SceneResolver : SceneErrors {
     }
     if (control.rotation) coupling.turn->max_torque = control.rotation->max_torque;
     const bool waves = coupling.method == CouplingMethod::kWaves;
-    if (waves && control.limiter.law != Law::kNone && !coupling.purse) {
-      blame("teleoperation.purse", {"teleoperation.turn"},
+    if (waves && control.limiter.law != Law::kNone && !coupling.tank) {
+      blame("teleoperation.energy_tank", {"teleoperation.turn"},
             "missing, expected this table: waves do not transmit rotations, so the energy that turns the follower must "
             "come from the leader");
     }
@@ -547,8 +548,8 @@ class SceneResolver : SceneErrors {
     }
     coupling.grip->arm = control.grip->arm;
     coupling.grip->max_force = control.grip->max_force;
-    if (control.limiter.law != Law::kNone && !coupling.purse) {
-      blame("teleoperation.purse", {"teleoperation.grip"},
+    if (control.limiter.law != Law::kNone && !coupling.tank) {
+      blame("teleoperation.energy_tank", {"teleoperation.grip"},
             "missing, expected this table: with its own limiter, a gripper can only move with energy from the leader");
     }
   }

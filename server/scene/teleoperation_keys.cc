@@ -139,11 +139,11 @@ void declare_teleoperation(Table& scene, Draft& draft) {
     keys.table("coupling", [&draft](Table& law) { declare_coupling(law, draft); });
     keys.part("rate", coupling.rate,
               [&coupling](Table& rate, RateControl& config) { declare_rate(rate, config, coupling.centring); });
-    keys.part("purse", coupling.purse, [](Table& purse, Purse::Config& config) {
-      purse.key("max_account_mj", config.max_account, Number{.least = 0, .most = 1e6, .without_least = true},
-                "Maximum energy in each account. Further energy is discarded");
-      purse.key("max_power_w", config.max_power, kAboveZero,
-                "Maximum average power at which energy from the peer is accepted, after the first max_account_mj");
+    keys.part("energy_tank", coupling.tank, [](Table& tank, EnergyTank::Config& config) {
+      tank.key("max_account_mj", config.max_account, Number{.least = 0, .most = 1e6, .without_least = true},
+               "Maximum energy in each account. Further energy is discarded");
+      tank.key("max_power_w", config.max_power, kAboveZero,
+               "Maximum average power at which energy from the peer is accepted, after the first max_account_mj");
     });
     keys.part({"turn", "couples the orientations"}, coupling.turn, [](Table& turn, TurnCoupling::Config& config) {
       turn.key("stiffness_nm_per_rad", config.stiffness, kAboveZero,

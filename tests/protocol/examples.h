@@ -338,7 +338,7 @@ inline PortFrame port() {
   return port;
 }
 
-/// This is a follower that presses with its tool. It does not have a purse.
+/// This is a follower that presses with its tool. It does not have an energy tank.
 inline PortFrame port_in_contact() {
   PortFrame port = examples::port();
   port.contact_force = Vec3(-2, 0, 0.5);

@@ -108,7 +108,7 @@ TEST(HapticLoop, OfAFollowerWithFourLeadersMakesNoHeapCall) {
   auto& coupling = config.control.coupling.emplace();
   coupling.role = PortRole::kFollower;
   coupling.spring = {.stiffness = 400, .own_damping = 4, .period = milliseconds(1)};
-  coupling.purse.emplace();
+  coupling.tank.emplace();
   coupling.holds_place = true;
   for (std::uint32_t i = 0; i < 4; ++i) config.control.leaders.push_back({.channel = i, .share = 0.25});
   config.control.channels.assign(4, ChannelRule::kSum);

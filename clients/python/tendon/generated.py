@@ -413,7 +413,7 @@ class Couple:
     mutual_damping: float  # N·s/m, damping between the handles, as felt by the leader
     damping: float  # N·s/m, damping of each handle, as felt by the leader
     adapt_to_delay: bool  # the stiffness decreases as the round trip increases
-    purse: bool  # the ends exchange energy (core/teleoperation/purse.h)
+    purse: bool  # the ends exchange energy (core/teleoperation/energy_tank.h)
     period_us: int  # time between two PortState frames of the sender
     absolute: bool = False  # positions map to positions: the offsets are zero, and the ends align before they engage
     # As felt by the leader. With a stiffness of 0 the part is not coupled:
@@ -707,7 +707,7 @@ class PortState:
     force: Vec3 = ZERO  # N, actual force on the hand at the sender's handle
     contact_force: Vec3 | None = None  # N, force of the environment on the sender's tool; None: not measured
     account: float = 0.0  # J, energy that the sender may still give out, after its payments
-    need: float = 0.0  # J, energy that the sender needs for its desired force; 0: it has no purse
+    need: float = 0.0  # J, energy that the sender needs for its desired force; 0: it has no tank
     given: float = 0.0  # J, total paid to the receiver; it never decreases while both epochs last
     taken: float = 0.0  # J, the receiver's given, as last received, in joules of the receiver
     # CouplingMethod.WAVES: √W·s, ∫ wave dt since the epoch began: a total, so a lost frame has no lasting effect; half

@@ -11,16 +11,16 @@ namespace {
 
 constexpr double kUnboundedGrip = std::numeric_limits<double>::infinity();
 
-std::optional<Purse> purse_of(const GripCoupling::End& end, const PoseMap& map) {
-  if (!end.purse) return std::nullopt;
-  Purse::Config purse = *end.purse;
-  purse.peers = 1;
-  purse.joule[0] = end.role == PortRole::kLeader ? map.leader_grip_joule() : map.follower_grip_joule();
-  if (end.role == PortRole::kFollower) purse.start *= map.follower_grip_joule();
-  return Purse(purse);
+std::optional<EnergyTank> tank_of(const GripCoupling::End& end, const PoseMap& map) {
+  if (!end.tank) return std::nullopt;
+  EnergyTank::Config tank = *end.tank;
+  tank.peers = 1;
+  tank.joule[0] = end.role == PortRole::kLeader ? map.leader_grip_joule() : map.follower_grip_joule();
+  if (end.role == PortRole::kFollower) tank.start *= map.follower_grip_joule();
+  return EnergyTank(tank);
 }
 
-PurseMessage purse_message(const PortState& peer) noexcept {
+EnergyTankMessage tank_message(const PortState& peer) noexcept {
   return {.epoch = peer.epoch,
           .answers_epoch = peer.answers_epoch,
           .sequence = peer.sequence,
@@ -39,7 +39,7 @@ GripCoupling::GripCoupling(const Config& config, const End& end, const PoseMap& 
       peers_(end.role == PortRole::kLeader ? map.grip_stiffness_at_follower(config.stiffness) : config.stiffness),
       damping_(end.role == PortRole::kLeader ? config.damping : map.grip_stiffness_at_follower(config.damping)),
       stiffness_({.most = whole_, .damping = end.adapts ? damping_ : kUnboundedGrip, .period = end.period}),
-      purse_(purse_of(end, map)) {
+      tank_(tank_of(end, map)) {
   expect_above_zero(config.stiffness, "grip.stiffness");
   expect_not_negative(config.damping, "grip.damping");
   if (end.adapts) {
@@ -52,23 +52,23 @@ GripCoupling::GripCoupling(const Config& config, const End& end, const PoseMap& 
 }
 
 bool GripCoupling::accepts(const PortState& peer) const noexcept {
-  if (!purse_ || !peer.grip) return true;
-  Purse trial = *purse_;
-  trial.receive(0, purse_message(peer));
-  return trial.refused() == purse_->refused();
+  if (!tank_ || !peer.grip) return true;
+  EnergyTank trial = *tank_;
+  trial.receive(0, tank_message(peer));
+  return trial.refused() == tank_->refused();
 }
 
 void GripCoupling::receive(const PortState& peer) noexcept {
   heard_ = peer.grip.has_value();
   if (!heard_) return;
-  if (purse_) purse_->receive(0, purse_message(peer));
+  if (tank_) tank_->receive(0, tank_message(peer));
   newest_ = *peer.grip;
   came_ = true;
 }
 
 void GripCoupling::renew(std::uint64_t epoch) noexcept {
   heard_ = came_ = false;
-  if (purse_) purse_->renew(epoch);
+  if (tank_) tank_->renew(epoch);
 }
 
 void GripCoupling::begin_act() noexcept { begins_ = true; }
@@ -144,14 +144,14 @@ void GripCoupling::skip(const CouplingPeriod& period) noexcept {
   last_ = 0;
 }
 
-Purse::Settlement GripCoupling::settle(const Purse::Period& period) noexcept {
-  return purse_ ? purse_->settle(period) : Purse::Settlement{};
+EnergyTank::Settlement GripCoupling::settle(const EnergyTank::Period& period) noexcept {
+  return tank_ ? tank_->settle(period) : EnergyTank::Settlement{};
 }
 
 PortGrip GripCoupling::message(double force) noexcept {
   PortGrip grip{.opening = told_, .velocity = speed_, .force = force};
-  if (purse_) {
-    const PurseMessage paid = purse_->message(0);
+  if (tank_) {
+    const EnergyTankMessage paid = tank_->message(0);
     grip.account = paid.account;
     grip.need = paid.need;
     grip.given = paid.given;

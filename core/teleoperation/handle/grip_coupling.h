@@ -6,15 +6,15 @@
 
 #include "core/base/motion.h"
 #include "core/teleoperation/coupling_period.h"
+#include "core/teleoperation/energy_tank.h"
 #include "core/teleoperation/methods/quiet_stiffness.h"
 #include "core/teleoperation/port_state.h"
 #include "core/teleoperation/pose_map.h"
-#include "core/teleoperation/purse.h"
 
 namespace tendon {
 
 /// Couples the grippers of two handles. A Coupling owns one object for each end and provides phases, ramp and fade. A
-/// gripper is a separate port (PortGrip) with its own account and purse. All methods couple grippers by springs at
+/// gripper is a separate port (PortGrip) with its own account and tank. All methods couple grippers by springs at
 /// both ends, because both openings are measured.
 ///
 /// **Openings.** g = arm · opening, m at the fingers, > 0 open. Both ends use the same openings without a scale or an
@@ -39,8 +39,8 @@ namespace tendon {
 /// are those of the leader.
 ///
 /// **Account.** One joule of the follower's gripper is s_f joules of the leader's, since openings are not scaled. The
-/// grippers exchange energy by their own purse, in the same messages (PortGrip) and with the same limits; the theorem
-/// of Purse holds for the pair of grippers. The motion of the follower's fingers is paid by the motion of the
+/// grippers exchange energy by their own tank, in the same messages (PortGrip) and with the same limits; the theorem
+/// of EnergyTank holds for the pair of grippers. The motion of the follower's fingers is paid by the motion of the
 /// leader's fingers.
 ///
 /// **Robots.** A follower with `holds_place` that is not live holds the opening z_h with the full K_f, where z_h =
@@ -48,7 +48,7 @@ namespace tendon {
 /// also when the leader acts again, because w then starts at this opening. A fault ends the force. The grip of a hand
 /// fades.
 ///
-/// **Bad input.** A state that the purse would refuse is refused entirely (`accepts`). Openings must be finite.
+/// **Bad input.** A state that the tank would refuse is refused entirely (`accepts`). Openings must be finite.
 ///
 /// Thread-safe: no. Realtime-safe: yes, except the constructor.
 class GripCoupling {
@@ -65,13 +65,13 @@ class GripCoupling {
     bool adapts = true;
     Duration period{};  ///< > 0
     /// See Coupling::Config. `joule`, `peers` and `start` are set from the map.
-    std::optional<Purse::Config> purse{};
+    std::optional<EnergyTank::Config> tank{};
   };
 
   /// Throws std::invalid_argument with the name of the field ("grip.…"), its value and the expected value.
   GripCoupling(const Config& config, const End& end, const PoseMap& map);
 
-  /// Returns false if the purse would refuse the state.
+  /// Returns false if the tank would refuse the state.
   bool accepts(const PortState& peer) const noexcept;
   void receive(const PortState& peer) noexcept;
 
@@ -86,14 +86,14 @@ class GripCoupling {
   void skip(const CouplingPeriod& period) noexcept;
 
   /// See Coupling::settle; for the account of the gripper.
-  Purse::Settlement settle(const Purse::Period& period) noexcept;
+  EnergyTank::Settlement settle(const EnergyTank::Period& period) noexcept;
 
   /// Must be called once per period. `force` is the applied force, N.
   PortGrip message(double force) noexcept;
 
-  double stiffness() const noexcept { return stiffness_.value(); }            ///< current K, N/m
-  double account() const noexcept { return purse_ ? purse_->account() : 0; }  ///< J; 0 without a purse
-  double asked() const noexcept { return asked_; }                            ///< w or z, m
+  double stiffness() const noexcept { return stiffness_.value(); }          ///< current K, N/m
+  double account() const noexcept { return tank_ ? tank_->account() : 0; }  ///< J; 0 without an energy tank
+  double asked() const noexcept { return asked_; }                          ///< w or z, m
 
  private:
   bool leads() const noexcept { return end_.role == PortRole::kLeader; }
@@ -108,7 +108,7 @@ class GripCoupling {
   double peers_;  ///< K of the peer without a delay, N/m
   double damping_;
   QuietStiffness stiffness_;
-  std::optional<Purse> purse_;
+  std::optional<EnergyTank> tank_;
 
   PortGrip newest_;
   bool heard_ = false;

@@ -44,7 +44,7 @@ namespace tendon {
 ///     K_l = (s_f/s_x) K_f,  B_l = (s_f/s_x) B_f          τ_l = (s_f/s_x) Rᵀ τ_f          (PoseMap)
 ///
 /// `stiffness` and `damping` are those of the leader. The law is not passive if y is delayed; the limiter of the
-/// wrench and the purse make the pair passive.
+/// wrench and the tank make the pair passive.
 ///
 /// **Methods.** With position-position and waves, the leader has the spring as well, so that both ends hold the same
 /// torque (waves do not transfer rotations). With all other methods the torque of the leader is −B ω, because the

@@ -59,7 +59,7 @@ struct CouplingLaw {
   /// Starts an act at the displacement `u` in m.
   void begin_act(const Vec3& /*u*/) noexcept {}
   /// Returns the energy that the law has exchanged with the peer, or an empty value if it does not exchange energy.
-  std::optional<Purse::Settlement> observe(const LawInterval& /*ended*/) noexcept { return std::nullopt; }
+  std::optional<EnergyTank::Settlement> observe(const LawInterval& /*ended*/) noexcept { return std::nullopt; }
   /// Returns the force of the law. `speed` is the velocity along the coupled axes in m/s, and `spring` is the force
   /// of the common spring.
   Demand<3> command(const LawPeriod& /*period*/, const Vec3& /*speed*/, const Demand<3>& spring) noexcept {

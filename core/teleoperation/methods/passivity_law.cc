@@ -38,7 +38,7 @@ void PassivityLaw::begin_act(const Vec3& u) noexcept {
   if (follower_) follower_->begin(u);
 }
 
-std::optional<Purse::Settlement> PassivityLaw::observe(const LawInterval& ended) noexcept {
+std::optional<EnergyTank::Settlement> PassivityLaw::observe(const LawInterval& ended) noexcept {
   if (leader_ && ended.was_live) energy_in_ = leader_->observe(ended.interval).energy_in;
   return std::nullopt;
 }

@@ -11,14 +11,14 @@ namespace tendon {
 /// because the friction of a device is too small. The law adds B, because otherwise E_in is 0 and the pair cannot
 /// start to move. E_in is the energy of this coupling. The energy of the peer is only counted from the first state of
 /// an epoch on, because the energy before that state can be used already. The law generates some mJ, because tools
-/// have mass and the ends predict one period. The pair therefore needs limiters and a purse.
+/// have mass and the ends predict one period. The pair therefore needs limiters and an energy tank.
 class PassivityLaw : public CouplingLaw {
  public:
   PassivityLaw(const CouplingConfig& config, const MappedEnd& frame);
 
   void receive(const PortState& peer, const PortState& before, bool anew, const MappedEnd& frame) noexcept;
   void begin_act(const Vec3& u) noexcept;
-  std::optional<Purse::Settlement> observe(const LawInterval& ended) noexcept;
+  std::optional<EnergyTank::Settlement> observe(const LawInterval& ended) noexcept;
   Demand<3> command(const LawPeriod& period, const Vec3& speed, const Demand<3>& spring) noexcept;
   void conclude(const LawPeriod& period, const Vec3& applied, const std::optional<Vec3>& contact) noexcept;
   LawPart part() const noexcept { return {.energy_in = energy_in_}; }

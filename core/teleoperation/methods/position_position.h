@@ -14,7 +14,7 @@ namespace tendon {
 /// The message between the ends of a position–position coupling, in the frame and scale of the receiver.
 template <int N>
 struct PortMotion {
-  std::uint64_t epoch = 1;           ///< of the sender, > 0; increases with each restart (Purse)
+  std::uint64_t epoch = 1;           ///< of the sender, > 0; increases with each restart (EnergyTank)
   std::uint64_t sequence = 0;        ///< period of the sender: 1, 2, …; messages that are not newer are dropped
   std::uint64_t answers_epoch = 0;   ///< epoch of the receiver for `answers`; 0: none
   std::uint64_t answers = 0;         ///< sequence of the receiver's message that the sender used; 0: none
@@ -44,7 +44,7 @@ Vec<N> paid_stretch(const Vec<N>& stretch, double stiffness, double energy) noex
 ///
 /// **Dependence of K on the delay** (core/PROOFS.md, "Coupling springs"). The delayed spring generates energy, which
 /// a damper of K·T_loop/2 at each end dissipates. The coupling is quiet for K ≤ 2B/T_loop, where B is the reliable
-/// damping at one end. Above that, the limiters and the purse keep the pair passive, but it oscillates: 0.04 … 0.08
+/// damping at one end. Above that, the limiters and the tank keep the pair passive, but it oscillates: 0.04 … 0.08
 /// m/s in free motion for delays above 50 ms.
 ///
 /// **T_loop** is measured without a common clock: a message contains the sequence that it answers, and the periods
@@ -65,7 +65,7 @@ Vec<N> paid_stretch(const Vec<N>& stretch, double stiffness, double energy) noex
 /// The stiffness that a hand can feel is at most K_op of the two limiters, 1/K_op = T_l/(2 b_l) + T_f/(2 b_f). Both
 /// ends must use the same K, D and B up to the scales: K_l = s_f s_x K_f, and likewise for D and B.
 ///
-/// This law is not passive. There must be a limiter and a Purse at both ends.
+/// This law is not passive. There must be a limiter and a EnergyTank at both ends.
 ///
 /// Messages that are not finite or out of bounds are dropped and counted in `refused`. A higher epoch of the other
 /// end starts anew, and a lower one is ignored. If the position is not finite, the demand is not finite, and the
@@ -88,7 +88,7 @@ class PositionPosition {
     double own_damping = 0;  ///< B, N·s/m; ≥ 0, and > 0 with adapt_to_delay
     bool adapt_to_delay = true;
     Duration period{};        ///< of this end, > 0
-    std::uint64_t epoch = 1;  ///< > 0, see Purse
+    std::uint64_t epoch = 1;  ///< > 0, see EnergyTank
     /// The time after which T_loop can decrease, > 0.
     Duration recovery = std::chrono::seconds(5);
     double max_force = std::numeric_limits<double>::infinity();  ///< N, > 0
@@ -110,7 +110,7 @@ class PositionPosition {
   /// Returns the message to send in this period. Must be called after `command`.
   PortMotion<N> message() const noexcept;
 
-  /// Resets the other end and sets the own epoch (Purse::renew).
+  /// Resets the other end and sets the own epoch (EnergyTank::renew).
   void renew(std::uint64_t epoch) noexcept;
 
   /// Sets K, D and B, within the bounds of Config. K changes with the time constant kSettling.

@@ -44,7 +44,7 @@ void WaveLaw::receive(const PortState& peer, const PortState& /*before*/, bool a
   }
 }
 
-std::optional<Purse::Settlement> WaveLaw::observe(const LawInterval& ended) noexcept {
+std::optional<EnergyTank::Settlement> WaveLaw::observe(const LawInterval& ended) noexcept {
   Interval<3> end{.applied = force_, .dx = Vec3::Zero(), .held = ended.interval.held};
   if (moves_) {
     end.dx = ended.interval.dx;
@@ -52,7 +52,7 @@ std::optional<Purse::Settlement> WaveLaw::observe(const LawInterval& ended) noex
     end.applied = ended.interval.applied + force_ - ended.wanted;
   }
   sent_ = port_.observe(end, {.payable = ended.payable, .reserve = ended.reserve, .wanted = force_});
-  return Purse::Settlement{.credit = port_.taken(), .withdraw = port_.given()};
+  return EnergyTank::Settlement{.credit = port_.taken(), .withdraw = port_.given()};
 }
 
 Demand<3> WaveLaw::command(const LawPeriod& period, const Vec3& speed, const Demand<3>& /*spring*/) noexcept {

@@ -24,7 +24,7 @@ class WaveLaw : public CouplingLaw {
   void receive(const PortState& peer, const PortState& before, bool anew, const MappedEnd& frame) noexcept;
   void forget() noexcept { joined_ = false; }
   void begin_act(const Vec3& /*u*/) noexcept { port_.forgive(); }
-  std::optional<Purse::Settlement> observe(const LawInterval& ended) noexcept;
+  std::optional<EnergyTank::Settlement> observe(const LawInterval& ended) noexcept;
   Demand<3> command(const LawPeriod& period, const Vec3& speed, const Demand<3>& spring) noexcept;
   void skip(const LawPeriod& period, Duration elapsed) noexcept;
   LawPart part() const noexcept { return {.wave = sent_}; }

@@ -176,7 +176,7 @@ TEST(PairAccount, IsNotSaidWhereItIsNotKnown) {
   EXPECT_TRUE(without([](Board::Ports&) {}));
   EXPECT_FALSE(without([](Board::Ports& p) { p.peer.reset(); }));
   EXPECT_FALSE(without([](Board::Ports& p) { p.own.position_scale = 0; })) << "the scales are not known";
-  EXPECT_FALSE(without([](Board::Ports& p) { p.peer->need = 0; })) << "it has no purse";
+  EXPECT_FALSE(without([](Board::Ports& p) { p.peer->need = 0; })) << "it has no tank";
   EXPECT_FALSE(without([](Board::Ports& p) { p.own.answers_epoch = 8; })) << "of a peer that has started anew";
   EXPECT_FALSE(without([](Board::Ports& p) { p.peer->answers_epoch = 0; }));
 }

@@ -18,7 +18,7 @@ using std::chrono::milliseconds;
 using std::chrono::seconds;
 
 const std::string kCoupled =
-    "[teleoperation]\nrole = \"leader\"\n[teleoperation.purse]\n"
+    "[teleoperation]\nrole = \"leader\"\n[teleoperation.energy_tank]\n"
     "[teleoperation.coupling]\nstiffness_n_per_m = 400\ndamping_n_s_per_m = 4\n";
 
 class ObserverTest : public Servers {

@@ -194,7 +194,7 @@ TEST(PageJson, TellsBothEndsOfACouplingInRows) {
     EXPECT_TRUE(lone[unknown].is_null()) << unknown;
   }
   EXPECT_EQ(lone["own"]["phase"], "alone");
-  EXPECT_TRUE(lone["own"]["account_j"].is_null()) << "it has no purse";
+  EXPECT_TRUE(lone["own"]["account_j"].is_null()) << "it has no tank";
   EXPECT_TRUE(lone["own"]["round_trip_ms"].is_null());
 }
 

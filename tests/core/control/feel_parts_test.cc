@@ -52,7 +52,7 @@ TEST(Shaping, LeavesASofterObjectAsItIs) {
   EXPECT_NEAR(displayed(config, 300), 300, 6);
 }
 
-TEST(Thrift, KeepsBackOnlyWhileTheHandIsLetOutAndThePurseIsLow) {
+TEST(Thrift, KeepsBackOnlyWhileTheHandIsLetOutAndTheTankIsLow) {
   const auto share = [](double dx, double earned) {
     auto config = device(milliseconds(1), 0.26, 0.02);
     config.parts.thrift = {{.share = 0.5, .energy = 0.004}};

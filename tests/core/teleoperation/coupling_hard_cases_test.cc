@@ -199,7 +199,7 @@ TEST(CouplingHardCases, AFollowerForgetsThemToo) {
   auto config = coupling_of(PortRole::kFollower);
   config.method = CouplingMethod::kWaves;
   config.spring.max_force = 5;
-  config.purse.reset();
+  config.tank.reset();
   Played played(config);
   const auto period = [&](PortPhase leader, std::uint64_t act, const Vec3& dx, double payable) {
     played.hear(played.state(leader, act));

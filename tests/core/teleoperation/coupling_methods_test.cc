@@ -55,17 +55,17 @@ TEST(CouplingMethods, WavesAreFeltAlikeAtBothEndsAndThePairIsPassive) {
   }
 }
 
-TEST(CouplingMethods, WavesNeedNoPurse) {
+TEST(CouplingMethods, WavesNeedNoTank) {
   for (const int one_way : {5, 100}) {
     const double with = feel({.one_way = one_way}).second;
-    const double without = feel({.purse = false, .one_way = one_way}).second;
+    const double without = feel({.tank = false, .one_way = one_way}).second;
     EXPECT_NEAR(without, with, 0.05 * with) << one_way;
   }
 }
 
 TEST(CouplingMethods, WavesAt200MsGiveAQuarterOfARigidLinksForce) {
   double buzz = 0;
-  const auto all = shares({.impedance = 10, .purse = false, .one_way = 100}, 3001, buzz);
+  const auto all = shares({.impedance = 10, .tank = false, .one_way = 100}, 3001, buzz);
   std::cout << "waves of 10 N·s/m, round trip 200 ms, n = 21 from seed 3001: share " << median(all) << ", least "
             << *std::min_element(all.begin(), all.end()) << ", buzz " << buzz * 1e3 << " mm/s\n";
   EXPECT_GE(median(all), 0.23);
@@ -237,7 +237,7 @@ TEST(CouplingMethods, APeerThatLiesAboutItsWavesGivesNoMoreThanTheyMayBe) {
   auto config = coupling_of(PortRole::kLeader);
   config.method = CouplingMethod::kWaves;
   config.spring.max_force = 5;
-  config.purse.reset();
+  config.tank.reset();
   Played played(config);
   played.hear(played.state(PortPhase::kCoupled));
   played.step();

@@ -120,7 +120,7 @@ TEST(CouplingSetPosition, TheFollowerGoesWhereTheHandGoes) {
   EXPECT_LT(apart_while_waving(CouplingMethod::kSetPosition, 100, 25), 2e-3);
 }
 
-TEST(CouplingPassivity, IsFeltAndWithAPurseThePairIsPassive) {
+TEST(CouplingPassivity, IsFeltAndWithATankThePairIsPassive) {
   const double felt_at_least[] = {2.7, 2.5, 1.5, 1.2};
   int i = 0;
   for (const int one_way : {0, 25, 100, 300}) {
@@ -134,7 +134,7 @@ TEST(CouplingPassivity, IsFeltAndWithAPurseThePairIsPassive) {
 
 TEST(CouplingPassivity, WithALimiterAtTheHandAloneThePairGivesOutMillijoules) {
   for (const int one_way : {0, 25, 100, 300}) {
-    Ports made = press({.method = CouplingMethod::kPassivity, .purse = false, .one_way = one_way});
+    Ports made = press({.method = CouplingMethod::kPassivity, .tank = false, .one_way = one_way});
     PortSetup follower = made.follower.setup;
     follower.limited = false;
     Ports ports(made.leader.setup, follower, bad_way(one_way, 1), bad_way(one_way, 2));
@@ -142,7 +142,7 @@ TEST(CouplingPassivity, WithALimiterAtTheHandAloneThePairGivesOutMillijoules) {
     ASSERT_TRUE(ports.engage());
     double hand = 0;
     ports.run(3000 + 4 * kPressMs - ports.now, [&](int) { hand = std::min(hand, ports.leader.truth.energy()); });
-    std::cout << "passivity without a purse, round trip " << 2 * one_way << " ms: pair " << ports.least_sum * 1e3
+    std::cout << "passivity without an energy tank, round trip " << 2 * one_way << " ms: pair " << ports.least_sum * 1e3
               << " mJ\n";
     EXPECT_GE(ports.least_sum, -0.05) << one_way;
     EXPECT_GE(hand, kRounding) << one_way;

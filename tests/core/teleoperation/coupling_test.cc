@@ -386,7 +386,7 @@ TEST(Coupling, RefusesImpossibleConfigurations) {
                       {"peer_period", [](auto& c) { c.peer_period = {}; }},
                       {"force_scale", [](auto& c) { c.map.force_scale = 0; }},
                       {"stiffness", [](auto& c) { c.spring.stiffness = -1; }},
-                      {"max_power", [](auto& c) { c.purse->max_power = 0; }},
+                      {"max_power", [](auto& c) { c.tank->max_power = 0; }},
                       {"clutch.bit = 32", [](auto& c) { c.clutch = Coupling::Button{.bit = 32}; }},
                       {"engage_by = 32", [](auto& c) { c.engage_by = 32; }},
                       {"engage_by = 2",

@@ -238,7 +238,7 @@ Star pumped(bool limited) {
   return star;
 }
 
-TEST(Couplings, AShareMovedUnderStretchIsPaidForByLimiterAndPurses) {
+TEST(Couplings, AShareMovedUnderStretchIsPaidForByLimiterAndTanks) {
   const Star with = pumped(true);
   const Star without = pumped(false);
   std::cout << "sum of the ports: with " << with.least_sum << " J, without " << without.least_sum << " J\n";
@@ -397,7 +397,7 @@ TEST(Couplings, TogetherGiveNoMoreThanTheAccountHas) {
       couplings[i].receive(peer, Port::at(ms));
     }
     couplings.command({Port::at(ms), Vec3::Zero(), Vec3::Zero()}, 0, true);
-    const Purse::Settlement paid = couplings.settle(0.01, 0, std::chrono::milliseconds(1));
+    const EnergyTank::Settlement paid = couplings.settle(0.01, 0, std::chrono::milliseconds(1));
     EXPECT_LE(paid.withdraw, 0.01) << ms;
     given += paid.withdraw;
   }

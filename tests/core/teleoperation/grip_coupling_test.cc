@@ -214,7 +214,7 @@ TEST(GripCoupling, NoActMakesAStep) {
   EXPECT_LT(step, 0.08);
 }
 
-TEST(GripCoupling, AStateThatTheGripsPurseRefusesChangesNothing) {
+TEST(GripCoupling, AStateThatTheGripsTankRefusesChangesNothing) {
   WholePorts ports(whole_of(PortRole::kLeader), whole_of(PortRole::kFollower), 2);
   ASSERT_TRUE(ports.engage());
   ports.run(100);

@@ -10,8 +10,8 @@
 
 #include "core/control/limiter.h"
 #include "core/ledger/energy_ledger.h"
+#include "core/teleoperation/energy_tank.h"
 #include "core/teleoperation/methods/position_position.h"
-#include "core/teleoperation/purse.h"
 #include "tests/core/teleoperation/one_way.h"
 
 namespace tendon {
@@ -89,17 +89,17 @@ struct PairConfig {
   double force_scale = 1;     ///< s_f; the caller scales the springs' K, D, B: K_l = s_x s_f K_f
   Network there{};            ///< tenths of a millisecond
   Network back{};
-  bool limited = true;  ///< false: without limiter and purse
+  bool limited = true;  ///< false: without limiter and tank
   double max_account = 10;
   double max_power = 100;
 };
 
-/// Simulates two devices with springs, limiters and purses. They are connected by a bad network and run in virtual
+/// Simulates two devices with springs, limiters and tanks. They are connected by a bad network and run in virtual
 /// time.
 class Pair {
  public:
   struct End {
-    End(const EndConfig& from, const Purse::Config& purse_config)
+    End(const EndConfig& from, const EnergyTank::Config& tank_config)
         : config(from),
           body(from.mass, from.friction, from.around),
           limiter({.law = from.law,
@@ -107,7 +107,7 @@ class Pair {
                    .longest_hold = from.period * std::chrono::microseconds(100),
                    .parts = from.parts,
                    .shared_account = true}),
-          purse(purse_config),
+          tank(tank_config),
           spring([&from] {
             auto with_period = from.spring;
             with_period.period = from.period * std::chrono::microseconds(100);
@@ -120,7 +120,7 @@ class Pair {
     EndConfig config;
     Body body;
     Limiter limiter;
-    Purse purse;
+    EnergyTank tank;
     PositionPosition<3> spring;
     EnergyLedger ledger;
     double wanted = 0;   ///< N
@@ -132,8 +132,8 @@ class Pair {
 
   explicit Pair(const PairConfig& config)
       : config_(config),
-        leader(config.leader, purse_of(config, config.force_scale / config.position_scale)),
-        follower(config.follower, purse_of(config, config.position_scale / config.force_scale)),
+        leader(config.leader, tank_of(config, config.force_scale / config.position_scale)),
+        follower(config.follower, tank_of(config, config.position_scale / config.force_scale)),
         there_(config.there),
         back_(config.back) {}
 
@@ -162,16 +162,16 @@ class Pair {
 
  private:
   struct Message {
-    PurseMessage purse;
+    EnergyTankMessage tank;
     PortMotion<3> motion;
   };
 
-  static Purse::Config purse_of(const PairConfig& config, double joule) {
-    Purse::Config purse;
-    purse.joule[0] = joule;
-    purse.max_account = config.max_account;
-    purse.max_power = config.max_power;
-    return purse;
+  static EnergyTank::Config tank_of(const PairConfig& config, double joule) {
+    EnergyTank::Config tank;
+    tank.joule[0] = joule;
+    tank.max_account = config.max_account;
+    tank.max_power = config.max_power;
+    return tank;
   }
 
   void step(End& end, OneWay<Message>& in, OneWay<Message>& out, double scale) {
@@ -196,12 +196,12 @@ class Pair {
       message.motion.position *= scale;
       message.motion.velocity *= scale;
       end.spring.receive(message.motion);
-      end.purse.receive(0, message.purse);
+      end.tank.receive(0, message.tank);
     });
     const Demand<3> wanted = end.spring.command(Vec3(measured(end), 0, 0), Vec3(end.speed, 0, 0));
     end.wanted = wanted.force.x();
     if (config_.limited) {
-      share<3>(end.purse, end.limiter, wanted.force, held);
+      share<3>(end.tank, end.limiter, wanted.force, held);
       const LimitedForce<3> limited = end.limiter.limit(wanted);
       end.applied = limited.force.x();
       end.cut += limited.reasons.empty() ? 0 : 1;
@@ -209,7 +209,7 @@ class Pair {
     } else {
       end.applied = std::clamp(end.wanted, -100.0, 100.0);
     }
-    out.send(now_, {end.purse.message(0), end.spring.message()});
+    out.send(now_, {end.tank.message(0), end.spring.message()});
   }
 
   static double measured(const End& end) {

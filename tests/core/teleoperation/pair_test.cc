@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Two devices coupled by position–position springs with limiters and purses over bad networks: contact force, free
+// Two devices coupled by position–position springs with limiters and tanks over bad networks: contact force, free
 // motion, noise, and passivity of the pair.
 #include "tests/core/teleoperation/pair.h"
 
@@ -49,7 +49,7 @@ void use_law(PairConfig& config, Law law) {
   }
 }
 
-TEST(Pair, WithoutAPurseTheFollowerDoesNotFollow) {
+TEST(Pair, WithoutATankTheFollowerDoesNotFollow) {
   PairConfig config = waving();
   config.max_account = 1e-12;  // this is too small to receive or to give any energy
   Pair pair(config);

@@ -42,7 +42,7 @@ inline Coupling::Config coupling_of(PortRole role) {
   Coupling::Config config;
   config.role = role;
   config.spring = {.stiffness = 400, .own_damping = 4, .period = std::chrono::milliseconds(1)};
-  config.purse = Purse::Config{.max_power = 100, .max_account = 10};
+  config.tank = EnergyTank::Config{.max_power = 100, .max_account = 10};
   return config;
 }
 
@@ -121,7 +121,7 @@ class Port {
       demand = {Vec3::Zero()};
     }
     const double loss = limiter->worst_loss(demand.force);
-    const Purse::Settlement settled = coupling->settle(limiter->payable(), loss, held);
+    const EnergyTank::Settlement settled = coupling->settle(limiter->payable(), loss, held);
     limiter->credit(settled.credit);
     limiter->withdraw(settled.withdraw);
     paid = settled.withdraw;

@@ -25,7 +25,7 @@ struct Pressing {
   double wall = 500;       // N/m
   double impedance = 4;    // N·s/m
   double stiffness = 400;  // N/m
-  bool purse = true;
+  bool tank = true;
   PoseMap::Config map{};
   double wall_until = 1e9;  // s
   int one_way = 0;          // ms
@@ -47,7 +47,7 @@ inline Ports press(const Pressing& with) {
     end->coupling.spring.stiffness = with.stiffness;
     end->coupling.spring.max_force = 8;
     end->coupling.spring.adapt_to_delay = with.adapts;
-    if (!with.purse) end->coupling.purse.reset();
+    if (!with.tank) end->coupling.tank.reset();
   }
   leader.coupling.clutch = Coupling::Button{.bit = 0};
   leader.around[0] = {.stiffness = with.hand, .damping = 3, .reference = [](double t) {

@@ -35,7 +35,7 @@ class Node {
                       .friction = setup.friction,
                       .longest_hold = std::chrono::milliseconds(1)};
     config.limiter.shared_account = setup.limited;
-    if (!setup.limited) config.coupling->purse.reset();
+    if (!setup.limited) config.coupling->tank.reset();
     config.max_force = 100;
     config.max_slew = 1000;
     controller.emplace(config);
@@ -72,7 +72,7 @@ class Node {
     return coupling.message();
   }
   Coupling& coupling(std::size_t which = 0) { return (*controller->couplings())[which]; }
-  const Purse::Settlement& settled(std::size_t which) { return controller->couplings()->settled(which); }
+  const EnergyTank::Settlement& settled(std::size_t which) { return controller->couplings()->settled(which); }
 
   PortSetup setup;
   std::optional<HapticController> controller;

@@ -334,7 +334,7 @@ TEST(WholeHandles, WithoutLimitersTheSamePairGivesOutEnergy) {
   WholeSetup follower = whole_of(PortRole::kFollower);
   leader.turn_hand = [](double t) { return Vec3(0.5 * std::sin(6 * t), 0, 0); };
   for (WholeSetup* const end : {&leader, &follower}) {
-    end->coupling.purse.reset();
+    end->coupling.tank.reset();
     end->coupling.spring.adapt_to_delay = false;
     end->coupling.turn->stiffness = 3;
     end->coupling.turn->damping = 0;
@@ -363,7 +363,7 @@ TEST(WholeHandles, APositionAloneIsCoupledOnADeviceWithMoreMotors) {
   EXPECT_GE(ports.least_sum, -kNanojoule);
 }
 
-/// Recomputes the step without the coupling, from its recorded demand and settlement of two purses.
+/// Recomputes the step without the coupling, from its recorded demand and settlement of two tanks.
 TEST(WholeHandles, ARecordedStepIsTakenAgainToTheLastBit) {
   WholeSetup leader = whole_of(PortRole::kLeader);
   leader.along_x = {.stiffness = 400, .damping = 3, .reference = [](double t) { return 0.02 * std::sin(4 * t); }};

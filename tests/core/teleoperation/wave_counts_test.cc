@@ -24,7 +24,7 @@ Ports light_devices(double count, std::optional<Preset> preset, const Friction& 
   PortSetup follower = port_of(PortRole::kFollower);
   for (PortSetup* const end : {&leader, &follower}) {
     couple_by(CouplingMethod::kWaves, end->coupling);
-    end->coupling.purse.reset();
+    end->coupling.tank.reset();
     end->friction = friction;
     end->encoder_step = count;
     end->preset = preset;

@@ -39,7 +39,7 @@ inline WholeSetup whole_of(PortRole role) {
   Coupling::Config& config = setup.coupling;
   config.role = role;
   config.spring = {.stiffness = 400, .own_damping = 4, .period = std::chrono::milliseconds(1)};
-  config.purse = Purse::Config{.max_power = 100, .max_account = 10};
+  config.tank = EnergyTank::Config{.max_power = 100, .max_account = 10};
   config.turn = TurnCoupling::Config{.stiffness = 0.5, .damping = 5e-3};
   config.grip = GripCoupling::Config{.stiffness = 400, .damping = 2, .arm = kFingerArm};
   return setup;
@@ -90,7 +90,7 @@ class WholePort {
   HapticController::Config control(std::uint64_t epoch) const {
     HapticController::Config config;
     config.limiter = setup.limiter;
-    config.limiter.shared_account = setup.coupling.purse || setup.coupling.method == CouplingMethod::kWaves;
+    config.limiter.shared_account = setup.coupling.tank || setup.coupling.method == CouplingMethod::kWaves;
     config.rotation = {.friction = kTurnFriction, .max_torque = 1, .max_slew = std::numeric_limits<double>::infinity()};
     config.grip = {.friction = kGripFriction, .arm = kFingerArm, .max_force = 20};
     config.max_force = 20;

@@ -147,7 +147,7 @@ TEST_F(Shards, TogetherTheirCountsAreThoseOfTheServer) {
 
 TEST_F(Shards, AServerThatDialsHasItsPeerWhereTheDeviceIs) {
   scenes_[20] = device_named("d-20",
-                             "[teleoperation]\nrole = \"leader\"\ndial = \"127.0.0.1:1\"\n[teleoperation.purse]\n"
+                             "[teleoperation]\nrole = \"leader\"\ndial = \"127.0.0.1:1\"\n[teleoperation.energy_tank]\n"
                              "[teleoperation.coupling]\nstiffness_n_per_m = 400\ndamping_n_s_per_m = 4\n");
   restart();
   for (std::uint32_t i = 0; i < 2; ++i) {

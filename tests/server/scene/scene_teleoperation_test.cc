@@ -18,8 +18,8 @@ std::string coupled(const std::string& role, const std::string& what, const std:
   return "[teleoperation]\nrole = \"" + role + "\"\n" + more +
          "[teleoperation.coupling]\nstiffness_n_per_m = 400\ndamping_n_s_per_m = 4\n" + what;
 }
-const std::string kPurse = "[teleoperation.purse]\n";
-const std::string kLeader = coupled("leader", kPurse);
+const std::string kTank = "[teleoperation.energy_tank]\n";
+const std::string kLeader = coupled("leader", kTank);
 
 const std::string kRate = "[teleoperation.rate]\ndead_zone_mm = 3\ngain_per_s = 4\nmax_speed_mm_per_s = 50\n";
 
@@ -42,7 +42,7 @@ TEST(SceneTeleoperation, HasWhatItListsAndTheRestIsSimple) {
   EXPECT_EQ(coupling.spring.own_damping, 4);
   EXPECT_EQ(coupling.spring.period, 1ms);
   EXPECT_EQ(coupling.spring.max_force, scene.loop.control.max_force);
-  EXPECT_TRUE(coupling.spring.adapt_to_delay && coupling.purse);
+  EXPECT_TRUE(coupling.spring.adapt_to_delay && coupling.tank);
   EXPECT_FALSE(coupling.clutch || coupling.engage_by || coupling.holds_place);
   EXPECT_TRUE(scene.loop.control.limiter.shared_account);
 }
@@ -80,8 +80,8 @@ TEST(SceneTeleoperation, TakesEveryKeyInItsUnit) {
       {"teleoperation.coupling.adapt_to_delay=false", 0,
        [](S s) -> double { return coupling(s).spring.adapt_to_delay; }},
       {"teleoperation.coupling.max_force_n=2", 2, [](S s) { return coupling(s).spring.max_force; }},
-      {"teleoperation.purse.max_account_mj=50", 0.05, [](S s) { return coupling(s).purse->max_account; }},
-      {"teleoperation.purse.max_power_w=1", 1, [](S s) { return coupling(s).purse->max_power; }},
+      {"teleoperation.energy_tank.max_account_mj=50", 0.05, [](S s) { return coupling(s).tank->max_account; }},
+      {"teleoperation.energy_tank.max_power_w=1", 1, [](S s) { return coupling(s).tank->max_power; }},
       {"teleoperation.engage.ramp_ms=100", 0.1, [](S s) { return seconds(coupling(s).ramp); }}};
   expect_made(std::string(kMinimal) + kLeader, settings);
 }
@@ -99,13 +99,13 @@ button = 0
   EXPECT_EQ(coupling(scene).engage_by, 0U);
 }
 
-TEST(SceneTeleoperation, NamesEachMethodAndWavesShareAccountsWithoutAPurse) {
+TEST(SceneTeleoperation, NamesEachMethodAndWavesShareAccountsWithoutATank) {
   const auto by = [](const std::string& method, const std::string& more = "") {
     return coupled("leader", more, "method = \"" + method + "\"\n");
   };
   for (const CouplingMethod method : kCouplingMethods) {
     const std::string more = method == CouplingMethod::kRate ? kRate : "";
-    const Scene scene = minimal_and(by(std::string(to_string(method)), kPurse + more));
+    const Scene scene = minimal_and(by(std::string(to_string(method)), kTank + more));
     EXPECT_EQ(scene.loop.control.coupling->method, method) << to_string(method);
   }
   EXPECT_TRUE(minimal_and(by("waves")).loop.control.limiter.shared_account);
@@ -131,7 +131,7 @@ TEST(SceneTeleoperation, AnAbsoluteMapAlignsAndHasNoClutch) {
             "only this leader is aligned");
   EXPECT_EQ(error_of_minimal_and(kLeader + "[teleoperation.engage]\nalign_energy_mj = 8\n"),
             "s.toml:11: teleoperation.engage.align_energy_mj: expected 0, except for a leader with map.absolute and a "
-            "purse: the energy is paid into its account");
+            "tank: the energy is paid into its account");
   EXPECT_EQ(
       error_of_minimal_and(kLeader + "[teleoperation.map]\nabsolute = true\n[teleoperation.clutch]\nbutton = 1\n"),
       "s.toml:12: teleoperation.clutch: expected no clutch with map.absolute: a clutch changes the offset, which is "
@@ -143,7 +143,7 @@ TEST(SceneTeleoperation, AnAbsoluteMapAlignsAndHasNoClutch) {
 
 TEST(SceneTeleoperation, TakesWhatPassivityRateAndSlowLinksNeed) {
   const auto by = [](const std::string& role, const std::string& method, const std::string& more) {
-    return coupled(role, more, "method = \"" + method + "\"\nmax_delay_ms = 800\n" + kPurse);
+    return coupled(role, more, "method = \"" + method + "\"\nmax_delay_ms = 800\n" + kTank);
   };
   const Scene passivity = minimal_and(by("follower", "passivity", "drift_rate_per_s = 50\n"));
   EXPECT_EQ(passivity.loop.control.coupling->drift_rate, 50);
@@ -161,64 +161,73 @@ TEST(SceneTeleoperation, SaysWhichMethodHasNoUseForAKey) {
     return error_of_minimal_and("[teleoperation]\nrole = \"" + std::string(role) + "\"\nmethod = \"" + method +
                                 "\"\n[teleoperation.coupling]\nstiffness_n_per_m = 400\n" + more);
   };
-  const std::string purse = "damping_n_s_per_m = 4\n[teleoperation.purse]\n";
+  const std::string tank = "damping_n_s_per_m = 4\n[teleoperation.energy_tank]\n";
   for (const char* const method : {"passivity", "set-position"}) {
-    EXPECT_EQ(refusal(method, "damping_n_s_per_m = 4\n"),
-              "s.toml:4: teleoperation.purse: missing, expected this table: with its own limiter, a follower can only "
-              "move with energy from the leader");
+    EXPECT_EQ(
+        refusal(method, "damping_n_s_per_m = 4\n"),
+        "s.toml:4: teleoperation.energy_tank: missing, expected this table: with its own limiter, a follower can only "
+        "move with energy from the leader");
   }
-  EXPECT_EQ(refusal("rate", purse),
+  EXPECT_EQ(refusal("rate", tank),
             "s.toml:6: teleoperation.rate: missing, expected this table with method \"rate\": it sets the speed of the "
             "follower");
-  EXPECT_EQ(refusal("waves", purse + kRate),
+  EXPECT_EQ(refusal("waves", tank + kRate),
             "s.toml:11: teleoperation.rate: expected none with method \"waves\": only the method \"rate\" uses it");
-  EXPECT_EQ(refusal("rate", purse + kRate + "centring_n_per_m = 200\n", "follower"),
+  EXPECT_EQ(refusal("rate", tank + kRate + "centring_n_per_m = 200\n", "follower"),
             "s.toml:15: teleoperation.rate.centring_n_per_m: expected 0 or no value for a follower: only the leader's "
             "handle is centred");
-  EXPECT_EQ(refusal("rate", purse + "[teleoperation.rate]\ndead_zone_mm = 3\ngain_per_s = 4\n"),
+  EXPECT_EQ(refusal("rate", tank + "[teleoperation.rate]\ndead_zone_mm = 3\ngain_per_s = 4\n"),
             "s.toml:11: teleoperation.rate.max_speed_mm_per_s: missing, expected a number above 0 mm/s");
-  EXPECT_EQ(refusal("surface", "drift_rate_per_s = 5\n" + purse),
+  EXPECT_EQ(refusal("surface", "drift_rate_per_s = 5\n" + tank),
             "s.toml:9: teleoperation.coupling.drift_rate_per_s: expected none with method \"surface\": only "
             "\"passivity\" corrects drift");
-  EXPECT_EQ(refusal("set-position", "mutual_damping_n_s_per_m = 1\n" + purse),
+  EXPECT_EQ(refusal("set-position", "mutual_damping_n_s_per_m = 1\n" + tank),
             "s.toml:9: teleoperation.coupling.mutual_damping_n_s_per_m: expected 0 or no value with method "
             "\"set-position\": it does not use the velocity of the other end");
-  EXPECT_EQ(refusal("passivity", "[teleoperation.purse]\n"),
+  EXPECT_EQ(refusal("passivity", "[teleoperation.energy_tank]\n"),
             "s.toml:6: teleoperation.coupling.damping_n_s_per_m: expected a number above 0: nothing else absorbs "
             "energy, so no motion could start");
 }
 
+TEST(SceneTeleoperation, TheFormerNameOfATableIsAnsweredWithItsNewOne) {
+  EXPECT_EQ(error_of_minimal_and(kLeader + "[teleoperation.purse]\n"),
+            "s.toml:10: teleoperation.purse: renamed to teleoperation.energy_tank");
+}
+
 TEST(SceneTeleoperation, SaysWhatCannotBeTogether) {
   const auto refusal = [](const std::string& more) { return error_of_minimal_and(more); };
-  EXPECT_EQ(refusal(coupled("leader", "")),
-            "s.toml:4: teleoperation.purse: missing, expected this table: with its own limiter, a follower can only "
-            "move with energy from the leader");
-  EXPECT_EQ(refusal("[limiter]\nkind = \"tdpa\"\n" + kLeader),
-            "s.toml:5: teleoperation.purse: expected the limiter \"aol+\", \"aol\" or \"aol-box\": other limiters have "
-            "no energy account that ports can share");
-  EXPECT_EQ(refusal("[limiter]\nkind = \"aol+\"\n[limiter.latency_reserve]\nholds = 2\n" + kLeader),
-            "s.toml:6: limiter.latency_reserve: expected none with teleoperation.purse: the reserve is not proved for "
-            "an account that is shared by several ports");
+  EXPECT_EQ(
+      refusal(coupled("leader", "")),
+      "s.toml:4: teleoperation.energy_tank: missing, expected this table: with its own limiter, a follower can only "
+      "move with energy from the leader");
+  EXPECT_EQ(
+      refusal("[limiter]\nkind = \"tdpa\"\n" + kLeader),
+      "s.toml:5: teleoperation.energy_tank: expected the limiter \"aol+\", \"aol\" or \"aol-box\": other limiters have "
+      "no energy account that ports can share");
+  EXPECT_EQ(
+      refusal("[limiter]\nkind = \"aol+\"\n[limiter.latency_reserve]\nholds = 2\n" + kLeader),
+      "s.toml:6: limiter.latency_reserve: expected none with teleoperation.energy_tank: the reserve is not proved for "
+      "an account that is shared by several ports");
   EXPECT_EQ(
       refusal(kLeader + "[teleoperation.map]\naxes = \"zx\"\n"),
       "s.toml:11: teleoperation.map.axes: expected one or more of the letters x, y, z, in this order, found \"zx\"");
   EXPECT_EQ(refusal(kLeader + "[teleoperation.engage]\nby = \"button\"\n"),
             "s.toml:11: teleoperation.engage.by: expected \"button\" together with button, or \"request\" without");
-  EXPECT_EQ(refusal(coupled("leader", kPurse, "dial = \"192.0.2.7:47100\"\n")),
+  EXPECT_EQ(refusal(coupled("leader", kTank, "dial = \"192.0.2.7:47100\"\n")),
             "s.toml:6: teleoperation.dial: expected a loopback address, or a key: connections over a network must be "
             "encrypted");
-  EXPECT_EQ(refusal(coupled("leader", kPurse, "key = \"a.key\"\n")),
+  EXPECT_EQ(refusal(coupled("leader", kTank, "key = \"a.key\"\n")),
             "s.toml:6: teleoperation.key: expected no key without dial, because a server that is dialled uses the keys "
             "of [network]");
-  EXPECT_EQ(refusal(coupled("leader", kPurse, "on_loss = \"hold\"\n")),
+  EXPECT_EQ(refusal(coupled("leader", kTank, "on_loss = \"hold\"\n")),
             "s.toml:6: teleoperation.on_loss: expected \"release\" for a leader, which is held by a hand");
-  EXPECT_EQ(refusal(coupled("follower", kPurse + "[teleoperation.clutch]\nbutton = 1\n")),
+  EXPECT_EQ(refusal(coupled("follower", kTank + "[teleoperation.clutch]\nbutton = 1\n")),
             "s.toml:10: teleoperation.clutch: expected no clutch for a follower: only the leader has a clutch");
 }
 
 /// Ten lines after kMinimal, so the rest begins at line 14.
 const std::string kTwoLeaders =
-    "[[channel]]\nname = \"trainer\"\n[[channel]]\nname = \"trainee\"\n" + coupled("follower", kPurse);
+    "[[channel]]\nname = \"trainer\"\n[[channel]]\nname = \"trainee\"\n" + coupled("follower", kTank);
 
 std::string leader(const std::string& channel, const std::string& share) {
   return "[[teleoperation.leader]]\nchannel = \"" + channel + "\"\nshare = " + share + "\n";
@@ -284,7 +293,7 @@ const std::string kGrip = "[teleoperation.grip]\nstiffness_n_per_m = 300\ndampin
 
 TEST(SceneTeleoperation, CouplesOrientationsAndGrippersThatItLists) {
   const Scene scene = minimal_and(kRotation + kMotors + kGripper + kGripMotor + kTurnBounds + kGripBounds +
-                                  coupled("follower", kTurn + kGrip + kPurse));
+                                  coupled("follower", kTurn + kGrip + kTank));
   const Coupling::Config& coupling = *scene.loop.control.coupling;
   ASSERT_TRUE(coupling.turn && coupling.grip);
   EXPECT_EQ(coupling.turn->stiffness, 0.5);
@@ -298,35 +307,35 @@ TEST(SceneTeleoperation, CouplesOrientationsAndGrippersThatItLists) {
   const Scene points = minimal_and(kRotation + kMotors + kTurnBounds + kLeader);
   EXPECT_TRUE(points.loop.control.rotation && points.loop.control.coupling);
   EXPECT_FALSE(points.loop.control.coupling->turn) << "a position alone, on a device with six motors";
-  EXPECT_TRUE(minimal_and(kRotation + coupled("leader", kTurn + kPurse)).loop.control.coupling->turn)
+  EXPECT_TRUE(minimal_and(kRotation + coupled("leader", kTurn + kTank)).loop.control.coupling->turn)
       << "a leader that measures its orientation and feels no torque";
 }
 
 TEST(SceneTeleoperation, RefusesHandlesThatCannotBeCoupled) {
-  EXPECT_EQ(error_of_minimal_and(coupled("leader", kTurn + kPurse)),
+  EXPECT_EQ(error_of_minimal_and(coupled("leader", kTurn + kTank)),
             "s.toml:9: teleoperation.turn: expected a device with [device.rotation]: this device does not measure the "
             "orientation of its handle");
-  EXPECT_EQ(error_of_minimal_and(kRotation + coupled("follower", kTurn + kPurse)),
+  EXPECT_EQ(error_of_minimal_and(kRotation + coupled("follower", kTurn + kTank)),
             "s.toml:12: teleoperation.turn: expected a device with max_torque_nm in [device.rotation]: a follower "
             "requires motors that turn its handle");
-  EXPECT_EQ(error_of_minimal_and(coupled("follower", kGrip + kPurse)),
+  EXPECT_EQ(error_of_minimal_and(coupled("follower", kGrip + kTank)),
             "s.toml:9: teleoperation.grip: expected a device with [device.gripper]: this device does not measure the "
             "opening of a gripper");
-  EXPECT_EQ(error_of_minimal_and(kGripper + coupled("leader", kGrip + kPurse)),
+  EXPECT_EQ(error_of_minimal_and(kGripper + coupled("leader", kGrip + kTank)),
             "s.toml:14: teleoperation.grip: expected a device with max_force_n in [device.gripper]: a gripper without "
             "a motor cannot follow and cannot be felt");
   EXPECT_EQ(
       error_of_minimal_and(kGripper + kGripMotor + kGripBounds + coupled("follower", kGrip, "method = \"surface\"\n")),
-      "s.toml:19: teleoperation.purse: missing, expected this table: with its own limiter, a gripper can only "
+      "s.toml:19: teleoperation.energy_tank: missing, expected this table: with its own limiter, a gripper can only "
       "move with energy from the leader");
   EXPECT_EQ(
       error_of_minimal_and(kRotation + kMotors + kTurnBounds + coupled("follower", kTurn, "method = \"waves\"\n")),
-      "s.toml:17: teleoperation.purse: missing, expected this table: waves do not transmit rotations, so the "
+      "s.toml:17: teleoperation.energy_tank: missing, expected this table: waves do not transmit rotations, so the "
       "energy that turns the follower must come from the leader");
   EXPECT_EQ(error_of_minimal_and(kRotation + coupled("leader",
                                                      "[teleoperation.turn]\n"
                                                      "stiffness_nm_per_rad = 0.5\n" +
-                                                         kPurse)),
+                                                         kTank)),
             "s.toml:7: teleoperation: turn.damping = 0: expected a number above 0 N·m·s/rad, because adapt_to_delay "
             "limits the stiffness to 2 B divided by the round-trip time");
 }

@@ -20,7 +20,7 @@ namespace {
 const std::string kCoupling =
     "stiffness_n_per_m = 400\n"
     "damping_n_s_per_m = 4\n"
-    "[teleoperation.purse]\n";
+    "[teleoperation.energy_tank]\n";
 
 struct Running {
   Running(const std::string& text, std::uint64_t epoch)

@@ -79,7 +79,8 @@ Step Rerun::take(const StepRecord& recorded, const Effort& held) {
     missed_ = 0;
     const bool has_port = settled_at_ == recorded.tick;
     return controller_.step(recorded.hand, applied, recorded.hand_force, wanted_in(recorded), handle,
-                            has_port ? settled_ : Purse::Settlement{}, has_port ? grip_settled_ : Purse::Settlement{});
+                            has_port ? settled_ : EnergyTank::Settlement{},
+                            has_port ? grip_settled_ : EnergyTank::Settlement{});
   }
   // For a rejected position the record contains only the rejection.
   ++missed_;

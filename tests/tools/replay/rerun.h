@@ -52,9 +52,9 @@ class Rerun {
   std::uint32_t missed_ = 0;  ///< consecutive readings
   Held held_;
   Effort own_;
-  Purse::Settlement settled_;       ///< sum over all couplings
-  Purse::Settlement grip_settled_;  ///< grip part, used by a single coupling only
-  std::uint64_t settled_at_ = 0;    ///< tick; 0: none yet
+  EnergyTank::Settlement settled_;       ///< sum over all couplings
+  EnergyTank::Settlement grip_settled_;  ///< grip part, used by a single coupling only
+  std::uint64_t settled_at_ = 0;         ///< tick; 0: none yet
 };
 
 /// Returns the first result of the law that is not bitwise identical, for example "energy_j: recorded 0.1, again 0.2",

@@ -187,7 +187,7 @@ export class Coupling {
     const scaled = row?.position_scale != null && row.position_scale !== row.force_scale;
     const account = (t: Tile, name: string, end: PortEnd | null | undefined): void => {
       const value = end?.account_j ?? NaN;
-      const note = !end ? "not told" : end.account_j === null ? "it has no purse: its limiter counts for itself" : scaled ? "joules of its own scale" : "may be spent now";
+      const note = !end ? "not told" : end.account_j === null ? "it has no energy tank: its limiter counts for itself" : scaled ? "joules of its own scale" : "may be spent now";
       show(t, name, value < 0 ? "bad" : "off", Number.isFinite(value) ? `${digits(1e3 * value)} mJ` : "–", note);
     };
     account(ownAccount, "Account of this end", row?.own);
@@ -238,7 +238,7 @@ export class Coupling {
 function pairNote(row: PortRow | undefined, scaled: boolean): string {
   if (!row?.peer) return "the other end is not heard";
   if (row.pair_j !== null) return scaled ? "joules of the leader, with what is under way" : "both, and what is under way between them";
-  if (row.own.account_j === null || row.peer.account_j === null) return "an end has no purse: they do not pay each other";
+  if (row.own.account_j === null || row.peer.account_j === null) return "an end has no energy tank: they do not pay each other";
   if (row.position_scale === null) return "the scales are not known: look at each by itself";
   return "the two do not know each other yet";
 }

@@ -284,7 +284,7 @@ export interface Couple {
   readonly damping: number;
   /** The stiffness decreases as the round trip increases */
   readonly adaptToDelay: boolean;
-  /** The ends exchange energy (core/teleoperation/purse.h) */
+  /** The ends exchange energy (core/teleoperation/energy_tank.h) */
   readonly purse: boolean;
   /** Time between two PortState frames of the sender */
   readonly periodUs: number;
@@ -615,7 +615,7 @@ export interface PortState {
   readonly contactForce?: Vec3 | undefined;
   /** J, energy that the sender may still give out, after its payments */
   readonly account: number;
-  /** J, energy that the sender needs for its desired force; 0: it has no purse */
+  /** J, energy that the sender needs for its desired force; 0: it has no tank */
   readonly need: number;
   /** J, total paid to the receiver; it never decreases while both epochs last */
   readonly given: number;

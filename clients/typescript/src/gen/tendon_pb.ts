@@ -1182,7 +1182,7 @@ export type Couple = Message<"tendon.v1.Couple"> & {
   adaptToDelay: boolean;
 
   /**
-   * the ends exchange energy (core/teleoperation/purse.h)
+   * the ends exchange energy (core/teleoperation/energy_tank.h)
    *
    * @generated from field: bool purse = 13;
    */
@@ -2311,7 +2311,7 @@ export type PortState = Message<"tendon.v1.PortState"> & {
   accountJ: number;
 
   /**
-   * [0, 1e3]: energy that the sender needs for its desired force; 0: it has no purse
+   * [0, 1e3]: energy that the sender needs for its desired force; 0: it has no tank
    *
    * @generated from field: double need_j = 17;
    */

@@ -17,7 +17,7 @@ inline Pressing pressing_by(CouplingMethod method) {
       break;
     case CouplingMethod::kWaves:
       with.impedance = 10;
-      with.purse = false;
+      with.tank = false;
       break;
     case CouplingMethod::kPositionForce:
     case CouplingMethod::kSurface:

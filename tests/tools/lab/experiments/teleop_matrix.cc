@@ -72,7 +72,7 @@ PortSetup end_of(const MatrixCase& of, PortRole role, const DeviceProfile& devic
   const Pressing with = pressing_by(of.method);
   end.coupling.spring.own_damping = with.impedance;
   end.coupling.spring.stiffness = with.stiffness;
-  if (!with.purse) end.coupling.purse.reset();
+  if (!with.tank) end.coupling.tank.reset();
   end.coupling.spring.max_force = device.max_force.value;
   end.mass = device.mass.value;
   end.friction = device.friction_bounds();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "core/teleoperation/purse.h"
+#include "core/teleoperation/energy_tank.h"
 
 #include <cmath>
 
@@ -10,28 +10,28 @@ namespace tendon {
 
 namespace {
 
-bool possible(const PurseMessage& message) noexcept {
-  constexpr double kAccount = PurseMessage::kMostAccount;
-  constexpr double kTotal = PurseMessage::kMostTotal;
+bool possible(const EnergyTankMessage& message) noexcept {
+  constexpr double kAccount = EnergyTankMessage::kMostAccount;
+  constexpr double kTotal = EnergyTankMessage::kMostTotal;
   return message.epoch > 0 && message.sequence > 0 && within(message.account, -kAccount, kAccount) &&
          within(message.need, 0, kAccount) && within(message.given, 0, kTotal) && within(message.taken, 0, kTotal);
 }
 
 }  // namespace
 
-Purse::Purse(const Config& config) : config_(config), allowance_(config.max_account) {
+EnergyTank::EnergyTank(const Config& config) : config_(config), allowance_(config.max_account) {
   expect(config.peers >= 1 && config.peers <= kMostPeers, "peers", static_cast<double>(config.peers), "1 to 3");
   for (std::size_t j = 0; j < config.peers; ++j) {
     expect(within(config.joule[j], 1e-6, 1e6), "joule", config.joule[j], "1e-6 to 1e6");
   }
   expect_above_zero(config.start, "start");
   expect_above_zero(config.max_power, "max_power");
-  expect(config.max_account > 0 && config.max_account <= PurseMessage::kMostAccount, "max_account", config.max_account,
-         "above 0 J, at most 1000 J");
+  expect(config.max_account > 0 && config.max_account <= EnergyTankMessage::kMostAccount, "max_account",
+         config.max_account, "above 0 J, at most 1000 J");
   expect(config.epoch > 0, "epoch", static_cast<double>(config.epoch), "a number above 0");
 }
 
-void Purse::receive(std::size_t peer, const PurseMessage& message) noexcept {
+void EnergyTank::receive(std::size_t peer, const EnergyTankMessage& message) noexcept {
   if (peer >= config_.peers) return;
   Peer& from = peers_[peer];
   if (!possible(message)) {
@@ -55,23 +55,23 @@ void Purse::receive(std::size_t peer, const PurseMessage& message) noexcept {
   from.arrived = message.taken;
 }
 
-void Purse::renew(std::uint64_t epoch) noexcept {
+void EnergyTank::renew(std::uint64_t epoch) noexcept {
   config_.epoch = epoch;
   for (Peer& peer : peers_) peer = {.sent = peer.sent};
 }
 
-void Purse::revalue(std::size_t peer, double joule, double start) noexcept {
+void EnergyTank::revalue(std::size_t peer, double joule, double start) noexcept {
   if (peer >= config_.peers) return;
   config_.joule[peer] = joule;
   config_.start = start;
   forgo(peer);
 }
 
-void Purse::forgo(std::size_t peer) noexcept {
+void EnergyTank::forgo(std::size_t peer) noexcept {
   if (peer < config_.peers) peers_[peer].credited = peers_[peer].heard;
 }
 
-double Purse::take() noexcept {
+double EnergyTank::take() noexcept {
   double sum = 0;
   for (std::size_t j = 0; j < config_.peers; ++j) {
     sum += (peers_[j].heard - peers_[j].credited) * config_.joule[j];
@@ -80,7 +80,7 @@ double Purse::take() noexcept {
   return sum;
 }
 
-double Purse::give(double account, double need) noexcept {
+double EnergyTank::give(double account, double need) noexcept {
   if (!(account > 0)) return 0;
   std::array<double, kMostPeers> there{};  // Â_j and n_j, in joules of this port
   std::array<double, kMostPeers> needs{};  // 0: receives nothing
@@ -121,7 +121,7 @@ double Purse::give(double account, double need) noexcept {
   double left = account;
   for (std::size_t j = 0; j < config_.peers; ++j) {
     Peer& peer = peers_[j];
-    const double total = std::min(peer.given + std::min(share * gifts[j], left), PurseMessage::kMostTotal);
+    const double total = std::min(peer.given + std::min(share * gifts[j], left), EnergyTankMessage::kMostTotal);
     // The actual increase of the rounded total, which the peer will count.
     const double grown = total - peer.given;
     if (!(grown > 0) || grown > left) continue;
@@ -131,7 +131,7 @@ double Purse::give(double account, double need) noexcept {
   return account - left;
 }
 
-Purse::Settlement Purse::settle(const Period& period) noexcept {
+EnergyTank::Settlement EnergyTank::settle(const Period& period) noexcept {
   Settlement settlement;
   if (!std::isfinite(period.payable) || std::isnan(period.loss)) return settlement;
   allowance_ += config_.max_power * std::max(0.0, seconds(period.elapsed));
@@ -144,7 +144,7 @@ Purse::Settlement Purse::settle(const Period& period) noexcept {
   account -= excess;
   discarded_ += came - settlement.credit + excess;
 
-  need_ = std::min(std::max(period.loss, 0.0) + config_.start, PurseMessage::kMostAccount);
+  need_ = std::min(std::max(period.loss, 0.0) + config_.start, EnergyTankMessage::kMostAccount);
   const double gift = period.giving ? give(account, need_) : 0.0;
   allowance_ = std::min(allowance_ + gift, config_.max_account);
   account_ = account - gift;
@@ -152,10 +152,10 @@ Purse::Settlement Purse::settle(const Period& period) noexcept {
   return settlement;
 }
 
-PurseMessage Purse::message(std::size_t peer) noexcept {
+EnergyTankMessage EnergyTank::message(std::size_t peer) noexcept {
   if (peer >= config_.peers) return {};
   Peer& to = peers_[peer];
-  constexpr double kMost = PurseMessage::kMostAccount;
+  constexpr double kMost = EnergyTankMessage::kMostAccount;
   return {.epoch = config_.epoch,
           .answers_epoch = to.epoch,
           .sequence = ++to.sent,
@@ -165,7 +165,7 @@ PurseMessage Purse::message(std::size_t peer) noexcept {
           .taken = to.heard};
 }
 
-double Purse::given(std::size_t peer) const noexcept { return peer < config_.peers ? peers_[peer].given : 0; }
-double Purse::taken(std::size_t peer) const noexcept { return peer < config_.peers ? peers_[peer].heard : 0; }
+double EnergyTank::given(std::size_t peer) const noexcept { return peer < config_.peers ? peers_[peer].given : 0; }
+double EnergyTank::taken(std::size_t peer) const noexcept { return peer < config_.peers ? peers_[peer].heard : 0; }
 
 }  // namespace tendon

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Tests the energy-sharing theorem of purse.h for handles. There are two ports that rotate or grip. They pay each other
-// over a network that delays, loses, repeats and reorders messages. The accounts and the sum of both ledgers must not
-// fall below −1 nJ, even if the motion is a closed loop in SO(3). The ledgers are computed independently from the true
-// motion.
+// Tests the energy-sharing theorem of energy_tank.h for handles. There are two ports that rotate or grip. They pay each
+// other over a network that delays, loses, repeats and reorders messages. The accounts and the sum of both ledgers must
+// not fall below −1 nJ, even if the motion is a closed loop in SO(3). The ledgers are computed independently from the
+// true motion.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -17,11 +17,11 @@
 #include "core/base/rotation.h"
 #include "core/control/stability_controller.h"
 #include "core/handle/handle_port.h"
-#include "core/teleoperation/purse.h"
+#include "core/teleoperation/energy_tank.h"
 #include "tests/core/teleoperation/one_way.h"
 #include "tests/support/dice.h"
 
-namespace tendon::handle_purse_test {
+namespace tendon::handle_tank_test {
 namespace {
 
 constexpr double kUnlimited = std::numeric_limits<double>::infinity();
@@ -38,7 +38,7 @@ struct HandleEnd {
   typename Limits::Config config;
   Duration period{};
   std::optional<Limits> port;
-  std::optional<Purse> purse;
+  std::optional<EnergyTank> tank;
   std::array<Friction, kBlocks> friction{};
   double truth = 0;                   ///< J
   Vec<kSize> x = Vec<kSize>::Zero();  ///< position; the orientation of a wrench is in `q`
@@ -89,12 +89,12 @@ class HandlePair {
       end.stiffness = dice_.decades(0, 3.5);
       end.hostility = loops_ ? 0.2 * dice_.uniform() : dice_.uniform();
       end.port.emplace(end.config);
-      Purse::Config purse;
-      purse.peers = 1;
-      purse.max_power = 1e3;
-      purse.max_account = dice_.decades(-2, 1);
-      purse.epoch = 1;
-      end.purse.emplace(purse);
+      EnergyTank::Config tank;
+      tank.peers = 1;
+      tank.max_power = 1e3;
+      tank.max_account = dice_.decades(-2, 1);
+      tank.epoch = 1;
+      end.tank.emplace(tank);
     }
     for (int i = 0; i < 2; ++i) {
       links_.emplace_back(Network{.delay = static_cast<int>(dice_.chance(0.5) ? 0 : dice_.decades(0, 2.3)),
@@ -203,16 +203,16 @@ class HandlePair {
     if (dice_.chance(0.5)) held = from_seconds(seconds(held) * dice_.within(0.25, 1));
     move(end, motion(end, held), held);
     look(end);
-    links_[1 - i].deliver(now_, [&](const PurseMessage& message) { end.purse->receive(0, message); });
+    links_[1 - i].deliver(now_, [&](const EnergyTankMessage& message) { end.tank->receive(0, message); });
     const Vec<kSize> force = wanted(end, ends_[1 - i]);
     const double loss = end.port->worst_loss(force.allFinite() ? force : Vec<kSize>(Vec<kSize>::Zero()));
-    const auto settlement = end.purse->settle({end.port->payable(), loss, end.period, !dice_.chance(0.1)});
+    const auto settlement = end.tank->settle({end.port->payable(), loss, end.period, !dice_.chance(0.1)});
     end.port->credit(settlement.credit);
     end.port->withdraw(settlement.withdraw);
     balance_.given += settlement.withdraw;
     end.force = end.port->limit({force}).force * bound_;
     look(end);
-    const PurseMessage message = end.purse->message(0);
+    const EnergyTankMessage message = end.tank->message(0);
     links_[i].send(now_, message);
     if (dice_.chance(duplicates_)) links_[i].send(now_, message);
   }
@@ -222,15 +222,15 @@ class HandlePair {
   bool loops_;
   double duplicates_ = 0;
   std::array<End, 2> ends_;
-  std::vector<OneWay<PurseMessage>> links_;
+  std::vector<OneWay<EnergyTankMessage>> links_;
   int now_ = 0;
   Balance balance_;
 };
 
 template <class Limits>
-class HandlePurse : public ::testing::Test {};
+class HandleTank : public ::testing::Test {};
 using HandlePorts = testing::Types<WrenchPort, GripPort>;
-TYPED_TEST_SUITE(HandlePurse, HandlePorts);
+TYPED_TEST_SUITE(HandleTank, HandlePorts);
 
 template <class Limits>
 void expect_no_pair_gains(std::uint64_t pairs, bool loops) {
@@ -247,9 +247,9 @@ void expect_no_pair_gains(std::uint64_t pairs, bool loops) {
   EXPECT_GT(all.given, 0.01 * static_cast<double>(pairs)) << "nobody gave anything: nothing was tested";
 }
 
-TYPED_TEST(HandlePurse, NoAccountAndNoSumOfLedgersIsEverNegative) { expect_no_pair_gains<TypeParam>(150, false); }
+TYPED_TEST(HandleTank, NoAccountAndNoSumOfLedgersIsEverNegative) { expect_no_pair_gains<TypeParam>(150, false); }
 
-TYPED_TEST(HandlePurse, ABoundOnePercentTooHighIsFound) {
+TYPED_TEST(HandleTank, ABoundOnePercentTooHighIsFound) {
   int found = 0;
   for (std::uint64_t seed = 1; seed <= 100; ++seed) {
     found += HandlePair<TypeParam>(seed, 1.01).run(2000).broken() ? 1 : 0;
@@ -258,9 +258,9 @@ TYPED_TEST(HandlePurse, ABoundOnePercentTooHighIsFound) {
   EXPECT_GT(found, 0);
 }
 
-TEST(HandlePurseLoops, ClosedLoopsOfTurnsGainNothing) { expect_no_pair_gains<WrenchPort>(100, true); }
+TEST(HandleTankLoops, ClosedLoopsOfTurnsGainNothing) { expect_no_pair_gains<WrenchPort>(100, true); }
 
-TYPED_TEST(HandlePurse, WhatIsPaidIsWhatTheForceMayLose) {
+TYPED_TEST(HandleTank, WhatIsPaidIsWhatTheForceMayLose) {
   typename TypeParam::Config config;
   config.law = Law::kAolPlus;
   config.friction.fill({0.02, 0.26});
@@ -282,7 +282,7 @@ TYPED_TEST(HandlePurse, WhatIsPaidIsWhatTheForceMayLose) {
   EXPECT_DOUBLE_EQ(port.payable(), 0.5 * loss);
 }
 
-TYPED_TEST(HandlePurse, TheEnergyCapKeepsWhatAPeerPaidForTheForce) {
+TYPED_TEST(HandleTank, TheEnergyCapKeepsWhatAPeerPaidForTheForce) {
   for (const bool shared : {true, false}) {
     typename TypeParam::Config config;
     config.law = Law::kAolPlus;
@@ -298,7 +298,7 @@ TYPED_TEST(HandlePurse, TheEnergyCapKeepsWhatAPeerPaidForTheForce) {
   }
 }
 
-TYPED_TEST(HandlePurse, ALawWithoutAnAccountIsRefused) {
+TYPED_TEST(HandleTank, ALawWithoutAnAccountIsRefused) {
   typename TypeParam::Config config;
   config.friction.fill({0.02, 0.26});
   config.longest_hold = std::chrono::milliseconds(1);
@@ -312,7 +312,7 @@ TYPED_TEST(HandlePurse, ALawWithoutAnAccountIsRefused) {
   EXPECT_THROW(TypeParam{config}, std::invalid_argument);
 }
 
-TEST(HandlePurseScene, AWrenchAndAGripShareWhereThePointDoes) {
+TEST(HandleTankScene, AWrenchAndAGripShareWhereThePointDoes) {
   LimiterConfig point;
   point.law = Law::kAolPlus;
   point.friction = {0.02, 0.26};
@@ -325,4 +325,4 @@ TEST(HandlePurseScene, AWrenchAndAGripShareWhereThePointDoes) {
 }
 
 }  // namespace
-}  // namespace tendon::handle_purse_test
+}  // namespace tendon::handle_tank_test

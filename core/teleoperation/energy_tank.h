@@ -13,7 +13,7 @@ namespace tendon {
 
 /// The message from one port to another about its account. Messages may be rare, late, duplicated or reordered. All
 /// energies are in joules of the sender.
-struct PurseMessage {
+struct EnergyTankMessage {
   std::uint64_t epoch = 0;          ///< of the sender; 0: no message
   std::uint64_t answers_epoch = 0;  ///< epoch of the receiver for `given` and `taken`; 0: not known
   std::uint64_t sequence = 0;       ///< 1, 2, … within an epoch
@@ -47,7 +47,7 @@ struct PurseMessage {
 /// bound. R_ij ≤ G_ij, because totals do not decrease and only the largest received one is used. So Σ L_i = Σ A_i + Σ
 /// (G_ij − R_ij) + Σ discarded_i ≥ 0, because each term is ≥ 0. ∎ The theorem requires no common clock, no
 /// acknowledgement and no retransmission. All holds must be at most T_max long; see OutputBound for longer holds.
-/// Several purses may use one account one after the other, each with the remaining energy as `payable` (Couplings).
+/// Several tanks may use one account one after the other, each with the remaining energy as `payable` (Couplings).
 /// Their sum then satisfies the condition of the theorem.
 ///
 /// **Amount.** The ports give energy so that the ratio of account to need becomes equal, including the energy in
@@ -70,7 +70,7 @@ struct PurseMessage {
 /// in transit until the peer knows the new value, and the follower gives up the part of its account by which
 /// (s_f/s_x) A has increased. No change of the scales increases the sum of the accounts in joules of the leader.
 ///
-/// **Epochs.** If a port restarts, it loses its totals. Its new purse must have an epoch above all previous ones (a
+/// **Epochs.** If a port restarts, it loses its totals. Its new tank must have an epoch above all previous ones (a
 /// persistent counter, or the time of day at the start; clocks of two machines are not compared). Totals belong to a
 /// pair of epochs. A higher epoch of the peer resets both totals. Messages of a lower epoch, and totals for another
 /// epoch of this port, are ignored. No total is therefore counted twice. Energy in transit is lost, which is safe.
@@ -89,7 +89,7 @@ struct PurseMessage {
 /// 2010).
 ///
 /// Thread-safe: no. Realtime-safe: yes, except the constructor.
-class Purse {
+class EnergyTank {
  public:
   static constexpr std::size_t kMostPeers = 3;
 
@@ -103,10 +103,10 @@ class Purse {
   };
 
   /// Throws std::invalid_argument with the name of the field, its value and the expected value.
-  explicit Purse(const Config& config);
+  explicit EnergyTank(const Config& config);
 
   /// May be called at any time before settle(). Does nothing unless peer < Config::peers.
-  void receive(std::size_t peer, const PurseMessage& message) noexcept;
+  void receive(std::size_t peer, const EnergyTankMessage& message) noexcept;
 
   /// Resets all peers, so that any epoch is accepted, and starts an epoch above all previous ones. Energy in transit
   /// is lost.
@@ -134,7 +134,7 @@ class Purse {
 
   /// Returns the message to a peer after settle(), or one with epoch 0 if the peer does not exist. Each message has
   /// its own sequence.
-  PurseMessage message(std::size_t peer) noexcept;
+  EnergyTankMessage message(std::size_t peer) noexcept;
 
   double account() const noexcept { return account_; }              ///< A after the last settle, J
   double need() const noexcept { return need_; }                    ///< n in the last settle, J
@@ -172,8 +172,8 @@ class Purse {
 /// Adds and gives energy, between `observe` and `limit`. `wanted` is the argument of `limit`.
 template <int N, class Law>
 requires SharesAccount<Law, N>
-void share(Purse& purse, Law& law, const Vec<N>& wanted, Duration elapsed, bool giving = true) noexcept {
-  const auto settlement = purse.settle({law.payable(), law.worst_loss(wanted), elapsed, giving});
+void share(EnergyTank& tank, Law& law, const Vec<N>& wanted, Duration elapsed, bool giving = true) noexcept {
+  const auto settlement = tank.settle({law.payable(), law.worst_loss(wanted), elapsed, giving});
   law.credit(settlement.credit);
   law.withdraw(settlement.withdraw);
 }

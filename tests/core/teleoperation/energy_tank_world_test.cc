@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Tests the energy-sharing theorem of purse.h with two to four ports and a network that delays, loses, repeats and
-// reorders messages. The forces are arbitrary and include the worst motion, pauses and restarts. The accounts and the
-// sum of all ledgers must not fall below −1 nJ. The ledgers are computed independently. Each sabotage must be found
+// Tests the energy-sharing theorem of energy_tank.h with two to four ports and a network that delays, loses, repeats
+// and reorders messages. The forces are arbitrary and include the worst motion, pauses and restarts. The accounts and
+// the sum of all ledgers must not fall below −1 nJ. The ledgers are computed independently. Each sabotage must be found
 // within 100 worlds.
 #include <gtest/gtest.h>
 
@@ -16,12 +16,12 @@
 
 #include "core/control/limiter.h"
 #include "core/ledger/energy_ledger.h"
-#include "core/teleoperation/purse.h"
+#include "core/teleoperation/energy_tank.h"
 #include "tests/core/teleoperation/one_way.h"
 #include "tests/support/dice.h"
 #include "tests/support/property_cases.h"
 
-namespace tendon::purse_world_test {
+namespace tendon::energy_tank_world_test {
 namespace {
 
 constexpr double kInf = std::numeric_limits<double>::infinity();
@@ -33,7 +33,7 @@ struct Port {
   LimiterConfig config;
   Duration period{};
   std::optional<Limiter> limiter;
-  std::optional<Purse> purse;
+  std::optional<EnergyTank> tank;
   std::uint64_t epoch = 0;
   EnergyLedger truth{Friction{}};
   Vec3 x = Vec3::Zero();
@@ -128,7 +128,7 @@ class World {
   void start(std::size_t i) {
     Port& port = ports_[i];
     port.limiter.emplace(port.config);
-    Purse::Config config;
+    EnergyTank::Config config;
     config.peers = 3;
     for (std::size_t j = 0; j < 4; ++j) {
       if (j != i) config.joule[number(i, j)] = worth(i, j);
@@ -136,7 +136,7 @@ class World {
     config.max_power = 1e3;
     config.max_account = dice_.decades(-2, 1);
     config.epoch = ++port.epoch;
-    port.purse.emplace(config);
+    port.tank.emplace(config);
     port.force.setZero();
   }
 
@@ -167,16 +167,16 @@ class World {
     Port& port = ports_[i];
     for (std::size_t j = 0; j < ports_.size(); ++j) {
       if (!coupled(i, j)) continue;
-      links_[j * ports_.size() + i].deliver(now_, [&](PurseMessage message) {
+      links_[j * ports_.size() + i].deliver(now_, [&](EnergyTankMessage message) {
         if (sabotage_ == Sabotage::kEpochIgnored) {
           // A receiver without epoch checks: every message seems to have the peer's present epoch and our present
           // totals.
           message.answers_epoch = port.epoch;
           message.epoch = 1;
-          message.taken = std::min(message.taken, port.purse->given(number(i, j)));  // otherwise this check alone would
-                                                                                     // find it
+          message.taken = std::min(message.taken, port.tank->given(number(i, j)));  // otherwise this check alone would
+                                                                                    // find it
         }
-        port.purse->receive(number(i, j), message);
+        port.tank->receive(number(i, j), message);
       });
     }
   }
@@ -185,7 +185,7 @@ class World {
     const double loss = port.limiter->worst_loss(force.allFinite() ? force : Vec3(Vec3::Zero()));
     const double payable =
         sabotage_ == Sabotage::kGiveAfterLimit ? std::max(port.limiter->payable(), 0.0) : port.limiter->payable();
-    const auto settlement = port.purse->settle({payable, loss, port.period, !dice_.chance(0.1)});
+    const auto settlement = port.tank->settle({payable, loss, port.period, !dice_.chance(0.1)});
     port.limiter->credit(settlement.credit * (sabotage_ == Sabotage::kTotalsTwice ? 2 : 1));
     port.limiter->withdraw(settlement.withdraw);
     outcome_.given += settlement.withdraw;
@@ -230,7 +230,7 @@ class World {
   void send(std::size_t i) {
     for (std::size_t j = 0; j < ports_.size(); ++j) {
       if (!coupled(i, j)) continue;
-      const PurseMessage message = ports_[i].purse->message(number(i, j));
+      const EnergyTankMessage message = ports_[i].tank->message(number(i, j));
       auto& link = links_[i * ports_.size() + j];
       link.send(now_, message);
       if (dice_.chance(duplicates_)) link.send(now_, message);
@@ -246,7 +246,7 @@ class World {
   double silence_ = 0;
   double scale_ = 1;
   std::vector<Port> ports_;
-  std::vector<OneWay<PurseMessage>> links_;
+  std::vector<OneWay<EnergyTankMessage>> links_;
   int now_ = 0;
   Outcome outcome_;
 };
@@ -281,14 +281,14 @@ int found(Sabotage sabotage) {
   return worlds;
 }
 
-TEST(PurseWorlds, NoAccountAndNoSumOfLedgersIsEverNegative) {
+TEST(TankWorlds, NoAccountAndNoSumOfLedgersIsEverNegative) {
   expect_no_world_gains(15 * static_cast<std::uint64_t>(property_cases()) / 100, 2000);
 }
 
 // Run by hand: --gtest_also_run_disabled_tests --gtest_filter='*TenThousand*'
-TEST(PurseWorlds, DISABLED_TenThousandWorldsOfTenSeconds) { expect_no_world_gains(10'000, 10'000); }
+TEST(TankWorlds, DISABLED_TenThousandWorldsOfTenSeconds) { expect_no_world_gains(10'000, 10'000); }
 
-TEST(PurseWorlds, OfThreePortsOrMoreOneMayBeLostForGood) {
+TEST(TankWorlds, OfThreePortsOrMoreOneMayBeLostForGood) {
   int worlds = 0;
   double given = 0;
   for (std::uint64_t seed = 1; seed <= 300; ++seed) {
@@ -307,10 +307,10 @@ TEST(PurseWorlds, OfThreePortsOrMoreOneMayBeLostForGood) {
   EXPECT_GT(given, 0.01 * worlds) << "nobody gave anything: nothing was tested";
 }
 
-TEST(PurseWorlds, ABoundOnePercentTooHighIsFound) { EXPECT_GT(found(Sabotage::kBoundOnePercentUp), 0); }
-TEST(PurseWorlds, TotalsThatAreCreditedTwiceAreFound) { EXPECT_GT(found(Sabotage::kTotalsTwice), 0); }
-TEST(PurseWorlds, GivingAfterTheLimiterIsFound) { EXPECT_GT(found(Sabotage::kGiveAfterLimit), 0); }
-TEST(PurseWorlds, AnEpochThatIsIgnoredIsFound) { EXPECT_GT(found(Sabotage::kEpochIgnored), 0); }
+TEST(TankWorlds, ABoundOnePercentTooHighIsFound) { EXPECT_GT(found(Sabotage::kBoundOnePercentUp), 0); }
+TEST(TankWorlds, TotalsThatAreCreditedTwiceAreFound) { EXPECT_GT(found(Sabotage::kTotalsTwice), 0); }
+TEST(TankWorlds, GivingAfterTheLimiterIsFound) { EXPECT_GT(found(Sabotage::kGiveAfterLimit), 0); }
+TEST(TankWorlds, AnEpochThatIsIgnoredIsFound) { EXPECT_GT(found(Sabotage::kEpochIgnored), 0); }
 
 }  // namespace
-}  // namespace tendon::purse_world_test
+}  // namespace tendon::energy_tank_world_test

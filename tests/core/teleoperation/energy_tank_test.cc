@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "core/teleoperation/purse.h"
+#include "core/teleoperation/energy_tank.h"
 
 #include <gtest/gtest.h>
 
@@ -13,7 +13,7 @@
 #include "tests/support/dice.h"
 #include "tests/support/refusal.h"
 
-namespace tendon::purse_test {
+namespace tendon::energy_tank_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -22,7 +22,7 @@ constexpr double kInf = std::numeric_limits<double>::infinity();
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 /// A message of a peer with epoch 7 that has received our epoch 1.
-PurseMessage from_peer(std::uint64_t sequence, double account, double need, double given = 0, double taken = 0) {
+EnergyTankMessage from_peer(std::uint64_t sequence, double account, double need, double given = 0, double taken = 0) {
   return {.epoch = 7,
           .answers_epoch = 1,
           .sequence = sequence,
@@ -32,78 +32,78 @@ PurseMessage from_peer(std::uint64_t sequence, double account, double need, doub
           .taken = taken};
 }
 
-Purse::Period period_of(double payable, double loss) {
+EnergyTank::Period period_of(double payable, double loss) {
   return {.payable = payable, .loss = loss, .elapsed = milliseconds(1)};
 }
 
-TEST(Purse, GivesUntilBothHaveTheSameShareOfTheirNeed) {
-  Purse purse({});
-  purse.receive(0, from_peer(1, 0.01, 0.03));
+TEST(EnergyTank, GivesUntilBothHaveTheSameShareOfTheirNeed) {
+  EnergyTank tank({});
+  tank.receive(0, from_peer(1, 0.01, 0.03));
   const double need = 0.01 + 0.2e-3;
-  const auto settlement = purse.settle(period_of(0.05, 0.01));
+  const auto settlement = tank.settle(period_of(0.05, 0.01));
   EXPECT_DOUBLE_EQ(settlement.withdraw, (0.05 * 0.03 - 0.01 * need) / (need + 0.03));
   EXPECT_NEAR((0.05 - settlement.withdraw) / need, (0.01 + settlement.withdraw) / 0.03, 1e-12);
-  EXPECT_EQ(purse.message(0).given, settlement.withdraw);
+  EXPECT_EQ(tank.message(0).given, settlement.withdraw);
 }
 
-TEST(Purse, CountsWhatIsUnderWay) {
-  Purse purse({});
-  purse.receive(0, from_peer(1, 0.01, 0.03));
-  const auto first = purse.settle(period_of(0.05, 0.01));
-  purse.receive(0, from_peer(2, 0.01, 0.03));  // the gift has not been received yet
-  EXPECT_NEAR(purse.settle(period_of(0.05 - first.withdraw, 0.01)).withdraw, 0, 1e-15);
-  purse.receive(0, from_peer(3, 0.01, 0.03, 0, first.withdraw));  // the gift has arrived and was spent
-  EXPECT_GT(purse.settle(period_of(0.05 - first.withdraw, 0.01)).withdraw, 1e-3);
+TEST(EnergyTank, CountsWhatIsUnderWay) {
+  EnergyTank tank({});
+  tank.receive(0, from_peer(1, 0.01, 0.03));
+  const auto first = tank.settle(period_of(0.05, 0.01));
+  tank.receive(0, from_peer(2, 0.01, 0.03));  // the gift has not been received yet
+  EXPECT_NEAR(tank.settle(period_of(0.05 - first.withdraw, 0.01)).withdraw, 0, 1e-15);
+  tank.receive(0, from_peer(3, 0.01, 0.03, 0, first.withdraw));  // the gift has arrived and was spent
+  EXPECT_GT(tank.settle(period_of(0.05 - first.withdraw, 0.01)).withdraw, 1e-3);
 }
 
-TEST(Purse, GivesNothingToOneThatWasNotHeardOrWhileItMayNot) {
-  Purse purse({});
-  EXPECT_EQ(purse.settle(period_of(0.1, 0)).withdraw, 0);
-  purse.receive(0, from_peer(1, 0, 0.03, 0.01));
+TEST(EnergyTank, GivesNothingToOneThatWasNotHeardOrWhileItMayNot) {
+  EnergyTank tank({});
+  EXPECT_EQ(tank.settle(period_of(0.1, 0)).withdraw, 0);
+  tank.receive(0, from_peer(1, 0, 0.03, 0.01));
   auto period = period_of(0.1, 0);
   period.giving = false;
-  const auto settlement = purse.settle(period);
+  const auto settlement = tank.settle(period);
   EXPECT_EQ(settlement.withdraw, 0);
   EXPECT_DOUBLE_EQ(settlement.credit, 0.01) << "what comes is still added";
 }
 
-TEST(Purse, NeverGivesMoreThanItHasHoweverManyAsk) {
+TEST(EnergyTank, NeverGivesMoreThanItHasHoweverManyAsk) {
   Dice dice(3);
   for (int n = 0; n < 20'000; ++n) {
     const auto peers = static_cast<std::size_t>(dice.within(1, 4));
-    Purse purse({.peers = peers});
+    EnergyTank tank({.peers = peers});
     for (std::size_t j = 0; j < peers; ++j) {
       const double sign = dice.chance(0.3) ? -1 : 1;
-      purse.receive(j, from_peer(1, sign * dice.decades(-6, 3), dice.decades(-6, 3)));
+      tank.receive(j, from_peer(1, sign * dice.decades(-6, 3), dice.decades(-6, 3)));
     }
     const double payable = (dice.chance(0.2) ? -1 : 1) * dice.decades(-9, -1);
-    const auto settlement = purse.settle(period_of(payable, dice.chance(0.1) ? kInf : dice.decades(-6, 3)));
+    const auto settlement = tank.settle(period_of(payable, dice.chance(0.1) ? kInf : dice.decades(-6, 3)));
     ASSERT_GE(settlement.withdraw, 0);
     ASSERT_LE(settlement.withdraw, std::max(payable, 0.0));
   }
 }
 
-TEST(Purse, WhenItHasTooLittleAllAreCutInProportion) {
-  Purse purse({.peers = 3});
-  for (std::size_t j = 0; j < 3; ++j) purse.receive(j, from_peer(1, -10, 0.01));
-  EXPECT_NEAR(purse.settle(period_of(0.03, 0.01)).withdraw, 0.03, 1e-12);
-  for (std::size_t j = 0; j < 3; ++j) EXPECT_NEAR(purse.given(j), 0.01, 1e-12) << j;
+TEST(EnergyTank, WhenItHasTooLittleAllAreCutInProportion) {
+  EnergyTank tank({.peers = 3});
+  for (std::size_t j = 0; j < 3; ++j) tank.receive(j, from_peer(1, -10, 0.01));
+  EXPECT_NEAR(tank.settle(period_of(0.03, 0.01)).withdraw, 0.03, 1e-12);
+  for (std::size_t j = 0; j < 3; ++j) EXPECT_NEAR(tank.given(j), 0.01, 1e-12) << j;
 }
 
-TEST(Purse, ThreePeersAndItselfEndAtOneRatio) {
-  Purse purse({.peers = 3, .max_account = 1});
+TEST(EnergyTank, ThreePeersAndItselfEndAtOneRatio) {
+  EnergyTank tank({.peers = 3, .max_account = 1});
   const std::array<double, 3> accounts = {0.01, 0.02, 0.5};  // the last account already has more than its share
   const std::array<double, 3> needs = {0.05, 0.02, 0.1};
-  for (std::size_t j = 0; j < 3; ++j) purse.receive(j, from_peer(1, accounts[j], needs[j]));
-  const double left = 0.3 - purse.settle(period_of(0.3, 0.03 - 0.2e-3)).withdraw;
-  EXPECT_NEAR((accounts[0] + purse.given(0)) / needs[0], left / 0.03, 1e-12);
-  EXPECT_NEAR((accounts[1] + purse.given(1)) / needs[1], left / 0.03, 1e-12);
-  EXPECT_EQ(purse.given(2), 0);
+  for (std::size_t j = 0; j < 3; ++j) tank.receive(j, from_peer(1, accounts[j], needs[j]));
+  const double left = 0.3 - tank.settle(period_of(0.3, 0.03 - 0.2e-3)).withdraw;
+  EXPECT_NEAR((accounts[0] + tank.given(0)) / needs[0], left / 0.03, 1e-12);
+  EXPECT_NEAR((accounts[1] + tank.given(1)) / needs[1], left / 0.03, 1e-12);
+  EXPECT_EQ(tank.given(2), 0);
 }
 
-TEST(Purse, AJouleOfThePeerIsWorthWhatTheScalesSay) {
+TEST(EnergyTank, AJouleOfThePeerIsWorthWhatTheScalesSay) {
   // s_x 0.2, s_f 5: a joule of the follower is 25 J at the leader.
-  Purse leader({.joule = {25}, .max_account = 10});
+  EnergyTank leader({.joule = {25}, .max_account = 10});
   leader.receive(0, from_peer(1, 0.0002, 0.001, 0.004));
   const auto settlement = leader.settle(period_of(0, 0.025 - 0.2e-3));
   EXPECT_DOUBLE_EQ(settlement.credit, 0.1);
@@ -112,36 +112,36 @@ TEST(Purse, AJouleOfThePeerIsWorthWhatTheScalesSay) {
 }
 
 /// If this were not the case, a joule could be given at one worth and credited at another.
-TEST(Purse, AChangeOfWorthForgoesWhatIsUnderWay) {
-  Purse purse({.max_power = 100, .max_account = 100});
-  purse.receive(0, from_peer(1, 1, 1, 2));
-  purse.revalue(0, 10, 1e-3);
-  EXPECT_EQ(purse.settle(period_of(0, 0)).credit, 0) << "given when it was worth 1 J";
-  EXPECT_EQ(purse.need(), 1e-3);
-  purse.receive(0, from_peer(2, 1, 1, 2.5));
-  purse.forgo(0);
-  EXPECT_EQ(purse.settle(period_of(0, 0)).credit, 0) << "the peer did not know yet";
-  purse.receive(0, from_peer(3, 1, 1, 3));
-  EXPECT_DOUBLE_EQ(purse.settle(period_of(0, 0)).credit, 5) << "half a joule of it";
+TEST(EnergyTank, AChangeOfWorthForgoesWhatIsUnderWay) {
+  EnergyTank tank({.max_power = 100, .max_account = 100});
+  tank.receive(0, from_peer(1, 1, 1, 2));
+  tank.revalue(0, 10, 1e-3);
+  EXPECT_EQ(tank.settle(period_of(0, 0)).credit, 0) << "given when it was worth 1 J";
+  EXPECT_EQ(tank.need(), 1e-3);
+  tank.receive(0, from_peer(2, 1, 1, 2.5));
+  tank.forgo(0);
+  EXPECT_EQ(tank.settle(period_of(0, 0)).credit, 0) << "the peer did not know yet";
+  tank.receive(0, from_peer(3, 1, 1, 3));
+  EXPECT_DOUBLE_EQ(tank.settle(period_of(0, 0)).credit, 5) << "half a joule of it";
 }
 
-TEST(Purse, ATotalIsCountedOnceHoweverOftenItComes) {
-  Purse purse({});
-  purse.receive(0, from_peer(2, 0, 0, 0.02));
-  purse.receive(0, from_peer(2, 0, 0, 0.02));
-  purse.receive(0, from_peer(1, 0, 0, 0.01));  // overtaken: late but valid
-  EXPECT_DOUBLE_EQ(purse.settle(period_of(0, 0)).credit, 0.02);
-  EXPECT_EQ(purse.settle(period_of(0, 0)).credit, 0);
-  EXPECT_EQ(purse.refused(), 0U);
+TEST(EnergyTank, ATotalIsCountedOnceHoweverOftenItComes) {
+  EnergyTank tank({});
+  tank.receive(0, from_peer(2, 0, 0, 0.02));
+  tank.receive(0, from_peer(2, 0, 0, 0.02));
+  tank.receive(0, from_peer(1, 0, 0, 0.01));  // overtaken: late but valid
+  EXPECT_DOUBLE_EQ(tank.settle(period_of(0, 0)).credit, 0.02);
+  EXPECT_EQ(tank.settle(period_of(0, 0)).credit, 0);
+  EXPECT_EQ(tank.refused(), 0U);
 }
 
-TEST(Purse, WhatIsWrongIsRefusedAndCounted) {
-  Purse purse({});
-  purse.receive(0, from_peer(5, 0, 0, 0.02));
+TEST(EnergyTank, WhatIsWrongIsRefusedAndCounted) {
+  EnergyTank tank({});
+  tank.receive(0, from_peer(5, 0, 0, 0.02));
   std::uint64_t refused = 0;
-  const auto refuses = [&](const PurseMessage& message, const char* why) {
-    purse.receive(0, message);
-    EXPECT_EQ(purse.refused(), ++refused) << why;
+  const auto refuses = [&](const EnergyTankMessage& message, const char* why) {
+    tank.receive(0, message);
+    EXPECT_EQ(tank.refused(), ++refused) << why;
   };
   refuses(from_peer(6, 0, 0, 0.01), "a total that falls");
   refuses(from_peer(7, kNan, 0, 0.02), "account");
@@ -154,72 +154,72 @@ TEST(Purse, WhatIsWrongIsRefusedAndCounted) {
   refuses(from_peer(7, 0, 0, 0.02, 0.5), "taken above what was given");
   refuses(from_peer(7, 0, 0, 0.02, kNan), "taken");
   refuses(from_peer(0, 0, 0, 0.02), "sequence");
-  refuses(PurseMessage{}, "epoch");
-  purse.receive(1, from_peer(1, 0, 0, 0.02));  // no such peer
-  EXPECT_EQ(purse.refused(), refused);
-  EXPECT_DOUBLE_EQ(purse.settle(period_of(0, 0)).credit, 0.02);
+  refuses(EnergyTankMessage{}, "epoch");
+  tank.receive(1, from_peer(1, 0, 0, 0.02));  // no such peer
+  EXPECT_EQ(tank.refused(), refused);
+  EXPECT_DOUBLE_EQ(tank.settle(period_of(0, 0)).credit, 0.02);
 }
 
-TEST(Purse, ANewEpochOfThePeerVoidsTheTotalsAndTheOldNeverCountsAgain) {
-  Purse purse({});
-  purse.receive(0, from_peer(9, 0, 0.03, 0.02));
-  EXPECT_GT(purse.settle(period_of(0.01, 0)).withdraw, 0);
-  const std::uint64_t sent = purse.message(0).sequence;
-  PurseMessage restarted = from_peer(1, 0, 0.03);
+TEST(EnergyTank, ANewEpochOfThePeerVoidsTheTotalsAndTheOldNeverCountsAgain) {
+  EnergyTank tank({});
+  tank.receive(0, from_peer(9, 0, 0.03, 0.02));
+  EXPECT_GT(tank.settle(period_of(0.01, 0)).withdraw, 0);
+  const std::uint64_t sent = tank.message(0).sequence;
+  EnergyTankMessage restarted = from_peer(1, 0, 0.03);
   restarted.epoch = 8;
   restarted.answers_epoch = 0;
-  purse.receive(0, restarted);
-  EXPECT_EQ(purse.given(0), 0);
-  EXPECT_EQ(purse.taken(0), 0);
-  const PurseMessage answer = purse.message(0);
+  tank.receive(0, restarted);
+  EXPECT_EQ(tank.given(0), 0);
+  EXPECT_EQ(tank.taken(0), 0);
+  const EnergyTankMessage answer = tank.message(0);
   EXPECT_EQ(answer.answers_epoch, 8U);
   EXPECT_GT(answer.sequence, sent) << "the peer may have heard the former ones";
-  purse.receive(0, from_peer(10, 0, 0.03, 0.05));  // late, of the previous epoch
-  EXPECT_EQ(purse.settle(period_of(0, 0)).credit, 0);
-  EXPECT_EQ(purse.refused(), 0U);
+  tank.receive(0, from_peer(10, 0, 0.03, 0.05));  // late, of the previous epoch
+  EXPECT_EQ(tank.settle(period_of(0, 0)).credit, 0);
+  EXPECT_EQ(tank.refused(), 0U);
 }
 
 /// A new peer may have a lower epoch. The same peer must not be credited twice.
-TEST(Purse, ARenewedPurseHearsAnyPeerAndCountsNoTotalTwice) {
-  Purse purse({.max_power = 100, .max_account = 100});
-  purse.receive(0, from_peer(9, 1, 1, 2));
-  EXPECT_EQ(purse.settle(period_of(0, 0)).credit, 2);
-  purse.renew(2);
-  purse.receive(0, from_peer(10, 1, 1, 2.5));
-  EXPECT_EQ(purse.settle(period_of(0, 0)).credit, 0) << "it answers the epoch before";
-  purse.renew(3);
-  PurseMessage other = from_peer(1, 1, 1, 0.5);
+TEST(EnergyTank, ARenewedTankHearsAnyPeerAndCountsNoTotalTwice) {
+  EnergyTank tank({.max_power = 100, .max_account = 100});
+  tank.receive(0, from_peer(9, 1, 1, 2));
+  EXPECT_EQ(tank.settle(period_of(0, 0)).credit, 2);
+  tank.renew(2);
+  tank.receive(0, from_peer(10, 1, 1, 2.5));
+  EXPECT_EQ(tank.settle(period_of(0, 0)).credit, 0) << "it answers the epoch before";
+  tank.renew(3);
+  EnergyTankMessage other = from_peer(1, 1, 1, 0.5);
   other.epoch = 3;
   other.answers_epoch = 3;
-  purse.receive(0, other);
-  EXPECT_EQ(purse.settle(period_of(0, 0)).credit, 0.5) << "of a lower epoch than the one before";
-  EXPECT_EQ(purse.message(0).epoch, 3U);
+  tank.receive(0, other);
+  EXPECT_EQ(tank.settle(period_of(0, 0)).credit, 0.5) << "of a lower epoch than the one before";
+  EXPECT_EQ(tank.message(0).epoch, 3U);
 }
 
-TEST(Purse, TotalsThatAnswerAnEpochOfOursThatIsOverAreNotCounted) {
-  Purse restarted({.epoch = 2});
+TEST(EnergyTank, TotalsThatAnswerAnEpochOfOursThatIsOverAreNotCounted) {
+  EnergyTank restarted({.epoch = 2});
   restarted.receive(0, from_peer(50, 0, 0.03, 0.08));  // answers epoch 1, whose total is already spent
   EXPECT_EQ(restarted.settle(period_of(0, 0)).credit, 0);
-  PurseMessage anew = from_peer(51, 0, 0.03, 0.01);
+  EnergyTankMessage anew = from_peer(51, 0, 0.03, 0.01);
   anew.answers_epoch = 2;
   restarted.receive(0, anew);
   EXPECT_DOUBLE_EQ(restarted.settle(period_of(0, 0)).credit, 0.01);
 }
 
-TEST(Purse, AnAccountAboveTheMostIsDiscardedWhoeverEarnedIt) {
-  Purse purse({.max_account = 0.2});
-  const auto settlement = purse.settle(period_of(0.5, 0));
+TEST(EnergyTank, AnAccountAboveTheMostIsDiscardedWhoeverEarnedIt) {
+  EnergyTank tank({.max_account = 0.2});
+  const auto settlement = tank.settle(period_of(0.5, 0));
   EXPECT_DOUBLE_EQ(settlement.withdraw, 0.3);
-  EXPECT_DOUBLE_EQ(purse.discarded(), 0.3);
-  EXPECT_DOUBLE_EQ(purse.account(), 0.2);
+  EXPECT_DOUBLE_EQ(tank.discarded(), 0.3);
+  EXPECT_DOUBLE_EQ(tank.account(), 0.2);
 }
 
-TEST(Purse, AgainstAnyPeerItsOwnPortLosesNoMoreThanTheAllowance) {
+TEST(EnergyTank, AgainstAnyPeerItsOwnPortLosesNoMoreThanTheAllowance) {
   for (std::uint64_t seed = 1; seed <= 200; ++seed) {
     Dice dice(seed);
     const Friction friction{.coulomb = 0.02, .viscous = dice.decades(-1, 0)};
-    const Purse::Config config{.max_power = dice.decades(-1, 1), .max_account = dice.decades(-2, 0)};
-    Purse purse(config);
+    const EnergyTank::Config config{.max_power = dice.decades(-1, 1), .max_account = dice.decades(-2, 0)};
+    EnergyTank tank(config);
     Limiter limiter({.law = dice.chance(0.5) ? Law::kAol : Law::kAolPlus,
                      .friction = friction,
                      .longest_hold = milliseconds(1),
@@ -233,7 +233,7 @@ TEST(Purse, AgainstAnyPeerItsOwnPortLosesNoMoreThanTheAllowance) {
       limiter.observe({force, dx, milliseconds(1)});
       ledger.observe(force, dx, milliseconds(1));
       ASSERT_GE(ledger.energy(), -(config.max_account + config.max_power * n * 1e-3) - 1e-9) << "seed " << seed;
-      PurseMessage lie = from_peer(static_cast<std::uint64_t>(n), dice.within(-1e3, 1e3), dice.decades(-6, 3));
+      EnergyTankMessage lie = from_peer(static_cast<std::uint64_t>(n), dice.within(-1e3, 1e3), dice.decades(-6, 3));
       switch (static_cast<int>(dice.within(0, 7))) {
         case 0:
           lie.given = 1e6;
@@ -258,9 +258,9 @@ TEST(Purse, AgainstAnyPeerItsOwnPortLosesNoMoreThanTheAllowance) {
         default:
           lie.given = total += dice.decades(-4, 2);
       }
-      purse.receive(0, lie);
+      tank.receive(0, lie);
       const Vec3 wanted = dice.direction() * dice.decades(-1, 5);
-      share<3>(purse, limiter, wanted, milliseconds(1));
+      share<3>(tank, limiter, wanted, milliseconds(1));
       force = limiter.limit({wanted}).force;
       ASSERT_TRUE(force.allFinite());
       ASSERT_LE(force.norm(), most_force * (1 + 1e-9)) << "seed " << seed;
@@ -269,27 +269,27 @@ TEST(Purse, AgainstAnyPeerItsOwnPortLosesNoMoreThanTheAllowance) {
   }
 }
 
-TEST(Purse, AGreedyPeerGetsWhatThereIsAndNoMore) {
-  Purse purse({});
-  purse.receive(0, from_peer(1, 0, 1e3));
-  const auto settlement = purse.settle(period_of(0.1, 0.01));
+TEST(EnergyTank, AGreedyPeerGetsWhatThereIsAndNoMore) {
+  EnergyTank tank({});
+  tank.receive(0, from_peer(1, 0, 1e3));
+  const auto settlement = tank.settle(period_of(0.1, 0.01));
   EXPECT_LE(settlement.withdraw, 0.1);
   EXPECT_GT(settlement.withdraw, 0.0999);
 }
 
-TEST(Purse, APeriodThatIsNoNumberMovesNothing) {
-  Purse purse({});
-  purse.receive(0, from_peer(1, 0, 0.03, 0.01));
+TEST(EnergyTank, APeriodThatIsNoNumberMovesNothing) {
+  EnergyTank tank({});
+  tank.receive(0, from_peer(1, 0, 0.03, 0.01));
   for (const auto& bad : {period_of(kNan, 0), period_of(kInf, 0), period_of(0.1, kNan)}) {
-    const auto settlement = purse.settle(bad);
+    const auto settlement = tank.settle(bad);
     EXPECT_EQ(settlement.credit, 0);
     EXPECT_EQ(settlement.withdraw, 0);
   }
-  EXPECT_DOUBLE_EQ(purse.settle(period_of(0, 0)).credit, 0.01) << "it was kept";
+  EXPECT_DOUBLE_EQ(tank.settle(period_of(0, 0)).credit, 0.01) << "it was kept";
 }
 
-TEST(Purse, RefusesImpossibleConfigurations) {
-  expect_refusals(Purse::Config(), Makes<Purse>(),
+TEST(EnergyTank, RefusesImpossibleConfigurations) {
+  expect_refusals(EnergyTank::Config(), Makes<EnergyTank>(),
                   {
                       {"peers = 4: expected 1 to 3", [](auto& c) { c.peers = 4; }},
                       {"peers = 0: expected 1 to 3", [](auto& c) { c.peers = 0; }},
@@ -315,7 +315,7 @@ TEST(SharedAccount, OnlyTheAolFamilyHasOne) {
       EXPECT_EQ(why, "") << law.name;
     } else {
       EXPECT_EQ(why, "law \"" + std::string(law.name) +
-                         "\" has no energy account that a purse can share: expected aol, aol-box or aol+");
+                         "\" has no energy account that an energy tank can share: expected aol, aol-box or aol+");
     }
   }
 }
@@ -362,4 +362,4 @@ TEST(SharedAccount, WhatAolPlusNeedsCountsItsPartsIn) {
 }
 
 }  // namespace
-}  // namespace tendon::purse_test
+}  // namespace tendon::energy_tank_test
