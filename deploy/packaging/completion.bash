@@ -15,5 +15,5 @@ _tendon() {
   fi
 }
 complete -o default -F _tendon \
-  tendond tendon-inject tendon-softbody tendon-lab tendon-report tendon-identify tendon-replay tendon-conformance tendon-dash tendon-plug \
+  tendond tendon-inject tendon-softbody tendon-lab tendon-report tendon-identify tendon-replay tendon-conformance tendon-dash tendon-bridge \
   tendon-sweep tendon-worlds tendon-ship tendon-fem tendon-fem-worker tendon-mesh

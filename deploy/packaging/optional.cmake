@@ -237,7 +237,7 @@ tendon_package(node DEBIAN nodejs PROGRAM node RUN --version VERSION 18)
 tendon_package(cyclonedds DEBIAN cyclonedds-dev HEADERS dds/dds.h LIBRARIES ddsc
   PROBE "#include <dds/dds.h>\nint main() { return dds_create_participant(DDS_DOMAIN_DEFAULT, nullptr, nullptr) > 0 ? 0 : 1; }")
 tendon_package(idlc DEBIAN cyclonedds-tools PROGRAM idlc
-  RUN -t -x final -o . ${PROJECT_SOURCE_DIR}/clients/plug/ros2/ros2_types.idl)
+  RUN -t -x final -o . ${PROJECT_SOURCE_DIR}/clients/bridge/ros2/ros2_types.idl)
 # Version 3.2 is the first version that sends small messages immediately. It is not available in Debian 12.
 tendon_package(precice DEBIAN libprecice-dev PKG_CONFIG libprecice>=3.2 libprecice<4 HEADERS precice/precice.hpp
   PROBE "#include <precice/precice.hpp>\nint main() { precice::Participant(\"a\", \"b\", 0, 1).initialize(); }")

@@ -2,7 +2,7 @@
 # The contents of `cmake --install` and of the Debian packages that are created by `cpack`:
 #   tendon             the server and the tools, including sweeps and the upload of recordings. Its image can also run
 #                      the job of a sweep
-#   tendon-plug        bridges for existing programs, which do not need any other package
+#   tendon-bridge      bridges for existing programs, which do not need any other package
 #   libtendon-dev      the C++ library: find_package(tendon), tendon::client
 #   tendon-fem-worker  the only package that depends on PETSc and MPI, if the build has found them
 include(GNUInstallDirs)
@@ -31,10 +31,12 @@ if(TARGET tendon-fem-worker)
   install(TARGETS tendon-fem-worker COMPONENT worker)
   install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/tendon-fem-worker COMPONENT worker)
 endif()
-install(TARGETS tendon-plug COMPONENT plug)
+install(TARGETS tendon-bridge COMPONENT bridge)
+# The former name, for one release.
+install(PROGRAMS clients/bridge/tendon-plug DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT bridge)
 # The program searches for these libraries relative to its own folder.
-install(TARGETS hdPhantom HD LIBRARY DESTINATION lib/tendon/chai3d COMPONENT plug)
-install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/tendon-plug COMPONENT plug)
+install(TARGETS hdPhantom HD LIBRARY DESTINATION lib/tendon/chai3d COMPONENT bridge)
+install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/tendon-bridge COMPONENT bridge)
 # These files are only installed by the packages. `cmake --install` into a home folder does not change /etc.
 install(FILES deploy/udev/60-tendon.rules DESTINATION lib/udev/rules.d COMPONENT machine EXCLUDE_FROM_ALL)
 install(FILES deploy/systemd/tendond.service deploy/recordings/tendon-ship.service deploy/recordings/tendon-ship.timer
@@ -71,7 +73,7 @@ foreach(program ${programs})
   describe_program(${program} programs)
 endforeach()
 describe_program(tendon-ship programs ${ship})
-describe_program(tendon-plug plug)
+describe_program(tendon-bridge bridge)
 if(TARGET tendon-fem-worker)
   describe_program(tendon-fem-worker worker)
 endif()
@@ -112,7 +114,7 @@ set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
 set(CPACK_PACKAGE_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR}/packages)
 set(CPACK_STRIP_FILES ON)
 set(CPACK_DEB_COMPONENT_INSTALL ON)
-set(CPACK_COMPONENTS_ALL programs machine injector conformance plug development)
+set(CPACK_COMPONENTS_ALL programs machine injector conformance bridge development)
 if(TARGET tendon-fem-worker)
   list(APPEND CPACK_COMPONENTS_ALL worker)
 endif()
@@ -120,7 +122,7 @@ set(CPACK_COMPONENT_PROGRAMS_GROUP run)
 set(CPACK_COMPONENT_MACHINE_GROUP run)
 set(CPACK_COMPONENT_INJECTOR_GROUP run)
 set(CPACK_COMPONENT_CONFORMANCE_GROUP run)
-set(CPACK_COMPONENT_PLUG_GROUP plug)
+set(CPACK_COMPONENT_BRIDGE_GROUP bridge)
 set(CPACK_COMPONENT_DEVELOPMENT_GROUP dev)
 set(CPACK_COMPONENT_WORKER_GROUP worker)
 set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
@@ -138,10 +140,12 @@ set(CPACK_DEBIAN_RUN_DESCRIPTION "Networked haptics server with an energy-boundi
  Runs the control loop of a haptic device at 1 kHz. It limits each force so that the device never gives out more
  energy than it has received, even if the forces of remote physics engines are late, rare or wrong.")
 set(CPACK_DEBIAN_RUN_PACKAGE_CONTROL_EXTRA ${CMAKE_CURRENT_SOURCE_DIR}/deploy/packaging/conffiles)
-set(CPACK_DEBIAN_PLUG_PACKAGE_NAME tendon-plug)
-set(CPACK_DEBIAN_PLUG_PACKAGE_SECTION science)
-set(CPACK_DEBIAN_PLUG_PACKAGE_SHLIBDEPS ON)
-set(CPACK_DEBIAN_PLUG_DESCRIPTION "Haptic devices of a Tendon server for existing programs
+set(CPACK_DEBIAN_BRIDGE_PACKAGE_NAME tendon-bridge)
+set(CPACK_DEBIAN_BRIDGE_PACKAGE_CONFLICTS tendon-plug)
+set(CPACK_DEBIAN_BRIDGE_PACKAGE_REPLACES tendon-plug)
+set(CPACK_DEBIAN_BRIDGE_PACKAGE_SECTION science)
+set(CPACK_DEBIAN_BRIDGE_PACKAGE_SHLIBDEPS ON)
+set(CPACK_DEBIAN_BRIDGE_DESCRIPTION "Haptic devices of a Tendon server for existing programs
  Connects programs that use CHAI3D, VRPN, Inverse-compatible JSON or ROS 2 to the device of a Tendon server on the
  network. The energy of the device is bounded by an output limiter.")
 set(CPACK_DEBIAN_WORKER_PACKAGE_NAME tendon-fem-worker)

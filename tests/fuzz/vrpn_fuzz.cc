@@ -3,15 +3,15 @@
 #include <chrono>
 #include <cstdint>
 
-#include "clients/plug/vrpn/vrpn_peer.h"
-#include "tests/clients/plug/vrpn/program.h"
+#include "clients/bridge/vrpn/vrpn_peer.h"
+#include "tests/clients/bridge/vrpn/program.h"
 #include "tests/fuzz/target.h"
 
 // Data of a VRPN program in TCP fragments and datagrams. Rendered forces are finite, answers can be parsed, and stored
 // data stays within the limits.
 
 using namespace tendon;
-using namespace tendon::plug;
+using namespace tendon::bridge;
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   fuzz::Input input(data, size);

@@ -128,7 +128,7 @@ def built(name, folders):
 
 @functools.lru_cache(maxsize=None)
 def left_out(build):
-    """Returns the parts that are not in this build, such as "tendon-dash" and "tendon-plug inverse"."""
+    """Returns the parts that are not in this build, such as "tendon-dash" and "tendon-bridge inverse"."""
     listed = build / "left_out.txt"
     return {line.split(" (")[0] for line in listed.read_text(encoding="utf-8").splitlines()} if listed.exists() else set()
 

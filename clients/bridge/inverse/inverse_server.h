@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "clients/bridge/bridge_host.h"
+#include "clients/bridge/inverse/inverse_session.h"
+#include "protocol/link.h"
+
+namespace tendon::bridge {
+
+/// The WebSocket server of the bridge. It uses one thread; each client has an InverseSession, and all share one
+/// BridgeHost. Only the source file uses Boost.Beast and Boost.Asio.
+///
+/// * **Turns.** A turn reads at most kMostMessages of each client and 256 in total. Their forces are sent before the
+///   replies are written, and the replies contain the newest states.
+/// * **Messages** may be text or binary, because some clients send JSON as bytes. Replies are text.
+/// * **Limits.** Clients beyond `max_clients` receive status 503. A message above 64 kB closes the connection (1009).
+///   A client with more than `max_unread` bytes of unread replies is not read, and is closed after it has read
+///   nothing for `patience`. Connections without a complete request after `request_patience` are closed; at most 16
+///   may be waiting.
+/// * **Browsers.** Requests with an Origin must pass may_come_from() or receive status 403. Other programs send no
+///   Origin.
+/// * **Plain HTTP** requests receive status 404 with an explanation.
+///
+/// Thread-safe: no. Realtime-safe: no.
+class InverseServer {
+ public:
+  struct Config {
+    Address listen = parse_address("127.0.0.1:10001");  ///< port 0: chosen by the system
+    std::vector<std::string> origins{};                 ///< allowed origins of pages from other machines
+    std::size_t max_clients = 16;
+    std::size_t max_unread = 64 * 1024;  ///< bytes
+    Duration patience = std::chrono::seconds(1);
+    Duration request_patience = std::chrono::seconds(5);
+  };
+  static constexpr std::size_t kMostMessages = 64;  ///< of one client in one turn; 64 kB of replies for one device
+  using Clock = LocalTime (*)();
+
+  /// Starts to listen. The BridgeHost must outlive the server. Throws std::runtime_error: "cannot listen on
+  /// 127.0.0.1:10001: Address already in use".
+  InverseServer(Config config, BridgeHost& host, Clock clock);
+  ~InverseServer();
+
+  Address address() const;
+  const InverseCounts& counts() const noexcept;
+
+  /// Runs until SIGINT or SIGTERM, or for `duration` if it is > 0.
+  void run(Duration duration);
+
+ private:
+  struct State;  // hides Beast
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace tendon::bridge

@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "clients/bridge/view.h"
+#include "protocol/messages.h"
+
+namespace tendon::bridge {
+
+// ROS 2 messages as plain structs, independent of DDS. SI units. Wrenches act **on the hand**. The axes follow REP
+// 103 (x forward, y left, z up) in frame `NAME_base`, whose origin is that of the device.
+
+struct RosTime {
+  std::int32_t sec = 0;  ///< since 1970-01-01
+  std::uint32_t nanosec = 0;
+  bool operator==(const RosTime&) const = default;
+};
+struct RosHeader {
+  RosTime stamp;
+  std::string frame_id;
+};
+/// geometry_msgs/PoseStamped
+struct RosPose {
+  RosHeader header;
+  Vec3 position = Vec3::Zero();
+  Quat orientation;
+};
+/// geometry_msgs/TwistStamped
+struct RosTwist {
+  RosHeader header;
+  Vec3 linear = Vec3::Zero();
+  Vec3 angular = Vec3::Zero();
+};
+/// geometry_msgs/WrenchStamped
+struct RosWrench {
+  RosHeader header;
+  Vec3 force = Vec3::Zero();
+  Vec3 torque = Vec3::Zero();
+};
+/// sensor_msgs/Joy
+struct RosJoy {
+  RosHeader header;
+  std::vector<float> axes;
+  std::vector<std::int32_t> buttons;
+};
+/// sensor_msgs/JointState, without efforts
+struct RosJointState {
+  RosHeader header;
+  std::vector<std::string> name;
+  std::vector<double> position;
+  std::vector<double> velocity;
+};
+/// diagnostic_msgs/DiagnosticStatus
+struct RosDiagnosis {
+  enum class Level : std::uint8_t { kOk = 0, kWarn = 1, kError = 2 };
+  Level level = Level::kOk;
+  std::string name;
+  std::string message;
+  std::string hardware_id;
+  std::vector<std::pair<std::string, std::string>> values;
+};
+
+/// Requires `since_1970` ≥ 0.
+RosTime ros_time(Duration since_1970);
+
+/// Converts a device name for use in topics and frames: replaces all characters except ASCII letters, digits and "_"
+/// by "_", and inserts "_" before a leading digit.
+std::string ros_name(std::string_view device);
+
+/// Returns at most 64 bytes of `text`, with "?" in place of bytes that are not printable ASCII.
+std::string printable(std::string_view text);
+
+/// Transforms one device to the frames of ROS. Thread-safe, realtime-safe: no.
+class RosView {
+ public:
+  /// `name`: see ros_name(). Without a rotation, the device frame is assumed to equal the operator frame.
+  RosView(std::string_view name, const std::optional<Quat>& operator_from_device);
+
+  const std::string& base_id() const noexcept { return base_id_; }          ///< "right_base"
+  const std::string& operator_id() const noexcept { return operator_id_; }  ///< "right_operator"
+
+  /// The orientation is the identity if the device does not measure it.
+  RosPose pose(const DeviceState& state, RosTime stamp) const;
+  /// In the axes of the base. The angular velocity is 0 if it is not measured.
+  RosTwist twist(const DeviceState& state, RosTime stamp) const;
+  /// The force that the device applies; the torque is about the position of the handle.
+  RosWrench wrench(const DeviceState& state, RosTime stamp) const;
+
+  /// The force requested by a `wrench_command`.
+  struct Wish {
+    Vec3 force = Vec3::Zero();  ///< N and N·m, acting on the hand, device base frame
+    Vec3 torque = Vec3::Zero();
+  };
+  /// Converts a command, or returns the reason for rejecting it: `frame_id` must be "", NAME_base or NAME_operator (x
+  /// right, y up, z to the user), and all numbers finite. With `negate`, the message contains the force on a robot or
+  /// by the hand, and the hand receives the opposite force.
+  std::variant<Wish, std::string> wish(const RosWrench& command, bool negate) const;
+
+ private:
+  View base_;
+  View operator_;
+  std::string base_id_;
+  std::string operator_id_;
+};
+
+/// `buttons`: 1 while pressed, in the order of the handle description. `axes`: opening of the gripper if there is
+/// one, from 0 closed to 1 open, or in rad if its range is unknown.
+RosJoy joy_of(const DeviceState& state, const std::optional<HandleDescription>& handle, RosHeader header);
+
+/// Returns nullopt if the device measures no joints or has no names for them.
+std::optional<RosJointState> joints_of(const DeviceState& state, const std::optional<HandleDescription>& handle,
+                                       RosHeader header);
+
+}  // namespace tendon::bridge

@@ -1,0 +1,330 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "clients/bridge/ros2/ros2_node.h"
+
+#include <dds/dds.h>
+#include <ros2_types.h>
+#include <sys/eventfd.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <deque>
+#include <span>
+#include <stdexcept>
+#include <string_view>
+#include <system_error>
+#include <utility>
+
+namespace tendon::bridge {
+namespace {
+
+/// Participants of one machine use the first free index. ROS 2 creates one for each process.
+constexpr int kMostParticipants = 100;
+
+std::string configuration(const Ros2Node::Config& config) {
+  std::string interface = "address=\"127.0.0.1\"";
+  std::string multicast = "false";
+  std::vector<std::string> peers = config.peers;
+  if (config.interface.empty()) {
+    peers.emplace_back("127.0.0.1");
+  } else {
+    interface = "name=\"" + config.interface + "\"";
+    multicast = "true";
+  }
+  std::string xml =
+      "<CycloneDDS><Domain Id=\"any\"><General><Interfaces><NetworkInterface " + interface +
+      "/></Interfaces><AllowMulticast>" + multicast +
+      "</AllowMulticast></General><Discovery><SPDPInterval>1s</SPDPInterval><ParticipantIndex>auto</ParticipantIndex>"
+      "<MaxAutoParticipantIndex>" +
+      std::to_string(kMostParticipants - 1) + "</MaxAutoParticipantIndex><Peers>";
+  for (const std::string& peer : peers) xml += "<Peer Address=\"" + peer + "\"/>";
+  return xml + "</Peers></Discovery></Domain></CycloneDDS>";
+}
+
+dds_entity_t made(dds_entity_t entity, const std::string& what) {
+  if (entity < 0) throw std::runtime_error("DDS cannot create a " + what + ": " + dds_strretcode(entity));
+  return entity;
+}
+
+class Qos {
+ public:
+  explicit Qos(dds_reliability_kind_t reliability) : qos_(dds_create_qos()) {
+    static constexpr dds_data_representation_id_t kXcdr1 = DDS_DATA_REPRESENTATION_XCDR1;
+    dds_qset_reliability(qos_, reliability, 0);
+    dds_qset_history(qos_, DDS_HISTORY_KEEP_LAST, 1);
+    dds_qset_durability(qos_, DDS_DURABILITY_VOLATILE);
+    dds_qset_data_representation(qos_, 1, &kXcdr1);
+  }
+  ~Qos() { dds_delete_qos(qos_); }
+  Qos(const Qos&) = delete;
+  Qos& operator=(const Qos&) = delete;
+  const dds_qos_t* get() const noexcept { return qos_; }
+
+ private:
+  dds_qos_t* qos_;
+};
+
+// ---- Conversion to the structures of DDS. They are only read during dds_write. --------------------------------
+
+char* text_of(const std::string& text) { return const_cast<char*>(text.c_str()); }  // NOLINT: it only reads
+
+template <class Sequence, class Element>
+Sequence sequence_of(const std::vector<Element>& elements) {
+  Sequence sequence{};
+  sequence._maximum = sequence._length = static_cast<std::uint32_t>(elements.size());
+  sequence._buffer = const_cast<Element*>(elements.data());  // NOLINT: it only reads
+  sequence._release = false;
+  return sequence;
+}
+
+std_msgs_msg_dds__Header_ dds_of(const RosHeader& header) {
+  return {{header.stamp.sec, header.stamp.nanosec}, text_of(header.frame_id)};
+}
+geometry_msgs_msg_dds__Vector3_ dds_of(const Vec3& v) { return {v.x(), v.y(), v.z()}; }
+
+geometry_msgs_msg_dds__PoseStamped_ dds_of(const RosPose& pose) {
+  const Quat& q = pose.orientation;
+  return {dds_of(pose.header), {{pose.position.x(), pose.position.y(), pose.position.z()}, {q.x, q.y, q.z, q.w}}};
+}
+geometry_msgs_msg_dds__TwistStamped_ dds_of(const RosTwist& twist) {
+  return {dds_of(twist.header), {dds_of(twist.linear), dds_of(twist.angular)}};
+}
+geometry_msgs_msg_dds__WrenchStamped_ dds_of(const RosWrench& wrench) {
+  return {dds_of(wrench.header), {dds_of(wrench.force), dds_of(wrench.torque)}};
+}
+sensor_msgs_msg_dds__Joy_ dds_of(const RosJoy& joy) {
+  sensor_msgs_msg_dds__Joy_ dds{};
+  dds.header = dds_of(joy.header);
+  dds.axes = sequence_of<decltype(dds.axes)>(joy.axes);
+  dds.buttons = sequence_of<decltype(dds.buttons)>(joy.buttons);
+  return dds;
+}
+
+Vec3 vector_of(const geometry_msgs_msg_dds__Vector3_& v) { return {v.x, v.y, v.z}; }
+
+/// Returns "publisher" and the beginning of the GUID, which is unique for each program.
+std::string name_of(const dds_guid_t& guid) {
+  std::array<char, 40> text{};
+  std::snprintf(text.data(), text.size(), "publisher %02x%02x%02x%02x.%02x%02x%02x%02x.%02x%02x%02x%02x", guid.v[0],
+                guid.v[1], guid.v[2], guid.v[3], guid.v[4], guid.v[5], guid.v[6], guid.v[7], guid.v[8], guid.v[9],
+                guid.v[10], guid.v[11]);
+  return text.data();
+}
+
+// ---- Shared with the threads of DDS ----------------------------------------------------------------------
+
+class Bell {
+ public:
+  Bell() : descriptor_(::eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)) {
+    if (descriptor_ < 0) throw std::system_error(errno, std::generic_category(), "eventfd");
+  }
+  ~Bell() { ::close(descriptor_); }
+  Bell(const Bell&) = delete;
+  Bell& operator=(const Bell&) = delete;
+  int descriptor() const noexcept { return descriptor_; }
+  void ring() const noexcept { ::eventfd_write(descriptor_, 1); }
+  void clear() const noexcept {
+    eventfd_t count = 0;
+    ::eventfd_read(descriptor_, &count);
+  }
+
+ private:
+  int descriptor_;
+};
+
+struct Ears {
+  explicit Ears(const Bell& of_all) : bell(of_all) {}
+  const Bell& bell;
+  std::atomic<std::uint64_t> arrived{0};
+  std::atomic<bool> matched{false};
+};
+
+void on_data(dds_entity_t, void* ears) {
+  auto& of_reader = *static_cast<Ears*>(ears);
+  of_reader.arrived.fetch_add(1, std::memory_order_relaxed);
+  of_reader.bell.ring();
+}
+
+void on_match(dds_entity_t, const dds_subscription_matched_status_t, void* ears) {
+  auto& of_reader = *static_cast<Ears*>(ears);
+  of_reader.matched.store(true, std::memory_order_release);
+  of_reader.bell.ring();
+}
+
+}  // namespace
+
+struct Ros2Node::State {
+  struct Device {
+    explicit Device(const Bell& bell) : ears(bell) {}
+    dds_entity_t pose = 0;
+    dds_entity_t twist = 0;
+    dds_entity_t wrench = 0;
+    dds_entity_t joy = 0;
+    dds_entity_t joints = 0;
+    dds_entity_t servo = 0;  ///< 0: none
+    dds_entity_t commands = 0;
+    Ears ears;
+    std::uint64_t taken = 0;
+  };
+
+  dds_entity_t topic(const std::string& name, const dds_topic_descriptor_t& type) const {
+    return made(dds_create_topic(participant, &type, ("rt/" + name).c_str(), nullptr, nullptr), "topic " + name);
+  }
+  dds_entity_t writer(const std::string& name, const dds_topic_descriptor_t& type) const {
+    const Qos qos(DDS_RELIABILITY_RELIABLE);
+    return made(dds_create_writer(participant, topic(name, type), qos.get(), nullptr), "writer of " + name);
+  }
+  dds_entity_t reader(const std::string& name, const dds_topic_descriptor_t& type, Ears& ears) const {
+    const Qos qos(DDS_RELIABILITY_BEST_EFFORT);
+    dds_listener_t* listener = dds_create_listener(nullptr);
+    dds_lset_data_available_arg(listener, on_data, &ears, true);
+    dds_lset_subscription_matched_arg(listener, on_match, &ears, true);
+    const dds_entity_t entity = dds_create_reader(participant, topic(name, type), qos.get(), listener);
+    dds_delete_listener(listener);
+    return made(entity, "reader of " + name);
+  }
+  template <class Message>
+  void write(dds_entity_t writer, const Message& message) {
+    ++(dds_write(writer, &message) == DDS_RETCODE_OK ? published : unsent);
+  }
+
+  Bell bell;
+  dds_entity_t domain = 0;
+  dds_entity_t participant = 0;
+  dds_entity_t diagnostics = 0;
+  std::deque<Device> devices;
+  std::uint64_t published = 0;
+  std::uint64_t unsent = 0;
+};
+
+Ros2Node::Ros2Node(const Config& config) : state_(std::make_unique<State>()) {
+  const std::string in_domain = "participant in domain " + std::to_string(config.domain) + " on " +
+                                (config.interface.empty() ? "the loopback" : config.interface);
+  state_->domain = made(dds_create_domain(config.domain, configuration(config).c_str()), in_domain);
+  try {
+    state_->participant = made(dds_create_participant(config.domain, nullptr, nullptr), in_domain);
+    state_->diagnostics = state_->writer("diagnostics", diagnostic_msgs_msg_dds__DiagnosticArray__desc);
+    for (const std::string& name : config.devices) {
+      State::Device& device = state_->devices.emplace_back(state_->bell);
+      const std::string under = "tendon/" + name + "/";
+      device.pose = state_->writer(under + "pose", geometry_msgs_msg_dds__PoseStamped__desc);
+      device.twist = state_->writer(under + "twist", geometry_msgs_msg_dds__TwistStamped__desc);
+      device.wrench = state_->writer(under + "wrench", geometry_msgs_msg_dds__WrenchStamped__desc);
+      device.joy = state_->writer(under + "joy", sensor_msgs_msg_dds__Joy__desc);
+      device.joints = state_->writer(under + "joint_states", sensor_msgs_msg_dds__JointState__desc);
+      if (config.servo == RosServo::Kind::kTwist) {
+        device.servo = state_->writer(under + "servo_twist", geometry_msgs_msg_dds__TwistStamped__desc);
+      } else if (config.servo == RosServo::Kind::kPose) {
+        device.servo = state_->writer(under + "servo_pose", geometry_msgs_msg_dds__PoseStamped__desc);
+      }
+      device.commands =
+          state_->reader(under + "wrench_command", geometry_msgs_msg_dds__WrenchStamped__desc, device.ears);
+    }
+  } catch (...) {
+    dds_delete(state_->domain);
+    throw;
+  }
+}
+
+Ros2Node::~Ros2Node() { dds_delete(state_->domain); }
+
+int Ros2Node::descriptor() const noexcept { return state_->bell.descriptor(); }
+void Ros2Node::clear() { state_->bell.clear(); }
+
+std::optional<Ros2Node::Command> Ros2Node::take(std::size_t i) {
+  State::Device& device = state_->devices[i];
+  std::optional<Command> newest;
+  for (;;) {
+    std::array<void*, 1> samples{};
+    std::array<dds_sample_info_t, 1> infos{};
+    if (dds_take(device.commands, samples.data(), infos.data(), 1, 1) != 1) return newest;
+    if (infos[0].valid_data) {
+      ++device.taken;
+      const auto& message = *static_cast<const geometry_msgs_msg_dds__WrenchStamped_*>(samples[0]);
+      newest = Command{.writer = infos[0].publication_handle,
+                       .called = {},
+                       .wrench = {.header = {{message.header.stamp.sec, message.header.stamp.nanosec},
+                                             message.header.frame_id == nullptr ? "" : message.header.frame_id},
+                                  .force = vector_of(message.wrench.force),
+                                  .torque = vector_of(message.wrench.torque)}};
+      newest->called = "a publisher";
+      if (dds_builtintopic_endpoint_t* about =
+              dds_get_matched_publication_data(device.commands, infos[0].publication_handle)) {
+        newest->called = name_of(about->participant_key);
+        dds_builtintopic_free_endpoint(about);
+      }
+    }
+    dds_return_loan(device.commands, samples.data(), 1);
+  }
+}
+
+std::optional<std::vector<std::uint64_t>> Ros2Node::writers_if_changed(std::size_t i) {
+  State::Device& device = state_->devices[i];
+  if (!device.ears.matched.exchange(false, std::memory_order_acq_rel)) return {};
+  std::vector<std::uint64_t> writers;
+  for (;;) {
+    const dds_return_t count = dds_get_matched_publications(device.commands, writers.data(), writers.size());
+    const auto found = static_cast<std::size_t>(std::max(count, 0));
+    const bool all = found <= writers.size();
+    writers.resize(found);
+    if (all) return writers;
+  }
+}
+
+void Ros2Node::publish(std::size_t i, const RosDevice::Messages& messages) {
+  const State::Device& device = state_->devices[i];
+  if (messages.pose) state_->write(device.pose, dds_of(*messages.pose));
+  if (messages.twist) state_->write(device.twist, dds_of(*messages.twist));
+  if (messages.wrench) state_->write(device.wrench, dds_of(*messages.wrench));
+  if (messages.joy) state_->write(device.joy, dds_of(*messages.joy));
+  if (messages.servo.twist) state_->write(device.servo, dds_of(*messages.servo.twist));
+  if (messages.servo.pose) state_->write(device.servo, dds_of(*messages.servo.pose));
+  if (messages.joints) {
+    std::vector<char*> names;
+    for (const std::string& name : messages.joints->name) names.push_back(text_of(name));
+    sensor_msgs_msg_dds__JointState_ dds{};
+    dds.header = dds_of(messages.joints->header);
+    dds.name = sequence_of<decltype(dds.name)>(names);
+    dds.position = sequence_of<decltype(dds.position)>(messages.joints->position);
+    dds.velocity = sequence_of<decltype(dds.velocity)>(messages.joints->velocity);
+    state_->write(device.joints, dds);
+  }
+}
+
+void Ros2Node::publish(const std::vector<RosDiagnosis>& diagnoses, RosTime stamp) {
+  std::deque<std::vector<diagnostic_msgs_msg_dds__KeyValue_>> values;
+  std::vector<diagnostic_msgs_msg_dds__DiagnosticStatus_> status;
+  for (const RosDiagnosis& one : diagnoses) {
+    auto& of_one = values.emplace_back();
+    for (const auto& [key, value] : one.values) of_one.push_back({text_of(key), text_of(value)});
+    auto& dds = status.emplace_back();
+    dds.level = static_cast<std::uint8_t>(one.level);
+    dds.name = text_of(one.name);
+    dds.message = text_of(one.message);
+    dds.hardware_id = text_of(one.hardware_id);
+    dds.values = sequence_of<decltype(dds.values)>(of_one);
+  }
+  const RosHeader header{stamp, {}};
+  diagnostic_msgs_msg_dds__DiagnosticArray_ dds{};
+  dds.header = dds_of(header);
+  dds.status = sequence_of<decltype(dds.status)>(status);
+  state_->write(state_->diagnostics, dds);
+}
+
+std::uint64_t Ros2Node::published() const noexcept { return state_->published; }
+std::uint64_t Ros2Node::unsent() const noexcept { return state_->unsent; }
+
+std::uint64_t Ros2Node::superseded() const noexcept {
+  std::uint64_t all = 0;
+  for (const State::Device& device : state_->devices) {
+    const std::uint64_t arrived = device.ears.arrived.load(std::memory_order_relaxed);
+    all += arrived > device.taken ? arrived - device.taken : 0;
+  }
+  return all;
+}
+
+}  // namespace tendon::bridge
