@@ -38,7 +38,7 @@ void Feed::leave(PageId page) {
   counts_.pages = pages_.size();
 }
 
-bool Feed::hear(LocalTime now, PageId id, std::string_view line) {
+bool Feed::receive(LocalTime now, PageId id, std::string_view line) {
   const auto found = pages_.find(id);
   if (found == pages_.end()) return false;
   Page& page = found->second;

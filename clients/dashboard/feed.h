@@ -41,7 +41,7 @@ class Feed {
   std::size_t pages() const noexcept { return pages_.size(); }
 
   /// Handles a line from a page. Returns false if it is invalid or too frequent; the page should then be closed.
-  bool hear(LocalTime now, PageId page, std::string_view line);
+  bool receive(LocalTime now, PageId page, std::string_view line);
   void tick(LocalTime now);
   /// Returns the next text for a page, if any.
   std::optional<std::string> next(PageId page);

@@ -49,7 +49,7 @@ bool FoxgloveFeed::wants_states() const {
   });
 }
 
-bool FoxgloveFeed::hear(LocalTime now, ClientId client, std::string_view text) {
+bool FoxgloveFeed::receive(LocalTime now, ClientId client, std::string_view text) {
   const auto found = clients_.find(client);
   if (found == clients_.end() || !found->second.orders.take(now)) return false;
   FoxgloveSession& session = found->second.session;

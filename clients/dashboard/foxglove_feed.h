@@ -56,7 +56,7 @@ class FoxgloveFeed {
 
   /// Handles a text message. Returns false if messages are too frequent or too many texts are waiting; the client
   /// should then be closed. Invalid messages are answered with a status.
-  bool hear(LocalTime now, ClientId client, std::string_view text);
+  bool receive(LocalTime now, ClientId client, std::string_view text);
   /// Collects changes from the board. Must be called after each turn of the Observer and before Feed::tick, which
   /// removes the states.
   void take(LocalTime now);

@@ -328,8 +328,8 @@ class Connection {
             if (gate_->passes(now, bytes, web_socket_->got_binary())) server_->send(bytes);
           } else {
             const std::string_view text(static_cast<const char*>(message_.data().data()), message_.data().size());
-            const bool heard = !web_socket_->got_binary() && (viewer_ ? shared_.foxglove.hear(now, *viewer_, text)
-                                                                      : shared_.feed.hear(now, *page_, text));
+            const bool heard = !web_socket_->got_binary() && (viewer_ ? shared_.foxglove.receive(now, *viewer_, text)
+                                                                      : shared_.feed.receive(now, *page_, text));
             if (!heard) return close();
             pump();
           }

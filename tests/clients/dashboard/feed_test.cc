@@ -75,7 +75,7 @@ TEST_F(FeedTest, TellsEachPageOfTheDeviceThatItLooksAt) {
   tick();
   all(left);
   all(right);
-  EXPECT_TRUE(feed_.hear(now_, right, "watch 1"));
+  EXPECT_TRUE(feed_.receive(now_, right, "watch 1"));
   states(0, 3);
   states(1, 5);
   tick();
@@ -91,7 +91,7 @@ TEST_F(FeedTest, TellsEachPageOfTheDeviceThatItLooksAt) {
 TEST_F(FeedTest, TellsOfTheOtherDevicesBesideWhereAPageAsks) {
   const auto page = feed_.join(now_);
   const auto plain = feed_.join(now_);
-  EXPECT_TRUE(feed_.hear(now_, page, "watch 1 beside"));
+  EXPECT_TRUE(feed_.receive(now_, page, "watch 1 beside"));
   tick();
   all(page);
   all(plain);
@@ -107,7 +107,7 @@ TEST_F(FeedTest, TellsOfTheOtherDevicesBesideWhereAPageAsks) {
   EXPECT_EQ(texts[1]["device"], 1);
   EXPECT_EQ(texts[1]["tick"].size(), 5U);
   for (const json& text : all(plain)) EXPECT_EQ(text.at("device"), 0);
-  EXPECT_TRUE(feed_.hear(now_, page, "watch 1"));
+  EXPECT_TRUE(feed_.receive(now_, page, "watch 1"));
   states(0, 1);
   tick();
   EXPECT_EQ(types(all(page)), Types{"reports"});
@@ -116,7 +116,7 @@ TEST_F(FeedTest, TellsOfTheOtherDevicesBesideWhereAPageAsks) {
 TEST_F(FeedTest, TellsOfTheCouplingOfTheWatchedDevice) {
   const auto left = feed_.join(now_);
   const auto right = feed_.join(now_);
-  EXPECT_TRUE(feed_.hear(now_, right, "watch 1"));
+  EXPECT_TRUE(feed_.receive(now_, right, "watch 1"));
   tick();
   all(left);
   all(right);
@@ -131,7 +131,7 @@ TEST_F(FeedTest, TellsOfTheCouplingOfTheWatchedDevice) {
   EXPECT_TRUE(all(left).empty());
   board_.observe(both_ends().own);
   tick();
-  EXPECT_TRUE(feed_.hear(now_, left, "watch 1"));
+  EXPECT_TRUE(feed_.receive(now_, left, "watch 1"));
   tick();
   EXPECT_EQ(types(all(left)), Types{"reports"}) << "of the device before";
 }
@@ -165,20 +165,20 @@ TEST_F(FeedTest, SendsAwayWhoSpeaksAnotherLanguage) {
        {"", "watch", "watch ", "watch -1", "watch 16", "watch 1 ", "watch 1e1", "watch beside", " beside",
         "watch 1 beside beside", "watch 99999999999", "hello", "arm 0", "{\"type\":\"watch\"}"}) {
     const auto page = feed_.join(now_);
-    EXPECT_FALSE(feed_.hear(now_, page, line)) << line;
+    EXPECT_FALSE(feed_.receive(now_, page, line)) << line;
     feed_.leave(page);
   }
-  EXPECT_FALSE(feed_.hear(now_, 12345, "watch 0")) << "nobody";
+  EXPECT_FALSE(feed_.receive(now_, 12345, "watch 0")) << "nobody";
   EXPECT_EQ(counts_.pages, 0U);
 }
 
 TEST_F(FeedTest, SendsAwayWhoSpeaksTooFast) {
   const auto page = feed_.join(now_);
-  EXPECT_TRUE(feed_.hear(now_, page, "watch 1"));
-  EXPECT_TRUE(feed_.hear(now_, page, "watch 0"));
-  EXPECT_FALSE(feed_.hear(now_, page, "watch 1"));
+  EXPECT_TRUE(feed_.receive(now_, page, "watch 1"));
+  EXPECT_TRUE(feed_.receive(now_, page, "watch 0"));
+  EXPECT_FALSE(feed_.receive(now_, page, "watch 1"));
   now_ += std::chrono::seconds(1);
-  EXPECT_TRUE(feed_.hear(now_, page, "watch 1"));
+  EXPECT_TRUE(feed_.receive(now_, page, "watch 1"));
 }
 
 }  // namespace

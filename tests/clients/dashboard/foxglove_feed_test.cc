@@ -66,8 +66,9 @@ class FoxgloveFeedTest : public testing::Test {
   bool subscribe(FoxgloveFeed::ClientId client, std::uint32_t subscription, const std::string& topic) {
     const std::uint32_t id = channel(client, topic);
     return id > 0 &&
-           feed_.hear(now_, client,
-                      json{{"op", "subscribe"}, {"subscriptions", {{{"id", subscription}, {"channelId", id}}}}}.dump());
+           feed_.receive(
+               now_, client,
+               json{{"op", "subscribe"}, {"subscriptions", {{{"id", subscription}, {"channelId", id}}}}}.dump());
   }
   static std::uint64_t tick_of(const std::string& data) {
     recording::v1::Step step;
@@ -155,7 +156,7 @@ TEST_F(FoxgloveFeedTest, WantsStatesOnlyWhileSomebodySubscribesToThem) {
   for (const char* topic : {"/haptic/step", "/right/haptic/step", "/tf", "/right/scene"}) {
     ASSERT_TRUE(subscribe(client, 2, topic));
     EXPECT_TRUE(feed_.wants_states()) << topic;
-    EXPECT_TRUE(feed_.hear(now_, client, R"({"op":"unsubscribe","subscriptionIds":[2]})"));
+    EXPECT_TRUE(feed_.receive(now_, client, R"({"op":"unsubscribe","subscriptionIds":[2]})"));
     EXPECT_FALSE(feed_.wants_states()) << topic;
   }
   ASSERT_TRUE(subscribe(client, 2, "/tf"));
@@ -252,21 +253,21 @@ TEST_F(FoxgloveFeedTest, AnotherServersDevicesTakeThePlaceOfTheOld) {
 TEST_F(FoxgloveFeedTest, ObjectsInSentencesAndClosesWhoDoesNotStop) {
   const auto client = feed_.join(now_);
   told(client);
-  EXPECT_TRUE(feed_.hear(now_, client, "hello"));
-  EXPECT_TRUE(feed_.hear(now_, client, R"({"op":"subscribe","subscriptions":[{"id":1,"channelId":99}]})"));
-  EXPECT_TRUE(feed_.hear(now_, client, R"({"op":"unsubscribe","subscriptionIds":[5]})"));
+  EXPECT_TRUE(feed_.receive(now_, client, "hello"));
+  EXPECT_TRUE(feed_.receive(now_, client, R"({"op":"subscribe","subscriptions":[{"id":1,"channelId":99}]})"));
+  EXPECT_TRUE(feed_.receive(now_, client, R"({"op":"unsubscribe","subscriptionIds":[5]})"));
   const auto texts = told(client).texts;
   ASSERT_EQ(texts.size(), 3U);
   EXPECT_EQ(texts[1]["message"], "There is no channel 99.");
   EXPECT_EQ(texts[2]["message"], "There is no subscription 5.");
   std::string many = R"({"op":"unsubscribe","subscriptionIds":[0)";
   for (int i = 1; i < 1000; ++i) many += "," + std::to_string(i);
-  EXPECT_FALSE(feed_.hear(now_, client, many + "]}")) << "it does not read what it is told";
+  EXPECT_FALSE(feed_.receive(now_, client, many + "]}")) << "it does not read what it is told";
   const auto second = feed_.join(now_);
   int heard = 0;
-  while (feed_.hear(now_, second, R"({"op":"subscribe","subscriptions":[]})") && heard < 1000) ++heard;
+  while (feed_.receive(now_, second, R"({"op":"subscribe","subscriptions":[]})") && heard < 1000) ++heard;
   EXPECT_EQ(heard, 200) << "a tenth of what is permitted in a second, at once";
-  EXPECT_FALSE(feed_.hear(now_, 99, "{}")) << "nobody";
+  EXPECT_FALSE(feed_.receive(now_, 99, "{}")) << "nobody";
 }
 
 }  // namespace

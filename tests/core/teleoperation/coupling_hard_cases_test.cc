@@ -202,7 +202,7 @@ TEST(CouplingHardCases, AFollowerForgetsThemToo) {
   config.tank.reset();
   Played played(config);
   const auto period = [&](PortPhase leader, std::uint64_t act, const Vec3& dx, double payable) {
-    played.hear(played.state(leader, act));
+    played.receive(played.state(leader, act));
     played.port.observe({Vec3::Zero(), dx, std::chrono::milliseconds(1)}, payable);
     played.step();
   };

@@ -187,10 +187,10 @@ TEST(Coupling, AnActFromBeforeTheLossThatComesAfterItEngagesNobody) {
 TEST(Coupling, AFaultAfterTheLossDoesNotMakeThePeerKnowOfIt) {
   Played follower(coupling_of(PortRole::kFollower));
   follower.step();
-  follower.hear(follower.state(PortPhase::kCoupled));
+  follower.receive(follower.state(PortPhase::kCoupled));
   follower.step();
   const PortState then = follower.state(PortPhase::kEngaged, 1);
-  follower.hear(then);
+  follower.receive(then);
   follower.step();
   ASSERT_TRUE(follower.port.live());
   for (int n = 0; n < 300; ++n) follower.step();
@@ -199,11 +199,11 @@ TEST(Coupling, AFaultAfterTheLossDoesNotMakeThePeerKnowOfIt) {
   for (int n = 0; n < 20; ++n) {
     PortState act = follower.state(PortPhase::kEngaged, 2);
     act.answers = then.answers;  // issued before the loss
-    follower.hear(act);
+    follower.receive(act);
     follower.step();
     EXPECT_EQ(follower.port.phase(), PortPhase::kAlone);
   }
-  follower.hear(follower.state(PortPhase::kCoupled, 2));
+  follower.receive(follower.state(PortPhase::kCoupled, 2));
   follower.step();
   EXPECT_EQ(follower.port.phase(), PortPhase::kCoupled) << "the leader knows";
 }
@@ -225,13 +225,13 @@ TEST(Coupling, AnAnswerToAFormerActOrToAFormerLeaderIsNone) {
   config.spring.epoch = 2;
   Played leader(config);
   leader.step();
-  leader.hear(leader.state(PortPhase::kCoupled));
+  leader.receive(leader.state(PortPhase::kCoupled));
   leader.step();
   ASSERT_TRUE(leader.port.engage());
   leader.step();
   PortState old = leader.state(PortPhase::kEngaged, 1);
   old.answers_epoch = 1;
-  leader.hear(old);
+  leader.receive(old);
   leader.step();
   EXPECT_FALSE(leader.port.live());
 }

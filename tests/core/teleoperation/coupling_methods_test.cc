@@ -239,9 +239,9 @@ TEST(CouplingMethods, APeerThatLiesAboutItsWavesGivesNoMoreThanTheyMayBe) {
   config.spring.max_force = 5;
   config.tank.reset();
   Played played(config);
-  played.hear(played.state(PortPhase::kCoupled));
+  played.receive(played.state(PortPhase::kCoupled));
   played.step();
-  played.hear(played.state(PortPhase::kCoupled));
+  played.receive(played.state(PortPhase::kCoupled));
   played.step();
   ASSERT_TRUE(played.port.engage());
   played.step();
@@ -250,7 +250,7 @@ TEST(CouplingMethods, APeerThatLiesAboutItsWavesGivesNoMoreThanTheyMayBe) {
     auto lie = played.state(PortPhase::kEngaged, 1);
     lie.wave_integral = Vec3(1e9 * i, 0, 0);
     lie.wave_energy = 1e6;
-    played.hear(lie);
+    played.receive(lie);
     played.port.observe({Vec3::Zero(), Vec3::Zero(), std::chrono::milliseconds(1)}, 1);
     EXPECT_LE(played.step().force.norm(), 5 * (1 + 1e-12));
     credited += played.port.settle(1, 0, std::chrono::milliseconds(1)).credit;

@@ -177,7 +177,7 @@ class PlayedPassivity {
       peer.epoch = epoch;
       peer.position = Vec3(at, 0, 0);
       peer.energy_in = energy_in;
-      played.hear(peer);
+      played.receive(peer);
       demand = played.port.command({Port::at(played.now++), Vec3::Zero(), Vec3::Zero()}, 0, true);
       played.port.conclude(demand.force, std::nullopt);
       played.told = played.port.message();
@@ -275,7 +275,7 @@ class PlayedRate {
   double period(PortPhase phase, double handle) {
     auto peer = played.state(phase, phase == PortPhase::kCoupled ? 0 : 1);
     peer.position = Vec3(handle, 0, 0);
-    played.hear(peer);
+    played.receive(peer);
     return played.step().force.x();
   }
 

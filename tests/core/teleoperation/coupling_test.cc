@@ -137,16 +137,16 @@ TEST(Coupling, AnotherLeaderIsHeardAfterARenewalAndEngagesByItsOwnAct) {
 TEST(Coupling, AnActThatAFollowerHeardInItsFaultNeverEngagesIt) {
   Played follower(coupling_of(PortRole::kFollower));
   follower.step();
-  follower.hear(follower.state(PortPhase::kCoupled));
+  follower.receive(follower.state(PortPhase::kCoupled));
   follower.step();
-  follower.hear(follower.state(PortPhase::kEngaged, 1));
+  follower.receive(follower.state(PortPhase::kEngaged, 1));
   follower.step(Vec3::Zero(), 0, false);
   for (int n = 0; n < 100; ++n) {
-    follower.hear(follower.state(PortPhase::kEngaged, 1));
+    follower.receive(follower.state(PortPhase::kEngaged, 1));
     follower.step();
     EXPECT_EQ(follower.port.phase(), PortPhase::kCoupled);
   }
-  follower.hear(follower.state(PortPhase::kEngaged, 2));
+  follower.receive(follower.state(PortPhase::kEngaged, 2));
   follower.step();
   EXPECT_TRUE(follower.port.live()) << "another act";
 }
@@ -155,7 +155,7 @@ TEST(Coupling, ALeaderWaitsForTheAnswerButNotForOneThatDeclines) {
   const auto engaged = [] {
     Played leader(coupling_of(PortRole::kLeader));
     leader.step();
-    leader.hear(leader.state(PortPhase::kCoupled));
+    leader.receive(leader.state(PortPhase::kCoupled));
     leader.step();
     EXPECT_TRUE(leader.port.engage());
     leader.step();
@@ -166,21 +166,21 @@ TEST(Coupling, ALeaderWaitsForTheAnswerButNotForOneThatDeclines) {
   for (; leader.port.phase() == PortPhase::kEngaged && waited < 100'000; ++waited) {
     PortState late = leader.state(PortPhase::kCoupled);
     late.answers = 2;  // it was sent before the engagement was received
-    leader.hear(late);
+    leader.receive(late);
     leader.step();
   }
   EXPECT_EQ(leader.port.phase(), PortPhase::kCoupled);
   EXPECT_NEAR(waited, 1e3 * seconds(Coupling::kAnswerWithin), 1);
 
   leader = engaged();
-  leader.hear(leader.state(PortPhase::kCoupled));
+  leader.receive(leader.state(PortPhase::kCoupled));
   leader.step();
   EXPECT_EQ(leader.port.phase(), PortPhase::kCoupled) << "it heard the act and is not engaged";
 
   leader = engaged();
   PortState fault = leader.state(PortPhase::kFault);
   fault.answers = 2;
-  leader.hear(fault);
+  leader.receive(fault);
   leader.step();
   EXPECT_EQ(leader.port.phase(), PortPhase::kCoupled) << "it cannot answer";
 }
@@ -297,12 +297,12 @@ TEST(Coupling, AStateWithAValueOutOfItsBoundsChangesNothing) {
     leader.step();
     PortState good = leader.state(PortPhase::kCoupled);
     good.given = 0.002;
-    leader.hear(good);
+    leader.receive(good);
     leader.step();
     PortState bad = leader.state(PortPhase::kFault);
     bad.given = 0.003;
     changes[n](bad);
-    leader.hear(bad);
+    leader.receive(bad);
     EXPECT_EQ(leader.port.refused(), 1U) << n;
     leader.step();
     EXPECT_TRUE(leader.port.engage()) << n << ": it would be refused after a fault";
@@ -310,7 +310,7 @@ TEST(Coupling, AStateWithAValueOutOfItsBoundsChangesNothing) {
     EXPECT_EQ(leader.told.taken, 0.002) << n;
     PortState next = leader.state(PortPhase::kCoupled);
     next.given = 0.003;
-    leader.hear(next);
+    leader.receive(next);
     EXPECT_EQ(leader.port.refused(), 1U) << n << ": a good one is heard again";
   }
 }

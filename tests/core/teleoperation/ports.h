@@ -239,7 +239,7 @@ class Played {
     peer.engagement = engagement;
     return peer;
   }
-  void hear(const PortState& peer) { port.receive(peer, Port::at(now)); }
+  void receive(const PortState& peer) { port.receive(peer, Port::at(now)); }
   Demand<3> step(const Vec3& x = Vec3::Zero(), std::uint32_t buttons = 0, bool ready = true) {
     const Demand<3> demand = port.command({Port::at(now), x, Vec3::Zero()}, buttons, ready);
     port.conclude(Vec3::Zero(), std::nullopt);
