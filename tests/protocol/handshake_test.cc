@@ -113,7 +113,7 @@ TEST_F(Handshake, EveryBitOfTheCookieCounts) {
   }
 }
 
-TEST_F(Handshake, ACookieIsForOneAddressOnePortOneAttemptAndEachDoorOfOneServer) {
+TEST_F(Handshake, ACookieIsForOneAddressPortAndAttemptAndAllDoors) {
   const Bytes good = hello_with_cookie();
   EXPECT_FALSE(z_->receive(now_, address(2, 4000), good, answer_).client.has_value());
   EXPECT_FALSE(z_->receive(now_, address(1, 4001), good, answer_).client.has_value());

@@ -24,7 +24,7 @@ std::vector<std::size_t> group_sizes(Assembly& assembly) {
   return sizes;
 }
 
-TEST_F(AssemblyTest, DevicesOfOnePeriodShareAHapticGroupThatStepsThemAtOneInstant) {
+TEST_F(AssemblyTest, DevicesOfOnePeriodShareAHapticGroup) {
   serve({device_named("a"), device_named("b", kFast), device_named("c")});
   EXPECT_EQ(group_sizes(*assembly_), (std::vector<std::size_t>{2, 1}));
   EXPECT_EQ(assembly_->haptic_groups().front().turn(now_), now_ + milliseconds(1));
@@ -43,7 +43,7 @@ TEST_F(AssemblyTest, AHapticGroupAt1KHzHasAtMostThreeBanks) {
   EXPECT_EQ(assembly_->first_device(1), 32U);
 }
 
-TEST_F(AssemblyTest, StepsAndDatagramsGoToTheRecordingUnlessTheCallerWatchesThem) {
+TEST_F(AssemblyTest, StepsAndDatagramsAreRecordedUnlessTheCallerWatchesThem) {
   const testing::ScratchFolder folder;
   Scene scene = device_named("left");
   scene.recording = Scene::Recording{.path = folder.path() / "run.mcap"};

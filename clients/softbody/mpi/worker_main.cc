@@ -178,7 +178,7 @@ int main(int argc, char** argv) {
     const Ranks ranks(none, argv);
     try {
       return verb->parsed() ? condense_scene(arguments, ranks) : answer(arguments, ranks);
-    } catch (const SceneError& error) {
+    } catch (const tendon::SceneError& error) {
       if (ranks.rank() == 0) std::cerr << "tendon-fem-worker: " << error.what() << '\n';
       return 2;
     } catch (const std::exception& error) {

@@ -48,7 +48,7 @@ TEST(ForceClient, TellsTheServerWhoItIs) {
   EXPECT_EQ(world.z->hellos.front().role, Role::kController);
 }
 
-TEST(ForceClient, AnswersEachStateWithTheForceOfThatStateAndNumbersThemWithoutAGap) {
+TEST(ForceClient, AnswersEachStateWithItsForceAndNumbersThemWithoutAGap) {
   World world(7, kFineWeather);
   world.connect({}, answer);
   ASSERT_TRUE(world.run_until(Phase::kOpen, kSecond));

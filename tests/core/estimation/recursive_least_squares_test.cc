@@ -91,7 +91,7 @@ struct Information {
   }
 };
 
-TEST(RecursiveLeastSquares, EqualsTheInformationFormThroughResetProjectionAndDeadZone) {
+TEST(RecursiveLeastSquares, EqualsTheInformationForm) {
   const LeastSquaresConfig config{.forgetting = 0.95, .prior_variance = 1e4, .dead_zone = 0.02};
   UdLeastSquares<3> ud(config);
   Information expected{.config = config};

@@ -34,7 +34,7 @@ Vec3 handle_of(const Mechanism::Arm& arm, const Vec3& q) {
           r * std::cos(q[0]) - arm.upper_arm};
 }
 
-TEST(Mechanism, AnArmsAnglesAreThoseThatCarryItsHandleAndItsJacobianInvertsTheDerivative) {
+TEST(Mechanism, AnArmsAnglesCarryItsHandleAndItsJacobianInvertsThem) {
   for (const Mechanism::Arm& arm : {kPhantom, kUneven}) {
     const Mechanism mechanism(arm);
     Dice dice(1);

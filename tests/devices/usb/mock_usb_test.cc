@@ -29,7 +29,6 @@ using namespace std::chrono_literals;
 using State = Device::State;
 
 constexpr FakeFalcon::Options kReady = {.has_firmware = true, .is_homed = true, .firmware_bytes = 4096};
-constexpr usb::Id kMouseId{0x046D, 0xC626};
 const Vec3 kForce(1, -2, 2);
 
 MockUsb& the_usb() {

@@ -190,7 +190,7 @@ TEST(Vectors, BoundsOfTheProtoFileAreThoseOfTheCodec) {
 }
 
 TEST(Vectors, AFrameOutOfBoundsIsLeftOutAndCountedAndTheNextIsRead) {
-  const RawProtobuf idle = RawProtobuf().message(3, RawProtobuf().message(1, RawProtobuf().varint(11, 2)));
+  const RawProtobuf idle = RawProtobuf().message(3, RawProtobuf().message(1, RawProtobuf().varint(11, 1)));
   const Json file = read("bounds.json");
   for (const Json& vector : file.at("bounds")) {
     if (vector.at("message") != "Datagram") continue;
@@ -216,10 +216,13 @@ TEST(Vectors, AFrameAtItsBoundsIsWrittenAgainAsItWasRead) {
   const Json file = read("bounds.json");
   for (const Json& vector : file.at("bounds")) {
     const std::string field = text(vector, "field");
-    if (vector.at("message") != "Datagram" || field.starts_with("DeviceStates") || !vector.at("accepted").get<bool>()) {
+    const std::string value = text(vector, "value");
+    if (vector.at("message") != "Datagram" || !vector.at("accepted").get<bool>()) continue;
+    // The writer has shorter forms of lists and of an infinite radius, and writes both numbers of a gripper.
+    if (field.starts_with("DeviceStates") || field.starts_with("DeviceState.gripper") || value.ends_with("entries") ||
+        value == "inf")
       continue;
-    }
-    SCOPED_TRACE(field + ' ' + text(vector, "value"));
+    SCOPED_TRACE(field + ' ' + value);
     const Bytes body = bytes(vector, "body");
     DataReader reader;
     const DataContent* const content = reader.read(body);

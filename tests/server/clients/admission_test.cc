@@ -256,7 +256,7 @@ TEST_F(SealedServer, AReplayFromElsewhereDoesNotLeadItsAnswersAway) {
   EXPECT_EQ(to_thief, 0U);
 }
 
-TEST_F(SealedServer, OneOfSeveralKeysHasHalfOfTheObserversPlacesAndTheOnlyOneAll) {
+TEST_F(SealedServer, OneOfSeveralKeysHasHalfOfTheObserverSlots) {
   for (const bool only : {false, true}) {
     if (only) config_.keys = {screen_};
     restart();

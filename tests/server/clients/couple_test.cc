@@ -193,8 +193,8 @@ TEST_F(Coupled, ScenesThatDoNotFitAreNamedByTheirFirstKey) {
 TEST_F(Coupled, AnObserverThatNamesTheFeatureIsToldBothEnds) {
   delay_ = milliseconds(10);
   start({"teleoperation.map.position_scale=0.5"}, {"teleoperation.map.position_scale=0.5"});
-  ServedClient at_leader(wire_, "127.0.0.1:4000", leader_->end.self, kViewer, now_);
-  ServedClient at_follower(wire_, "127.0.0.1:4001", follower_->end.self, kViewer, now_);
+  Viewer at_leader(wire_, "127.0.0.1:4000", leader_->end.self, kViewer, now_);
+  Viewer at_follower(wire_, "127.0.0.1:4001", follower_->end.self, kViewer, now_);
   clients_ = {&at_leader, &at_follower};
   std::map<std::uint64_t, Vec3> leads;
   std::map<std::uint64_t, Vec3> follows;
@@ -207,8 +207,8 @@ TEST_F(Coupled, AnObserverThatNamesTheFeatureIsToldBothEnds) {
   ASSERT_GT(at_follower.own.size(), 100U);
   ASSERT_GT(at_follower.peers.size(), 100U);
   EXPECT_EQ(at_leader.own.back().port.phase, PortPhase::kEngaged);
-  const auto same = [](const std::vector<ServedClient::Seen>& seen, const std::map<std::uint64_t, Vec3>& told) {
-    return std::ranges::all_of(seen, [&](const ServedClient::Seen& one) {
+  const auto same = [](const std::vector<Viewer::Seen>& seen, const std::map<std::uint64_t, Vec3>& told) {
+    return std::ranges::all_of(seen, [&](const Viewer::Seen& one) {
       return told.contains(one.port.sequence) && one.port.position == told.at(one.port.sequence);
     });
   };
@@ -225,10 +225,10 @@ TEST_F(Coupled, AnObserverThatNamesTheFeatureIsToldBothEnds) {
 
 TEST_F(Coupled, AnObserverIsToldTheEndsAtMost50TimesASecond) {
   start();
-  ServedClient viewer(wire_, "127.0.0.1:4000", leader_->end.self, kViewer, now_);
+  Viewer viewer(wire_, "127.0.0.1:4000", leader_->end.self, kViewer, now_);
   clients_ = {&viewer};
   run(seconds(2));
-  const auto told = [&](std::vector<ServedClient::Seen>& seen) {
+  const auto told = [&](std::vector<Viewer::Seen>& seen) {
     seen.clear();
     run(seconds(1));
     for (std::size_t i = 1; i < seen.size(); ++i) EXPECT_GE(seen[i].at - seen[i - 1].at, milliseconds(20));
@@ -244,7 +244,7 @@ TEST_F(Coupled, AnObserverIsToldTheEndsAtMost50TimesASecond) {
 
 TEST_F(Coupled, APeerThatIsGoneIsToldNoMore) {
   start();
-  ServedClient early(wire_, "127.0.0.1:4001", leader_->end.self, kViewer, now_);
+  Viewer early(wire_, "127.0.0.1:4001", leader_->end.self, kViewer, now_);
   clients_ = {&early};
   run(seconds(2));
   ASSERT_FALSE(early.peers.empty());
@@ -252,7 +252,7 @@ TEST_F(Coupled, APeerThatIsGoneIsToldNoMore) {
   run(milliseconds(100));
   cut_ = false;
   follower_.reset();
-  ServedClient late(wire_, "127.0.0.1:4000", leader_->end.self, kViewer, now_);
+  Viewer late(wire_, "127.0.0.1:4000", leader_->end.self, kViewer, now_);
   clients_ = {&early, &late};
   early.peers.clear();
   run(milliseconds(500));
@@ -264,9 +264,9 @@ TEST_F(Coupled, APeerThatIsGoneIsToldNoMore) {
 TEST_F(Coupled, OtherObserversAndDevicesAreToldOfNoEnds) {
   follower_ = place(shipped("follower.toml", {"teleoperation="}), ++epoch_);
   leader_ = place(shipped("leader.toml"), ++epoch_);
-  ServedClient silent(wire_, "127.0.0.1:4000", leader_->end.self,
-                      {.role = Role::kObserver, .name = "silent", .features = {}}, now_);
-  ServedClient named(wire_, "127.0.0.1:4001", follower_->end.self, kViewer, now_);
+  Viewer silent(wire_, "127.0.0.1:4000", leader_->end.self, {.role = Role::kObserver, .name = "silent", .features = {}},
+                now_);
+  Viewer named(wire_, "127.0.0.1:4001", follower_->end.self, kViewer, now_);
   clients_ = {&silent, &named};
   run(seconds(1));
   EXPECT_GT(silent.states, 900U);

@@ -87,7 +87,7 @@ TEST(Lateness, AForceThatIsStillMissingIsTheEnginesFaultWhileItIsHeard) {
             "forces were late once, by up to 970 ms: the engine (its datagrams arrive, but without a usable force)");
 }
 
-TEST(Lateness, SilenceOfARemoteEngineHasNoKnownCauseAndThatOfALocalOneIsItsFault) {
+TEST(Lateness, OnlyTheSilenceOfALocalEngineIsItsFault) {
   for (const bool local : {false, true}) {
     Engine silent(local);
     silent.answer_times(50);

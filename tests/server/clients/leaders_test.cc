@@ -32,7 +32,7 @@ class TwoLeaders : public Places {
                       .name = "desk",
                       .features = {std::string(kFeatureChannels), std::string(kFeatureTeleoperation)},
                       .claims = {{.device = "", .channel = channel, .role = Role::kController}}};
-    desk_ = std::make_unique<ServedClient>(wire_, "127.0.0.1:" + std::to_string(++port_), server.end.self, hello, now_);
+    desk_ = std::make_unique<Viewer>(wire_, "127.0.0.1:" + std::to_string(++port_), server.end.self, hello, now_);
     clients_ = {desk_.get()};
   }
 
@@ -44,7 +44,7 @@ class TwoLeaders : public Places {
     return desk_->answer.value_or(Session::RequestAnswered{});
   }
 
-  std::unique_ptr<ServedClient> desk_;
+  std::unique_ptr<Viewer> desk_;
   std::uint16_t port_ = 50000;
 };
 

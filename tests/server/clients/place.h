@@ -82,7 +82,7 @@ struct Place {
 };
 
 /// A client of a place. It stores the coupling states and the last answer that it receives.
-class ServedClient : public Foreign {
+class Viewer : public Foreign {
  public:
   struct Seen {
     LocalTime at;
@@ -116,7 +116,7 @@ class Places : public ::testing::Test {
   void run(Duration length, const std::function<void()>& each = {}) {
     for (const LocalTime until = now_ + length; now_ < until; now_ += std::chrono::milliseconds(1)) {
       for (Place* one : places()) one->step(now_);
-      for (ServedClient* one : clients_) one->turn(now_);
+      for (Viewer* one : clients_) one->turn(now_);
       for (const std::size_t count = wire_.size(); count_ < count; ++count_) {
         if (is_cut(wire_[count_]) || dice_.chance(loss_)) continue;
         under_way_.emplace_back(now_ + delay_ + dice_.milliseconds(0, jitter_ms_), wire_[count_]);
@@ -124,7 +124,7 @@ class Places : public ::testing::Test {
       std::erase_if(under_way_, [&](const auto& one) {
         if (one.first > now_) return false;
         for (Place* place : places()) deliver(one.second, place->end);
-        for (ServedClient* client : clients_) deliver(one.second, client->end);
+        for (Viewer* client : clients_) deliver(one.second, client->end);
         return true;
       });
       if (each) each();
@@ -149,7 +149,7 @@ class Places : public ::testing::Test {
   std::unique_ptr<Place> leader_;
   std::unique_ptr<Place> second_leader_;
   std::unique_ptr<Place> follower_;
-  std::vector<ServedClient*> clients_;
+  std::vector<Viewer*> clients_;
 
  private:
   std::vector<Place*> places() {

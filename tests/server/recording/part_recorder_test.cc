@@ -123,7 +123,7 @@ TEST_F(PartRecorderTest, EachPartIsAWholeRecordingAndNoStepIsMissing) {
   EXPECT_EQ(tick, 3500U);
 }
 
-TEST_F(PartRecorderTest, CountsTheStepsOfADeletedFileAsMissingAndGoesOnInItsFolder) {
+TEST_F(PartRecorderTest, CountsTheStepsOfADeletedFileAsMissingAndGoesOn) {
   const auto inner = folder.path() / "runs" / "run.mcap";
   fs::create_directory(inner.parent_path());
   PartRecorder recorder(config_at(inner));

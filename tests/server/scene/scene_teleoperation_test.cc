@@ -130,8 +130,8 @@ TEST(SceneTeleoperation, AnAbsoluteMapAlignsAndHasNoClutch) {
             "s.toml:11: teleoperation.engage.within_mm: expected no within_mm, except for a leader with map.absolute: "
             "only this leader is aligned");
   EXPECT_EQ(error_of_minimal_and(kLeader + "[teleoperation.engage]\nalign_energy_mj = 8\n"),
-            "s.toml:11: teleoperation.engage.align_energy_mj: expected 0, except for a leader with map.absolute and a "
-            "tank: the energy is paid into its account");
+            "s.toml:11: teleoperation.engage.align_energy_mj: expected 0, except for a leader with map.absolute and an "
+            "energy tank: the energy is paid into its account");
   EXPECT_EQ(
       error_of_minimal_and(kLeader + "[teleoperation.map]\nabsolute = true\n[teleoperation.clutch]\nbutton = 1\n"),
       "s.toml:12: teleoperation.clutch: expected no clutch with map.absolute: a clutch changes the offset, which is "

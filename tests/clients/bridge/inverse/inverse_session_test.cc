@@ -252,7 +252,7 @@ TEST(InverseSession, ATorqueForADeviceThatCannotTurnIsRefusedInASentence) {
   EXPECT_EQ(refused(reply)[0], "right: the device has no motors for rotation");
 }
 
-TEST(InverseSession, AForceIsValidFor100MsAndMessagesWithoutOneDoNotKeepItAlive) {
+TEST(InverseSession, AForceIsValidFor100MsAndOtherMessagesDoNotKeepItAlive) {
   Bridge bridge("demo_parts.toml");
   const auto client = bridge.client();
   bridge.run(300, *client, bridge.force(Vec3(0, 0, 0.5)));

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <iomanip>
 #include <limits>
-#include <memory>
 #include <nlohmann/json.hpp>
 #include <numbers>
 #include <sstream>
@@ -54,11 +53,10 @@ const DeviceProfile& profile_of(std::string_view name) {
 
 Network network_of(std::string_view name, injector::Direction direction, std::uint64_t seed) {
   const injector::Profile profile = injector::resolve_profile(name == kBursts ? kBurstProfile : name, direction);
-  const auto injector = std::make_shared<injector::Injector>(profile, seed, 0, direction, LocalTime{});
-  return {.arrivals = [injector](int now) {
+  return {.arrivals = [injector = injector::Injector(profile, seed, 0, direction, LocalTime{})](int now) mutable {
     const auto period = [](LocalTime at) { return static_cast<int>(std::ceil(at.time_since_epoch() / 1.0ms)); };
     const injector::Decision decision =
-        injector->decide({.arrival = LocalTime(std::chrono::milliseconds(now)), .size = 200});
+        injector.decide({.arrival = LocalTime(std::chrono::milliseconds(now)), .size = 200});
     std::vector<int> arrivals;
     if (decision.verdict != injector::Verdict::kDrop) arrivals.push_back(period(decision.release));
     if (decision.duplicate) arrivals.push_back(period(*decision.duplicate));

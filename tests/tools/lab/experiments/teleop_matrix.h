@@ -14,9 +14,9 @@
 namespace tendon::lab {
 
 struct MatrixOptions {
-  std::uint64_t seed = 1;          ///< of the networks
-  std::optional<Preset> preset{};  ///< of the limiters; empty: AOL+ without parts
-  Part part{};                     ///< the units are the rows
+  std::uint64_t seed = 1;                        ///< of the networks
+  std::optional<Preset> preset = Preset::kFeel;  ///< of the limiters; empty: AOL+ without parts
+  Part part{};                                   ///< the units are the rows
 };
 
 /// One method for a pair of devices, with or without their encoder counts, over a network.

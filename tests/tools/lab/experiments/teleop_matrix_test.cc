@@ -37,14 +37,14 @@ TEST(TeleopMatrix, UnequalDevicesOverBurstsFeelWhatTheCommittedTableSays) {
     EXPECT_EQ(was[3], to_string(of.method));
     if (of.network != "bursts" || of.devices != "falcon/phantom-premium") continue;
     ++repeated;
-    const MatrixResult is = matrix_result(of, 1, std::nullopt);
+    const MatrixResult is = matrix_result(of, 1, Preset::kFeel);
     EXPECT_TRUE(is.engaged);
     if (of.method != CouplingMethod::kRate) {
       EXPECT_NEAR(is.held, std::stod(was[4]), 0.02);
       EXPECT_NEAR(is.drift * 1e3, std::stod(was[5]), 0.02);
     }
     EXPECT_NEAR(is.vibration * 1e3, std::stod(was[6]), 0.3);
-    EXPECT_GE(is.energy, of.counts ? -2e-4 : -1e-9);
+    EXPECT_GE(is.energy, -1e-9);
   }
   EXPECT_EQ(repeated, 14);
   EXPECT_FALSE(std::getline(file, line)) << line;

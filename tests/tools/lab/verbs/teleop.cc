@@ -15,11 +15,11 @@ namespace tendon::lab::teleop_verb {
 namespace {
 
 std::optional<Preset> preset_named(const std::string& name) {
-  if (name.empty()) return std::nullopt;
-  std::string names;
+  if (name == "none") return std::nullopt;
+  std::string names = "none";
   for (const PresetInfo& known : presets()) {
     if (known.name == name) return known.preset;
-    names += (names.empty() ? "" : ", ") + std::string(known.name);
+    names += ", " + std::string(known.name);
   }
   throw std::invalid_argument("--preset: \"" + name + "\" is unknown, expected one of " + names);
 }
@@ -27,7 +27,7 @@ std::optional<Preset> preset_named(const std::string& name) {
 void add(CLI::App& verb, int& /*exit*/) {
   static TeleopOptions options;
   static bool matrix = false;
-  static std::string preset;
+  static std::string preset = "feel";
   verb.add_option("--hands", options.hands, "Number of hands for each method and round trip")->capture_default_str();
   verb.add_option("--seed", options.seed, "Seed of the first hand and its network")->capture_default_str();
   verb.add_option("--out", options.out, "Draw the figure in this folder, as SVG and PNG (requires gnuplot)")
@@ -41,14 +41,15 @@ void add(CLI::App& verb, int& /*exit*/) {
       "--matrix", matrix,
       "Print each method for pairs of devices, with and without encoder counts, over named networks, as CSV");
   rows->excludes(json)->excludes(verb.get_option("--out"))->excludes(verb.get_option("--hands"));
-  verb.add_option("--preset", preset, "With --matrix: preset of both limiters. Default: aol+ without parts")
+  verb.add_option("--preset", preset, "With --matrix: preset of both limiters; none: aol+ without parts")
+      ->capture_default_str()
       ->type_name("NAME")
       ->needs(rows);
   verb.footer(
       "\n"
       "Example\n"
       "  tendon-lab teleop --hands 21 --out figures     takes three minutes\n"
-      "  tendon-lab teleop --matrix --preset feel >matrix.csv\n\n"
+      "  tendon-lab teleop --matrix >matrix.csv               takes three minutes\n\n"
       "The same seed gives the same figures.\n"
       "Exit: 0 success; 1 failed, because of gnuplot or the files; 2 wrong usage.");
   verb.callback([] {
