@@ -52,8 +52,7 @@ void HapticController::book_unseen(const Vec3& applied, const HandleSample* hand
   if (admittance_) admittance_->observe_unseen();
 }
 
-// The functions that every step needs are inlined, so a device with a position only pays one branch for the other parts
-// of a handle.
+// The functions of every step are inlined. A device that only has a position pays one branch for the other parts.
 [[gnu::always_inline]] inline void HapticController::book_seen(const Motion& hand, const Vec3& applied,
                                                                const HandleSample* handle, Step& step) noexcept {
   const Vec3 dx = hand.position - last_->position;
@@ -241,7 +240,7 @@ void HapticController::take(Step& step, const Motion& hand, const Vec3& applied,
     limit_wrench(wanted.loop_age, applied, step);
   } else {
     limit_force(wanted, applied, step);
-    // The device has no motor for rotation. A device without an orientation never receives a torque demand.
+    // The device has no motor for rotation. There is no torque demand for a device without an orientation.
     if (step.turn() && !step.turn()->wanted.isZero(0)) step.reasons |= Reason::kMaxForce;
   }
   if (grip_) limit_grip(step);

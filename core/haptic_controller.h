@@ -19,16 +19,15 @@
 
 namespace tendon {
 
-/// The rotation of the handle in a step.
 struct TurnStep {
   Turning hand;
   Vec3 was_applied = Vec3::Zero();  ///< N·m, applied in the last interval
   Vec3 wanted = Vec3::Zero();       ///< N·m, demand of the remote environment
-  Vec3 torque = Vec3::Zero();       ///< N·m, to be applied now
+  Vec3 torque = Vec3::Zero();       ///< N·m, the torque to apply
   Vec3 applied = Vec3::Zero();      ///< N·m, applied by the device
 };
 
-/// The gripper of the handle in a step. It has a separate account.
+/// The gripper has a separate account.
 struct GripStep {
   Grip hand;
   double was_applied = 0;  ///< N, applied in the last interval
@@ -39,24 +38,23 @@ struct GripStep {
   double energy = 0;       ///< J, the account of the gripper after the interval
 };
 
-/// The parts of a handle other than its position in a step.
 struct HandleStep {
   std::optional<TurnStep> turn{};  ///< empty: the device does not measure its orientation
   std::optional<GripStep> grip{};  ///< empty: it has no gripper
   std::optional<Joints> joints{};  ///< empty if not measured; not used by the laws
 };
 
-/// The position of the handle in a step. Every handle has one.
+/// Every handle has a position.
 struct PositionStep {
   Motion hand;                       ///< measured motion; hand.at is the time of the step
-  Duration held{};                   ///< T_act: length of the last interval; 0 in the first step
+  Duration held{};                   ///< T_act, the length of the last interval, or 0 in the first step
   Vec3 was_applied = Vec3::Zero();   ///< N, applied in the last interval
-  std::optional<Vec3> hand_force{};  ///< N, of the hand on the handle, as measured; empty without a force sensor
+  std::optional<Vec3> hand_force{};  ///< N, the measured force of the hand on the handle; empty without a sensor
   Vec3 wanted = Vec3::Zero();        ///< N, demand of the remote environment (HeldForce)
   Mat3 stiffness = Mat3::Zero();     ///< N/m, −∂wanted/∂x from the remote environment; zero if unknown
   double permitted = 0;  ///< N, bound of the limiter on ‖force‖ (per axis: on the largest component); ∞ when off
   Vec3 force = Vec3::Zero();  ///< N, to be applied now
-  double energy = 0;          ///< J, account of the limiter after the interval (per axis: the minimum)
+  double energy = 0;          ///< J, the account of the limiter after the interval (per axis: the minimum)
   Duration longest_hold{};    ///< T: `force` can be applied for this time
   Reasons reasons;            ///< why `force` is not `wanted`
   Mode mode = Mode::kIdle;
@@ -65,24 +63,22 @@ struct PositionStep {
   std::uint64_t force_sequence = 0;     ///< the remote force in use; 0 = none
   Duration force_age{};                 ///< since it arrived
   Duration loop_age{};                  ///< since the sample of the answered motion
-  std::optional<double> force_error{};  ///< N, the engine's estimate of its error; empty: unknown
+  std::optional<double> force_error{};  ///< N, the error that the engine estimates; empty if unknown
 };
 
-/// Input and result of one haptic step. It contains enough to repeat the step (tests/tools/replay).
+/// Input and result of one haptic step. This is enough to repeat the step (tests/tools/replay).
 struct Step : PositionStep {
-  std::optional<HandleStep> handle{};  ///< empty: the device has a position only
+  std::optional<HandleStep> handle{};  ///< empty if the device only has a position
 
-  /// Return null if the device does not measure its orientation, or has no gripper.
+  /// Null if the device does not measure its orientation, its joints, or has no gripper.
   TurnStep* turn() noexcept { return handle && handle->turn ? &*handle->turn : nullptr; }
   const TurnStep* turn() const noexcept { return handle && handle->turn ? &*handle->turn : nullptr; }
   GripStep* grip() noexcept { return handle && handle->grip ? &*handle->grip : nullptr; }
   const GripStep* grip() const noexcept { return handle && handle->grip ? &*handle->grip : nullptr; }
-  /// Returns null if the device does not measure its joints.
   const Joints* joints() const noexcept { return handle && handle->joints ? &*handle->joints : nullptr; }
 };
 
 /// One haptic step: from the measured motion of the hand to the force to apply.
-///
 ///     account ← the last interval, with the force that was applied          (Limiter::observe)
 ///     F ← newest remote force, held, faded or stopped by its age            (HeldForce; several: ForceChannels)
 ///     F ← F + force of the coupling to one or several peers                 (Couplings, when listed)
@@ -92,27 +88,21 @@ struct Step : PositionStep {
 ///     account ← energy received from the peers, less energy given           (Couplings::settle, with an energy tank)
 ///     F ← the bound of the account, e.g. ‖F‖ ≤ f_c + 2 √(b E / T_max)        (Limiter::limit)
 ///     F ← ‖F‖ ≤ max_force again, if the damper of the limiter has added to it
-///
 /// If the device has motors for rotation, F is a wrench. Force and torque then share one account and are reduced by the
 /// same factor (WrenchPort). The gripper is a separate port (GripPort). The torque and the grip force of the coupling
 /// are added to those of the remote environment.
 ///
-/// The limiter is the last step, so the force cannot exceed its bound. It can reduce a force faster than the slew limit
-/// allows.
+/// The limiter is the last step, so the force cannot exceed its bound, but it can fall faster than the slew limit
+/// allows. It is guaranteed that E ≥ −1 nJ in every step, if each force is applied for at most the `longest_hold` of
+/// its step. Otherwise E can fall below zero by at most (T_act − T)(‖F‖ − f_c)₊²/(4b), and forces are limited to f_c
+/// until E has recovered. See core/PROOFS.md, "Output bound" and "Late holds".
 ///
-/// Guarantee: E ≥ −1 nJ in every step, if each force is applied for at most the `longest_hold` of its step. Otherwise E
-/// can fall below zero by at most (T_act − T)(‖F‖ − f_c)₊²/(4b), and forces are limited to f_c until E has recovered.
-/// See core/PROOFS.md, "Output bound" and "Late holds".
-///
-/// Overruns: if an interval is longer than the longest_hold of the scene, it is booked with its measured length and
-/// flagged, and the limiter adapts (HoldBound). If it is longer than the watchdog of the device, or if a position is
-/// missing, the worst motion is booked. (If longest_hold is the watchdog time, the guarantee has no condition, but the
-/// bound is lower: K_op → 2b / T_max.)
+/// Overruns: an interval longer than the longest_hold of the scene is booked with its measured length and flagged, and
+/// the limiter adapts (HoldBound). If it is longer than the watchdog of the device, or if a position is missing, the
+/// worst motion is booked. (If longest_hold is the watchdog time, there is no condition, but K_op → 2b / T_max.)
 ///
 /// A fault is latched: the force is zero (through the slew limit while positions are measured) until `rearm`. `disarm`
-/// is for the operator. It sets the force to zero from the next step on, without a ramp, until `rearm`. It does not
-/// clear a fault.
-///
+/// is for the operator. The force is then zero without a ramp until `rearm`. It does not clear a fault.
 /// Thread-safe: no. Realtime-safe: yes.
 class HapticController {
  public:
@@ -129,13 +119,11 @@ class HapticController {
     std::optional<FrictionMap::Config> friction_map{};
     /// For a device with motors that rotate the handle. Cannot be combined with admittance.
     std::optional<RotationLimits> rotation{};
-    /// For a device with a motorized gripper.
-    std::optional<GripLimits> grip{};
+    std::optional<GripLimits> grip{};  ///< for a device with a motorized gripper
     /// For a device with a force sensor. Without it the device is of impedance type.
     std::optional<AdmittanceLoop<3>::Config> admittance{};
     /// Couples the handle to that of a peer. The limiter has a shared_account if the coupling has an energy tank. A
-    /// coupled orientation must be measured in every step, and produces a torque only with `rotation`. A coupled
-    /// gripper needs `grip`.
+    /// coupled orientation must be measured in every step; a torque requires `rotation`, and a coupled gripper `grip`.
     std::optional<Coupling::Config> coupling{};
     /// For a follower with several leaders: one `coupling` per leader (Couplings). Empty: one leader.
     std::vector<CoupledLeader> leaders{};
@@ -147,62 +135,57 @@ class HapticController {
     HeldForce::Config hold;
     /// One rule per channel of remote forces. Each channel has its own HeldForce.
     std::vector<ChannelRule> channels = {ChannelRule::kSum};
-    /// Consecutive failed readings before a fault: 20 ms at 1 kHz, as in libfranka.
-    std::uint32_t max_missed = 20;
-    /// m/s; > 0. A faster motion is due to an encoder that has wrapped or lost counts. It is a fault and is not booked:
-    /// 0.2 m in a millisecond would earn 32 J at 0.8 N·s/m. Empty: no check.
+    std::uint32_t max_missed = 20;  ///< the number of failed readings before a fault: 20 ms at 1 kHz, as in libfranka
+    /// m/s; > 0. A faster motion is due to an encoder that has wrapped or lost counts. This is a fault and is not
+    /// booked, because 0.2 m in a millisecond would earn 32 J at 0.8 N·s/m. Empty: no check.
     std::optional<double> max_speed{};
   };
 
   /// Throws std::invalid_argument with the name of the field if a value is out of range.
   explicit HapticController(const Config& config);
 
-  /// Takes a newer remote force for `channel`, an index into `channels`. Returns false if it is refused because it is
-  /// not sound (HeldForce).
+  /// Takes a newer remote force for `channel`, an index into `channels`. Returns false if it is not sound (HeldForce).
   bool observe(const RemoteForce& force, std::size_t channel = 0) noexcept { return held_.observe(channel, force); }
 
-  /// The remote environment `source` of a channel has disconnected.
+  /// Must be called when the remote environment `source` of a channel has disconnected.
   void release(LocalTime now, std::uint32_t source = 0, std::size_t channel = 0) noexcept {
     held_.release(channel, source, now);
   }
 
   /// Performs one haptic step. `applied` is the force that the device has really held since the previous step.
   /// `hand_force` (N, of the hand on the handle) is the reading of its force sensor; with `admittance` a step without
-  /// it gives zero force. `handle` contains the other measurements of the handle: with `rotation` every step has the
-  /// orientation, and with `grip` the opening.
+  /// it gives zero force. `handle` must contain the orientation for `rotation`, and the opening for `grip`.
   Step step(const Motion& hand, const Vec3& applied, const std::optional<Vec3>& hand_force = {},
             const HandleSample* handle = nullptr) noexcept {
     Step fresh;
     step_into(fresh, hand, applied, hand_force, handle);
     return fresh;
   }
-  /// Writes the result into a newly constructed Step, which may be part of a record.
+  /// `fresh` must be newly constructed. It may be part of a record.
   void step_into(Step& fresh, const Motion& hand, const Vec3& applied, const std::optional<Vec3>& hand_force = {},
                  const HandleSample* handle = nullptr) noexcept;
 
   /// Performs a step with a given `wanted` instead of the observed remote forces and the coupling, and with given
-  /// settlements of the tanks. Replays recorded steps, of a scene without `coupling`.
+  /// settlements of the tanks. This can replay a recorded scene without `coupling`.
   Step step(const Motion& hand, const Vec3& applied, const std::optional<Vec3>& hand_force,
             const ForceChannels::Wanted& wanted, const HandleSample* handle = nullptr,
             const EnergyTank::Settlement& settled = {}, const EnergyTank::Settlement& grip_settled = {}) noexcept;
 
-  /// Performs a step without a position measurement. The force to apply is zero. From `handle` the last orientation and
-  /// grip are recorded, and the held torque and grip force are booked.
+  /// Performs a step without a position measurement. The force to apply is zero. The last orientation and grip are
+  /// recorded from `handle`, and the held torque and grip force are booked.
   Step step_unseen(LocalTime now, const Vec3& applied, const HandleSample* handle = nullptr) noexcept;
 
-  /// Returns the couplings, which receive the states of the peers and the commands of the operator. Null without any.
+  /// Null if there is no coupling. The couplings receive the states of the peers and the commands of the operator.
   Couplings* couplings() noexcept { return couplings_ ? &*couplings_ : nullptr; }
-  /// For the coupling, before the step: the buttons of the handle, and whether the device applies forces.
+  /// Must be called before the step if there is a coupling. `armed` is true if the device applies forces.
   void notice(std::uint32_t buttons, bool armed) noexcept {
     buttons_ = buttons;
     armed_ = armed;
   }
-  /// Returns the settlement of the tank of the grippers in the newest step.
-  const EnergyTank::Settlement& grip_settled() const noexcept { return grip_settled_; }
+  const EnergyTank::Settlement& grip_settled() const noexcept { return grip_settled_; }  ///< of the grippers' tank
 
   Fault fault() const noexcept { return fault_; }
-  /// Clears the fault and ends `disarm`. The next fresh force is ramped in.
-  void rearm() noexcept;
+  void rearm() noexcept;  ///< clears the fault and ends `disarm`. The next fresh force is ramped in.
   void disarm() noexcept { disarmed_ = true; }
 
  private:

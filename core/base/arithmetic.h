@@ -3,12 +3,10 @@
 
 #include <cstdint>
 
-/// Tendon requires IEEE 754 arithmetic without unsafe optimizations, at the same speed for every value. Included where
-/// NaN is caught and where rounding errors are corrected.
+/// Rejects -ffast-math at compile time. Must be included where NaN is caught or rounding errors are corrected.
 
 // With -ffast-math std::isfinite(NaN) is true, a clamp of NaN to ±5 N gives −5 N, and a compensated sum becomes a plain
-// one. GCC reports any part of it (-fassociative-math …) through __GCC_IEC_559, Clang only -ffast-math and
-// -ffinite-math-only.
+// one. GCC reports any part of it through __GCC_IEC_559, Clang only -ffast-math and -ffinite-math-only.
 #if defined(__FAST_MATH__) || (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__ != 0) || \
     (defined(__GCC_IEC_559) && __GCC_IEC_559 == 0)
 #error \
@@ -17,12 +15,10 @@
 
 namespace tendon {
 
-/// During its lifetime the thread treats numbers below 2.2e-308 as 0, as operands and as results. Otherwise decaying
-/// forces and velocities reach such numbers, for which arithmetic is about a hundred times slower on x86-64. Create one
-/// in each step instead of one per thread, because a driver or a library that is loaded later can change the mode of
-/// the thread. The destructor restores the previous mode.
-///
-/// x86-64 and AArch64; no effect elsewhere. Realtime-safe: yes.
+/// Makes the thread treat numbers below 2.2e-308 as 0, as operands and as results, while this object exists. Decaying
+/// forces and velocities otherwise reach such numbers, for which arithmetic is about a hundred times slower on x86-64.
+/// Create one in each step rather than one per thread, because a driver or a library that is loaded later can change
+/// the mode. The destructor restores the previous mode. x86-64 and AArch64; no effect elsewhere. Realtime-safe: yes.
 class [[nodiscard]] DenormalsOff {
  public:
   DenormalsOff() noexcept : before_(mode()) { set_mode(before_ | kFlush); }

@@ -10,12 +10,8 @@
 
 namespace tendon {
 
-/// Unsigned integers in little-endian byte order, for the wire, MCAP and hashes. The result is the same on every
-/// machine.
-///
-/// Realtime-safe.
+/// Unsigned integers in little-endian byte order, for the wire, MCAP and hashes. Realtime-safe.
 
-/// Writes `value` to the `sizeof(T)` bytes at `to`.
 template <std::unsigned_integral T>
 constexpr void put_little_endian(T value, std::byte* to) noexcept {
   if (!std::is_constant_evaluated() && std::endian::native == std::endian::little) {
@@ -25,7 +21,6 @@ constexpr void put_little_endian(T value, std::byte* to) noexcept {
   for (std::size_t i = 0; i < sizeof(T); ++i) to[i] = static_cast<std::byte>(value >> (8 * i) & 0xFFU);
 }
 
-/// Reads the `sizeof(T)` bytes at `from`.
 template <std::unsigned_integral T>
 constexpr T get_little_endian(const std::byte* from) noexcept {
   T value = 0;

@@ -13,34 +13,28 @@ namespace tendon {
 
 /// Coordinate frames of devices, and of programs that draw or compute with their positions.
 ///
-/// The **operator frame** is that of the person at the handle: x to the right, y up, z towards the user; right-handed;
-/// metres. It is the frame of OpenXR and WebXR. Positions on the wire stay in the device base frame. The
-/// `operator_from_device` of a device converts them:
-///
+/// The **operator frame** is that of the person at the handle, and of OpenXR and WebXR: x to the right, y up, z towards
+/// the user; right-handed; metres. Positions on the wire are in the device base frame:
 ///     p_operator = R p_device        the same R for velocities, forces and torques
 
-/// Parses the axes of a device, "right=x up=y user=z": the axis of the device base frame that points to the right of
-/// the operator, up, and towards the user, each with its sign ("right=-y up=z user=-x"), in any order. Returns R.
-/// Throws std::invalid_argument with the expected form if a word is missing, unknown or repeated, if two words name the
-/// same axis, or if the frame is left-handed, which no rotation can reach.
+/// Returns R for the axes of a device, such as "right=-y up=z user=-x": the axes of the device base frame that point to
+/// the right of the operator, up, and towards the user, in any order. Throws std::invalid_argument with the expected
+/// form if a word is missing, unknown or repeated, if two words name the same axis, or if the frame is left-handed.
 Mat3 operator_from_device(std::string_view axes);
 
-/// Formats R in this form. The result is empty if R does not map axes to axes.
+/// Returns R in this form, or an empty string if R does not map axes to axes.
 std::string axes_in_words(const Mat3& rotation);
 
-/// Converts between matrix and quaternion. `rotation` is orthonormal with determinant 1; `q` has any length but 0.
+/// `rotation` must be orthonormal with determinant 1. `q` can have any length but 0.
 Quat quaternion_of(const Mat3& rotation);
 Mat3 matrix_of(const Quat& q);
 
 /// The frame of a program or an interface, relative to the operator frame.
-///
 ///     position, velocity:  v = per_metre M v_operator       v_operator = Mᵀ v / per_metre
 ///     force:               f = M f_operator                 f_operator = Mᵀ f
 ///     orientation:         R = M R_operator Mᵀ              R_operator = Mᵀ R M
-///
-/// M is orthonormal. In a left-handed frame its determinant is −1, and the three equations still hold. Convert an
-/// orientation as a matrix, never by changing signs of a quaternion. A torque is an axial vector: τ = det(M) M
-/// τ_operator.
+/// M is orthonormal. The equations also hold for a left-handed frame, which has the determinant −1. Never convert an
+/// orientation by changing signs of a quaternion. A torque is axial: τ = det(M) M τ_operator.
 struct Frame {
   std::string_view name;    ///< lower case, for options, such as "ros"
   std::string_view axes;    ///< description, such as "x forward, y left, z up"
@@ -63,7 +57,7 @@ struct Frame {
   Mat3 operator_orientation(const Mat3& here) const { return from_operator.transpose() * here * from_operator; }
 };
 
-/// All known frames: operator, VRPN and OpenHaptics, CHAI3D, Inverse, ROS, Unity, Unreal.
+/// The known frames: operator, VRPN and OpenHaptics, CHAI3D, Inverse, ROS, Unity, Unreal.
 std::span<const Frame> frames();
 
 /// Returns null if no frame has this name.

@@ -5,15 +5,14 @@
 
 namespace tendon {
 
-/// The freshness of the rendered remote force (see HeldForce). The values are part of the wire format and of
-/// recordings: never renumber.
+/// The freshness of the rendered remote force (see HeldForce). Part of the wire format and recordings: never renumber.
 enum class Mode : std::uint8_t {
   kIdle = 1,      ///< no force has arrived yet
   kActive = 2,    ///< a fresh force is rendered
   kHolding = 3,   ///< the force is no longer valid and still held
   kDecaying = 4,  ///< the force fades after that
-  kSafeStop = 5,  ///< the force is zero; a fresh one is ramped in
-  kFault = 6,     ///< latched: zero force until an explicit re-arm
+  kSafeStop = 5,  ///< the force is zero until a fresh one is ramped in
+  kFault = 6,     ///< the force is zero until an explicit re-arm
 };
 
 }  // namespace tendon

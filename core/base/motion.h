@@ -14,7 +14,6 @@ using Vec3 = Eigen::Vector3d;
 using Mat3 = Eigen::Matrix3d;
 
 /// A rotation as a unit quaternion in Hamilton's convention: w + x i + y j + z k. q and −q are the same rotation.
-/// core/base/frames.h converts it to a matrix and back.
 struct Quat {
   double w = 1;
   double x = 0;
@@ -24,7 +23,6 @@ struct Quat {
   bool operator==(const Quat&) const = default;
 };
 
-/// The orientation of the handle at one instant.
 struct Turning {
   Quat orientation;                      ///< rotates the handle frame into the base frame
   Vec3 angular_velocity = Vec3::Zero();  ///< rad/s, base frame axes, an estimate
@@ -32,7 +30,6 @@ struct Turning {
   bool operator==(const Turning&) const = default;
 };
 
-/// The opening of the gripper of the handle at one instant.
 struct Grip {
   double opening = 0;   ///< rad; 0 = closed
   double velocity = 0;  ///< rad/s, an estimate
@@ -40,14 +37,12 @@ struct Grip {
   bool operator==(const Grip&) const = default;
 };
 
-/// The joints of the mechanism of the handle at one instant.
 struct Joints {
   static constexpr std::size_t kMost = 8;
   std::size_t count = 0;                 ///< at most kMost; all other elements are 0
   std::array<double, kMost> angle{};     ///< rad
   std::array<double, kMost> velocity{};  ///< rad/s, an estimate
 
-  /// Three joints, as in most devices.
   static Joints three(const Vec3& angles, const Vec3& velocities) noexcept {
     return {.count = 3,
             .angle = {angles[0], angles[1], angles[2]},
@@ -60,12 +55,12 @@ struct Joints {
 struct Effort {
   Vec3 force = Vec3::Zero();   ///< N, base frame axes
   Vec3 torque = Vec3::Zero();  ///< N·m, base frame axes, about the position of the handle
-  double grip = 0;             ///< N, on the fingers; > 0 opens them
+  double grip = 0;             ///< N; opens the fingers if positive
 
   bool operator==(const Effort&) const = default;
 };
 
-/// The measured motion of the hand at one instant.
+/// The measured motion of the hand.
 struct Motion {
   LocalTime at{};                ///< sample time
   Vec3 position = Vec3::Zero();  ///< m

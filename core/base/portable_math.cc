@@ -63,10 +63,8 @@ Doublings doublings(double x) noexcept {
 }
 
 /// 1 + r/first (1 + r/(first + 1) (… (1 + r/last))), summed from the smallest term: each sum is 1 + sum * r / n of the
-/// previous one.
-///
-/// In this form each division depends on the previous one, which takes 100 ns. The function therefore predicts the sums
-/// with r / n, whose divisions are independent, and compares each with its definition off the critical path. If a
+/// previous one. Each division depends on the previous one, which takes 100 ns. The function therefore predicts the
+/// sums with r / n, whose divisions are independent, and compares each with its definition off the critical path. If a
 /// prediction differs in its last bit (in one of 15 series), the following sums use the definition. This takes 5 ns if
 /// the loop is unrolled with constant n.
 template <std::size_t kFirst, std::size_t kLast>

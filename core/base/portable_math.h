@@ -6,13 +6,13 @@
 
 /// Functions of doubles with bitwise identical results on every processor, compiler and C library.
 ///
-/// The results of libm differ: glibc uses other instructions on processors with FMA, and its versions can round the
-/// last bit differently. A simulation with an encoder amplifies such a bit to a different run. These functions only use
-/// + − · ÷ √, rounding to integers and std::fmod, which are exact or correctly rounded in IEEE 754, in a fixed order.
-/// Compile with -ffp-contract=off (as in CMakeLists.txt), because a fused multiply-add rounds only once.
+/// libm is not enough: glibc uses other instructions on processors with FMA, and its versions can round the last bit
+/// differently. A simulation with an encoder amplifies such a bit to a different run. These functions only use + − · ÷
+/// √, rounding to integers and std::fmod, which are exact or correctly rounded in IEEE 754, in a fixed order. Compile
+/// with -ffp-contract=off (as in CMakeLists.txt), because a fused multiply-add rounds only once.
 ///
-/// Unless stated otherwise, errors are at most 2e-16 of the result or 1e-16, whichever is larger. NaN gives NaN where
-/// it is accepted. Realtime-safe: yes.
+/// Unless noted otherwise, the error is at most the larger of 1e-16 and 2e-16 of the result. NaN gives NaN.
+/// Realtime-safe: yes.
 namespace tendon::portable {
 
 /// Rounds to the nearest integer, halves away from zero; |x| below 2⁶².
@@ -21,21 +21,21 @@ std::int64_t round(double x) noexcept;
 /// Natural logarithm. x must be positive, normal and finite.
 double log(double x) noexcept;
 
-/// eˣ. Relative error below 1e-15 for x in −700 … 700; 0 below −700, ∞ above 709.
+/// eˣ. The relative error is below 1e-15 for x in −700 … 700. Returns 0 below −700 and ∞ above 709.
 double exp(double x) noexcept;
 
 /// eˣ − 1, with full precision near zero.
 double expm1(double x) noexcept;
 
-/// Hyperbolic tangent; exactly ±1 for |x| ≥ 20, also for ±∞.
+/// Returns exactly ±1 for |x| ≥ 20, including ±∞.
 double tanh(double x) noexcept;
 
-/// Sine and cosine of x rad. Beyond 2³⁰ rad x is first reduced by the double nearest to 2π, with an error that grows
-/// with x. ±∞ gives NaN.
+/// Sine and cosine of x rad. Beyond 2³⁰ rad, x is reduced by the double nearest to 2π, with an error that grows with x.
+/// ±∞ gives NaN.
 double sin(double x) noexcept;
 double cos(double x) noexcept;
 
-/// The angle of the point (x, y) in rad, −π … π; 0 for (0, 0). The sign of a zero has no effect. Both must be finite.
+/// Angle of (x, y) in rad, −π … π; 0 for (0, 0). The sign of zero is ignored. Both must be finite.
 double atan2(double y, double x) noexcept;
 
 /// √(a² + b²) without intermediate overflow or underflow.

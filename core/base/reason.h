@@ -6,30 +6,27 @@
 
 namespace tendon {
 
-/// The reason why a force differs from the demand. Every limiter returns one with its result. The values are bits, and
-/// part of the wire format and of recordings: never renumber.
+/// Why a force is different from the demand. The values are part of the wire format and recordings: never renumber.
 enum class Reason : std::uint32_t {
   kNone = 0,
-  kEnergy = 1U << 0,       ///< output limiter: a larger force could break passivity
-  kMaxForce = 1U << 1,     ///< force limit of the device or the scene
-  kSlew = 1U << 2,         ///< slew rate limit
-  kRampIn = 1U << 3,       ///< ramp after (re-)engaging
-  kHeld = 1U << 4,         ///< the remote force is no longer valid and still held
-  kDecaying = 1U << 5,     ///< the remote force fades
-  kSafeStop = 1U << 6,     ///< the remote force is zero until a fresh one arrives
-  kNotFinite = 1U << 7,    ///< NaN or infinity in the demand or a measurement
-  kFault = 1U << 8,        ///< a latched fault holds the force at zero
-  kDeviceClamp = 1U << 9,  ///< the device applied less than the commanded force
-  kOverrun = 1U << 10,     ///< no limit: the last interval exceeded the longest_hold of the scene
-  kWatchdog = 1U << 11,    ///< no limit: the last interval exceeded the watchdog of the device
-  kUnseen = 1U << 12,      ///< no position was measured, so the force is zero
-  kDisarmed = 1U << 13,    ///< the operator has disarmed the device
-  kDamped = 1U << 14,      ///< damper of the output limiter: the hand vibrates in contact
-  /// No limit: the hand exceeded the assumption of bounded_acceleration, so this step uses the plain bound.
-  kAcceleration = 1U << 15,
+  kEnergy = 1U << 0,         ///< output limiter: a larger force could break passivity
+  kMaxForce = 1U << 1,       ///< force limit of the device or the scene
+  kSlew = 1U << 2,           ///< slew rate limit
+  kRampIn = 1U << 3,         ///< ramp after (re-)engaging
+  kHeld = 1U << 4,           ///< the remote force is no longer valid and still held
+  kDecaying = 1U << 5,       ///< the remote force fades
+  kSafeStop = 1U << 6,       ///< the remote force is zero until a fresh one arrives
+  kNotFinite = 1U << 7,      ///< NaN or infinity in the demand or a measurement
+  kFault = 1U << 8,          ///< the force is zero until the fault is cleared
+  kDeviceClamp = 1U << 9,    ///< the device applied less than the commanded force
+  kOverrun = 1U << 10,       ///< no limit: the last interval exceeded the longest_hold of the scene
+  kWatchdog = 1U << 11,      ///< no limit: the last interval was longer than the watchdog of the device
+  kUnseen = 1U << 12,        ///< no position was measured, so the force is zero
+  kDisarmed = 1U << 13,      ///< the operator has disarmed the device
+  kDamped = 1U << 14,        ///< damper of the output limiter: the hand vibrates in contact
+  kAcceleration = 1U << 15,  ///< no limit: the hand broke bounded_acceleration, so this step uses the plain bound
 };
 
-/// A set of reasons.
 class Reasons {
  public:
   constexpr Reasons() noexcept = default;
@@ -53,7 +50,7 @@ class Reasons {
   std::uint32_t bits_ = 0;
 };
 
-/// Formats reasons as "energy, slew". Empty if there are none.
+/// Returns a list such as "energy, slew", or an empty string if there are none.
 std::string to_string(Reasons reasons);
 
 }  // namespace tendon

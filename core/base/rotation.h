@@ -6,14 +6,11 @@
 namespace tendon {
 
 // Rotations as unit quaternions. Results are the same for q and −q, and bitwise identical on every processor
-// (core/base/portable_math.h). The functions do not check that the length is 1, except for `unit`.
-//
-// Thread-safe, realtime-safe: yes.
+// (core/base/portable_math.h). The length is only checked by `unit` and `is_rotation`. Thread-safe, realtime-safe: yes.
 
 /// Returns the rotation a b: first b, then a.
 Quat product(const Quat& a, const Quat& b) noexcept;
 
-/// Returns the inverse rotation.
 Quat inverse(const Quat& q) noexcept;
 
 /// Returns q / |q|, or the identity if the length is 0 or not finite.
@@ -28,24 +25,21 @@ Quat rotation_by(const Vec3& vector) noexcept;
 /// Returns the rotation vector of q, of length π at most: rotation_by(rotation_vector(q)) is q.
 Vec3 rotation_vector(const Quat& q) noexcept;
 
-/// Returns the rotation vector θ from `from` to `to` in base frame axes: to = rotation_by(θ) · from. A constant torque
-/// on a handle that turns about one axis does the work τ·θ; the ledger books −τ·θ.
+/// Returns the rotation vector θ from `from` to `to` in base frame axes: to = rotation_by(θ) · from. If the handle
+/// turns about one axis, a constant torque does the work τ·θ, and the ledger books −τ·θ.
 Vec3 turn_between(const Quat& from, const Quat& to) noexcept;
 
 /// Returns R v.
 Vec3 rotated(const Quat& q, const Vec3& v) noexcept;
 
-/// Returns whether the rotation from `rest` to `q` is at most 150°. A spring is not valid beyond this, because its
+/// Returns whether the rotation from `rest` to `q` is at most 150°. A spring must not be used beyond this, because its
 /// torque decreases and has no direction at 180°.
 bool is_within_reach(const Quat& rest, const Quat& q) noexcept;
 
-/// Returns the torque of a spring of `stiffness` K (N·m/rad, symmetric, base frame axes) that is rotated from `rest` to
-/// `q`. With (w, v) = q · rest⁻¹:
-///
+/// The torque of a spring of stiffness K (N·m/rad, symmetric, base frame) from `rest` to `q`. With (w, v) = q · rest⁻¹:
 ///     τ = −2 (w K v + v × K v)          the gradient of U = 2 vᵀ K v;   −K θ for small turns θ
-///
-/// A closed path generates no energy, for any symmetric K. (The form 2 K sgn(w) v is a gradient as well, of 4 K (1 −
-/// |w|), but only for an isotropic K, and it jumps at 180°.)
+/// A closed path generates no energy for any symmetric K. (2 K sgn(w) v is the gradient of 4 K (1 − |w|) only for an
+/// isotropic K, and jumps at 180°.)
 Vec3 spring_torque(const Mat3& stiffness, const Quat& rest, const Quat& q) noexcept;
 
 /// Returns U of that spring in J.

@@ -6,11 +6,9 @@
 
 namespace tendon {
 
-/// A duration in whole nanoseconds.
 using Duration = std::chrono::nanoseconds;
 
-/// The monotonic clock of this machine, as a type only. It has no `now()`, so code cannot read it. The owner of a real
-/// or simulated clock passes times in.
+/// The monotonic clock of this machine, as a type only. There is no `now()`; times are passed in.
 struct LocalClock {
   using duration = Duration;
   using rep = Duration::rep;
@@ -19,7 +17,7 @@ struct LocalClock {
   static constexpr bool is_steady = true;
 };
 
-/// The monotonic clock of the peer, with another zero and rate. `LocalTime - PeerTime` does not compile (test
+/// The monotonic clock of the peer has a different zero and rate. `LocalTime - PeerTime` does not compile (test
 /// `Time.APeersTimeCannotBeSubtractedFromOurs`).
 struct PeerClock {
   using duration = Duration;
@@ -32,10 +30,9 @@ struct PeerClock {
 using LocalTime = LocalClock::time_point;
 using PeerTime = PeerClock::time_point;
 
-/// Converts to seconds, for equations.
 constexpr double seconds(Duration d) noexcept { return std::chrono::duration<double>(d).count(); }
 
-/// Converts `s` seconds, rounded down to whole nanoseconds. `s` must be finite and within ±292 years.
+/// Rounds down to whole nanoseconds. `s` must be finite and within ±292 years.
 constexpr Duration from_seconds(double s) noexcept {
   return std::chrono::floor<Duration>(std::chrono::duration<double, std::nano>(s * 1e9));
 }

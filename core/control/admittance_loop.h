@@ -6,35 +6,31 @@
 namespace tendon {
 
 /// Admittance control: makes a heavy device with a force sensor feel like a tool of another mass.
-///
 ///     M dv_d/dt = F_hand + F_env − D v_d − S x_d,   dx_d/dt = v_d        (the tool; v_d(0) = x_d(0) = 0)
 ///     F_wanted  = K_p (v_d − v) + K_i Σ (v_d T − Δx)                      (PI loop on the velocity)
-///
-/// F_hand is the measured force of the hand on the handle. F_env is the force of the remote environment on the tool.
-/// F_wanted is the force of the device on the hand. v is the velocity of the handle, and Δx and T are the displacement
-/// and the measured length of the last interval. M, D, S, K_p and K_i are diagonal. The implicit Euler method
-/// integrates the tool and is stable for any T.
+/// F_hand is the measured force of the hand on the handle, F_env the force of the remote environment on the tool, and
+/// F_wanted the force of the device on the hand. v is the velocity of the handle; Δx and T are the displacement and the
+/// measured length of the last interval. M, D, S, K_p and K_i are diagonal. The tool is integrated with the implicit
+/// Euler method, which is stable for any T.
 ///
 /// Pass F_wanted to a stability controller, and the same intervals to both. The port is then passive for all gains:
-///
 ///     law.observe(interval);                                 loop.observe(interval);
 ///     force = law.limit(loop.command({hand_force, environment, velocity})).force;
 ///
 /// Anti-windup: if the applied force was smaller than the command, the last integration step is not taken in the
 /// direction of the shortfall, and the integral in that direction is limited to the applied force. The force therefore
-/// leaves its bound as soon as the velocity error changes sign.
+/// leaves its bound when the velocity error changes sign.
 ///
-/// Limitation: the account of the limiter contains friction, not kinetic energy. To accelerate a handle of mass m like
-/// a lighter tool, the motors must provide ½ (m − M) v² before the hand does. The limiter clips the part that the
+/// Limitation: the account of the limiter contains friction, but not kinetic energy. To accelerate a handle of mass m
+/// like a lighter tool, the motors must provide ½ (m − M) v² before the hand does. The limiter clips the part that the
 /// damping of the tool has not earned, and the hand feels the mass of the device. A credit of ½ m (|v| − a_max T)₊²
 /// would not be passive (admittance_loop_test.cc contains a motion that breaks it).
 ///
+/// If a measurement is not finite, the tool and the integral are reset to rest, the demand is not finite, and the law
+/// returns zero force with the reason. An interval is ignored if it is not finite or not positive.
+///
 /// Source: Lee & Lee, IEEE TCST 17(4), 2009, section II-A; core/PROOFS.md, "Admittance loop".
-///
-/// A measurement that is not finite resets the tool and the integral to rest. The demand is then not finite, and the
-/// law returns zero force with the reason. An interval that is not finite or not positive is ignored.
-///
-/// Thread-safe: no. Realtime-safe: all but the constructor.
+/// Thread-safe: no. Realtime-safe: yes, except the constructor.
 template <int N>
 class AdmittanceLoop {
  public:
@@ -46,7 +42,6 @@ class AdmittanceLoop {
     Vec<N> integral = Vec<N>::Zero();   ///< K_i, N/m; ≥ 0
   };
 
-  /// Measurements of this step.
   struct Measured {
     Vec<N> hand_force;   ///< N, of the hand on the handle
     Vec<N> environment;  ///< N, of the remote environment on the tool

@@ -10,11 +10,8 @@
 
 namespace tendon {
 
-/// The Adjusting Output-Limiter with one ledger. It keeps the direction of the force.
-///
-/// The N = Blocks · Size coordinates form `Blocks` groups of `Size`. The friction of a group is isotropic, with the
-/// lower bounds f_c,i and b_i, and all groups share one account:
-///
+/// The Adjusting Output-Limiter with one ledger. It keeps the direction of the force. The N = Blocks · Size coordinates
+/// form `Blocks` groups of `Size` with isotropic friction, of lower bounds f_c,i and b_i. All groups share one account:
 ///     E(n) = Σₖ [ −F(k−1)·Δx(k) + Σ_i ( f_c,i ‖Δx_i‖ + b_i ‖Δx_i‖²/T(k) ) ]
 ///     F    = γ F_wanted,  γ ≤ 1 the largest with  Σ_i T_max (γ‖F_wanted,i‖ − f_c,i)₊²/(4 b_i) ≤ max(E, 0)
 ///
@@ -24,12 +21,10 @@ namespace tendon {
 ///                   torques, not Cartesian forces, are held between two steps
 ///     Aol<2, 3>     a wrench: force and torque, each with its own friction
 ///
-/// The port is passive for every demand if each force is held for at most T_max.
-///
+/// If each force is held for at most T_max, the port is passive for every demand.
 /// Source: Lee & Lee, IEEE TCST 17(4), 2009, eqs (1)–(9), Table I; core/PROOFS.md, "Output bound" and "Several
 /// coordinates".
-///
-/// Thread-safe: no. Realtime-safe: all but the constructor.
+/// Thread-safe: no. Realtime-safe: yes, except the constructor.
 template <int Blocks, int Size = 1>
 class Aol {
  public:
@@ -48,13 +43,12 @@ class Aol {
   LimitedForce<kSize> limit(const Demand<kSize>& wanted) noexcept;
   double energy() const noexcept;
 
-  /// SharesAccount: E is then the shared account.
   void credit(double energy) noexcept;
   void withdraw(double energy) noexcept;
   double payable() const noexcept { return energy(); }
   double worst_loss(const Vec<kSize>& force) const noexcept;
 
-  /// Sets T_max (> 0) for the next `limit` and all later ones.
+  /// Takes effect with the next `limit`. T_max must be positive.
   void hold_at_most(Duration longest_hold) noexcept;
 
  private:
@@ -64,16 +58,11 @@ class Aol {
 };
 
 /// The form of the paper for several degrees of freedom (eq. 10), with a separate ledger and limiter for each axis.
-///
 ///     E = Σ_i E_i,   |F_i| ≤ f_c,i + 2 √( b_i max(E_i, 0) / T_max )
-///
 /// The friction bounds must be valid for each axis alone, so with isotropic Coulomb friction f_c an axis can only use
-/// f_c/√N. The output depends on the frame and can lose or reverse a lateral force. Use this class to reproduce the
-/// experiments of the paper.
-///
-/// Source: core/PROOFS.md, "Several coordinates".
-///
-/// Thread-safe: no. Realtime-safe: all but the constructor.
+/// f_c/√N. The output depends on the frame, and can lose or reverse a lateral force. Use this class to reproduce the
+/// experiments of the paper. Source: core/PROOFS.md, "Several coordinates".
+/// Thread-safe: no. Realtime-safe: yes, except the constructor.
 template <int N>
 class PerAxisAol {
  public:
@@ -87,12 +76,10 @@ class PerAxisAol {
 
   void observe(const Interval<N>& interval) noexcept;
   void observe_unseen(const Vec<N>& applied, Duration at_most) noexcept;
-  /// `permitted` is the largest of the bounds of the axes.
   LimitedForce<N> limit(const Demand<N>& wanted) noexcept;
-  /// Returns the smallest of the accounts in J.
-  double energy() const noexcept;
+  double energy() const noexcept;  ///< the smallest of the accounts, J
 
-  /// Sets T_max (> 0) for the next `limit` and all later ones.
+  /// Takes effect with the next `limit`. T_max must be positive.
   void hold_at_most(Duration longest_hold) noexcept;
 
  private:

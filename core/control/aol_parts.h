@@ -12,16 +12,14 @@ namespace tendon {
 /// AOL+ for a point in space, the law of a scene with parts.
 using PointAolPlus = AolPlus<1, 3>;
 
-/// One part of AOL+: its name, its purpose, and the member with its configuration.
 template <class Config>
 struct AolPart {
-  std::string_view name;  ///< of its table in a scene, under [limiter]
-  std::string_view what;  ///< its purpose in one line
-  std::optional<Config> PointAolPlus::Parts::*config;
+  std::string_view name;                               ///< of its table in a scene, under [limiter]
+  std::string_view what;                               ///< its purpose in one line
+  std::optional<Config> PointAolPlus::Parts::*config;  ///< member with its configuration
 };
 
-/// All parts of AOL+ in the order of the tables. Scenes, `tendond explain` and the lab use this list, and a test
-/// compares it with the table in core/control/README.md.
+/// Used by scenes, `tendond explain` and the lab. A test compares this list with the table in core/control/README.md.
 inline constexpr std::tuple kAolParts{
     AolPart<PointAolPlus::EnergyCap>{"energy_cap", "limits the credit", &PointAolPlus::Parts::energy_cap},
     AolPart<PointAolPlus::Robust>{"robust_ledger", "earns no credit from the rounding of positions",

@@ -156,7 +156,7 @@ double AolPlus<Blocks, Size>::reserved() const noexcept {
   return sum;
 }
 
-/// Δ of the robust ledger over all coordinates of a group; 0 without one.
+/// Returns Δ over all coordinates of a group, or 0 if there is no robust ledger.
 template <int Blocks, int Size>
 double AolPlus<Blocks, Size>::count(std::size_t block) const noexcept {
   return parts_.robust_ledger ? parts_.robust_ledger->encoder_step[block] * std::sqrt(Size) : 0.0;
@@ -178,7 +178,7 @@ void AolPlus<Blocks, Size>::watch_acceleration(const Interval<kSize>& interval) 
   acceleration_holds_ = false;
   const Vec<kSize> velocity = interval.dx / held;
   if (velocity_) {
-    // The mean velocities of neighbouring intervals differ by at most a times the time between their midpoints, plus
+    // The difference of the mean velocities of two intervals is at most a times the time between their midpoints, plus
     // the rounding of the three positions.
     acceleration_holds_ = true;
     const double before = seconds(last_held_);
@@ -205,7 +205,7 @@ template <int Blocks, int Size>
   smoothed_ += fast * (once_smoothed_ - smoothed_);
   slow_ += slow * (smoothed_ - slow_);
   if (!parts_.damper) return;
-  // The debt decays, and income beyond it is not saved.
+  // The debt decays. Any income beyond the debt is lost.
   const double forgotten = std::min(1.0, held / kDamperMemory);
   double earned = damped_.dot(interval.dx);
   if (robust_) {
@@ -306,7 +306,7 @@ void AolPlus<Blocks, Size>::cap(const Vec<kSize>& wanted) noexcept {
   discarded_ = std::max(discarded_, account() - kept);
 }
 
-/// ℓ of a group of coordinates while `force` of norm `size` is held.
+/// Returns ℓ of a group of coordinates if `force` with norm `size` is held.
 template <int Blocks, int Size>
 [[gnu::noinline]] OutputBound AolPlus<Blocks, Size>::bound_along(std::size_t block, const Vec<Size>& force,
                                                                  double size) const noexcept {
@@ -319,13 +319,13 @@ template <int Blocks, int Size>
   return bound;
 }
 
-/// ℓ_s of a group of coordinates.
+/// Returns ℓ_s of a group of coordinates.
 template <int Blocks, int Size>
 OutputBound AolPlus<Blocks, Size>::shaping_along(std::size_t block) const noexcept {
   return {.coulomb = friction_[block].coulomb, .viscous_per_hold = parts_.shaping->stiffness[block] / 2};
 }
 
-/// The largest share of `force` that the account permits, by ℓ or (`shaping`) by ℓ_s; can exceed 1.
+/// The largest share of `force` that the account permits, by ℓ or (`shaping`) by ℓ_s. It can exceed 1.
 template <int Blocks, int Size>
 double AolPlus<Blocks, Size>::largest_share(const Vec<kSize>& force, double budget, bool shaping) const noexcept {
   std::array<double, Blocks> sizes{};
@@ -339,7 +339,7 @@ double AolPlus<Blocks, Size>::largest_share(const Vec<kSize>& force, double budg
   return largest_scale(bounds, sizes, budget);
 }
 
-/// The share of `force` that thrift lets through.
+/// Returns the factor by which thrift multiplies `force`.
 template <int Blocks, int Size>
 double AolPlus<Blocks, Size>::give_back(const Vec<kSize>& force, double size, double near,
                                         double budget) const noexcept {

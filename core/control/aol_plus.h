@@ -15,7 +15,6 @@ namespace tendon {
 
 /// AOL+ is the Adjusting Output-Limiter with optional parts for real devices. Without parts it is equal to Aol<Blocks,
 /// Size>: bit for bit with one group of coordinates, and up to rounding with several.
-///
 ///     E ← E + the last interval                     exactly, or as robust_ledger does
 ///     E ← min(E, E_cap + C)                         energy_cap
 ///     Ē = E − (Δ/2)‖F_held‖₁ − Σ ℓ(under way)       robust_ledger, latency_reserve
@@ -24,18 +23,15 @@ namespace tendon {
 ///     F₁ ← F₁ · (1 − a share)                       thrift
 ///     F₂ = F₁ − D(hand)                             damper
 ///     F = F₂, shortened to Σ_i ℓ_i(‖F_i‖) ≤ Ē along F₂
-///
 /// The port is passive because E never exceeds the true ledger, and because the last line bounds the force whatever the
-/// other parts do. If a force is held for T_act > T_max, this can take E below zero by at most ℓ(F) − E, with T_act in
-/// ℓ.
+/// other parts do. If a force is held for T_act > T_max, E can fall below zero by at most ℓ(F) − E, with T_act in ℓ.
 ///
-/// **energy_cap** limits the credit from free motion, which would otherwise switch the limiter off: 30 s of waving pay
-/// for 18 N. E ≤ E_cap + C, where C is the work that the hand has put into the current contact. It pays for springs
-/// that are released.
+/// **energy_cap** limits the credit from free motion. Otherwise, 30 s of waving would pay for 18 N. E ≤ E_cap + C,
+/// where C is the work of the hand in the current contact, which pays for springs that are released.
 ///     C ← max(0, C + work),  C ≤ ‖F_wanted‖ · ‖travel since the contact began‖,  C ≤ C_most
-/// A contact ends if no force is wanted, or if the wanted force reverses. C does not decay with time, because this
-/// would weaken the force on a hand that holds a spring still. A shared account (EnergyTank) also keeps ℓ(F_wanted):
-/// the C of a follower is zero, so the cap would discard the energy that its peer paid for the force.
+/// A contact ends when no force is wanted, or when the wanted force reverses. C does not decay with time, so that the
+/// force does not decrease while a hand holds a spring still. A shared account (EnergyTank) also keeps ℓ(F_wanted): the
+/// C of a follower is zero, so the cap would discard the energy that its peer paid for the force.
 ///
 /// **robust_ledger** uses RobustLedger for positions in counts of Δ.
 ///
@@ -43,59 +39,54 @@ namespace tendon {
 ///     κ(r) = r                                  r ≤ s
 ///          = s + (1 − s) tanh((r − s)/(1 − s))  beyond
 ///
-/// **latency_reserve** is for devices that apply a force only `holds` periods after the step. It reserves ℓ of all
-/// forces under way. K_op → 2b/((holds + 1) T).
+/// **latency_reserve** is for devices that apply a force `holds` periods after the step. The energy ℓ of all these
+/// forces is reserved. K_op → 2b/((holds + 1) T).
 ///
 /// **bounded_acceleration** is for devices with very little damping, where 2b/T is a few N/m. If the acceleration of
-/// the hand is at most a, then its travel along F in the next period is at most
+/// the hand is at most a, its travel along F in the next period is at most
 ///     L = T_max (F̂·Δx/T_act + a (T_act + T_max)/2) + Δ-allowance
 /// and a larger force is safe (OutputBound). If an interval violates the assumption, the step uses the plain bound and
-/// the violation is counted. Not with latency_reserve, because the proof only covers the next period. Requires shaping,
-/// which limits how hard a wall feels.
+/// the violation is counted. Cannot be used with latency_reserve, because the proof only covers the next period.
+/// Requires shaping, which limits the stiffness of walls.
 ///
 /// **shaping** keeps the force below that of a spring of stiffness K_s with the energy Ē, for any T:
 ///     ℓ_s(f) = (f − f_c)₊² / (2 K_s)            J, in addition to ℓ: f ≤ f_c + √(2 K_s Ē)
-/// The b_v of the papers is K_s T/2. The damper uses the range between this bound and ℓ; without a damper a clipped
-/// spring rings.
+/// The b_v of the papers is K_s T/2. The damper uses the range up to ℓ. A clipped spring rings without it.
 ///
-/// **thrift** reduces the force slightly while it does work on the hand (F₁·u > 0, with the velocity u below) and Ē <
-/// E_s:
+/// **thrift** reduces the force slightly while it does work on the hand (F₁·u > 0, u below) and Ē < E_s:
 ///     F₁ ← F₁ (1 − σ a n (1 − Ē/E_s)),   a = clamp(F₁·u/(‖F₁‖ (‖u‖ + 2 mm/s)), 0, 1),
 ///                                        n = clamp((‖F_wanted‖/f_γ − 0.4)/0.4, 0, 1),   f_γ = γ ‖F_wanted‖
 /// This leaves 0.1 to 0.3 mJ for the next contact. With a robust ledger the force also grows only as far as the account
-/// can pay for its counts, ‖F₁‖ ≤ max(f_c, ‖F_held‖ + Ē/(4Δ)), because otherwise an empty account would stay empty.
+/// can pay for its counts, ‖F₁‖ ≤ max(f_c, ‖F_held‖ + Ē/(4Δ)). Otherwise an empty account would stay empty.
 ///
-/// **damper** damps fast motion in contact, for hands that ring on a late or clipped spring. With the velocity v of the
-/// interval, for each group of coordinates:
+/// **damper** damps fast motion in contact, for hands that ring on a late or clipped spring. For each group of
+/// coordinates, with the velocity v of the interval:
 ///     u₁ ← u₁ + (T/τ_v)(v − u₁),   u ← u + (T/τ_v)(u₁ − u),   s ← s + (T/τ_h)(u − s),   w = u − s       m/s
 ///     D = min(B h (1 − O/O_most)₊ (1 − v_q/‖w‖)₊ ‖F₁‖/(‖F₁‖ + f_s), ‖F₁‖/‖w‖) w                         N
 ///     v_q = z Δ/(e τ_v) / (1 + (‖s‖ τ_v/Δ)²)                                                            m/s
 ///     h = clamp(max((‖F_wanted‖/f_γ − 0.3)/0.4, age/10 ms · min(1, k/(0.3 K_s))), 0, 1)
 ///     k = ‖F_wanted‖/‖travel since the contact began‖ with energy_cap and shaping, else ∞                 N/m
 ///     O ← max(0, O − O T/0.3 s − D_held·Δx + (Δ/2)‖D_held − D_before‖₁)                                 J
-/// h is zero for a fresh answer well inside the bound, and small for a soft spring: a late spring acts on the hand like
+/// h is zero for a fresh answer well inside the bound, and small for a soft spring. A late spring acts on the hand like
 /// a damper of −k · age N·s/m. The dead zone v_q removes the pulses of single counts, whose cost B Δ²/(e τ_v) would
-/// drain the robust ledger. O is the energy that the damper owes for its counts. The damper never reverses a force.
+/// drain the robust ledger. O is the energy that the damper owes for its counts. The force is never reversed.
 ///
-/// **fading_contact** lets C decay instead of vanish, so an object that softens and returns does not start from E_cap.
-/// The price: work on one object can pay for an impact for about τ_C longer. With C_b = min(‖F_wanted‖ ‖travel‖,
-/// C_most)
+/// **fading_contact** makes C decay instead of resetting it, for objects that soften and return. The work on one object
+/// can then pay for an impact for about τ_C longer. With C_b = min(‖F_wanted‖ ‖travel‖, C_most)
 ///     C ← C + (C_b − C) T/τ_C   while C > C_b;  at a change of sign only the travel starts again
 ///
 /// **adaptive_friction** follows `adapt`: downwards immediately, upwards slowly.
 ///
 /// Source: core/PROOFS.md, "Discarded credit", "Force inside the bound", "Output latency", "Bounded acceleration" and
 /// "Encoder counts". Blocks and Size are as in Aol.
-///
-/// Thread-safe: no. Realtime-safe: all but the constructor.
+/// Thread-safe: no. Realtime-safe: yes, except the constructor.
 template <int Blocks, int Size = 1>
 class AolPlus {
  public:
   static constexpr int kSize = Blocks * Size;
-  /// A reserve for more than 16 periods would leave no useful force.
-  static constexpr int kMostHolds = 16;
+  static constexpr int kMostHolds = 16;  ///< a reserve for more periods would leave no useful force
 
-  /// Default arrays are for the movement of a handle, the first group of coordinates. The other groups have no default.
+  /// Default arrays are for the movement of a handle, the first group of coordinates.
   struct EnergyCap {
     double energy = 0.005;       ///< E_cap, J: quiet on a 20 kN/m wall after 10 s of waving
     double most_contact = 0.13;  ///< C_most, J: F_max · 30 mm / 2 for 8.5 N
@@ -111,8 +102,7 @@ class AolPlus {
     int holds = 1;  ///< 1 to kMostHolds
   };
   struct BoundedAcceleration {
-    /// a, m/s² or rad/s². It must cover the largest (F_hand + F_motor)/m: 8.5 N on a free handle of 75 g are 113 m/s²,
-    /// and a tap is about 200 m/s².
+    /// a, m/s² or rad/s². At least (F_hand + F_motor)/m: 113 for 8.5 N on a handle of 75 g, and about 200 for a tap.
     std::array<double, Blocks> most{300};
   };
   struct Shaping {
@@ -137,7 +127,7 @@ class AolPlus {
     Duration rise = std::chrono::seconds(10);  ///< time constant of a rising bound
   };
 
-  /// An empty part is not used. AolPart (aol_parts.h) lists the parts by name.
+  /// Unused parts are empty.
   struct Parts {
     std::optional<EnergyCap> energy_cap{};
     std::optional<Robust> robust_ledger{};
@@ -155,7 +145,7 @@ class AolPlus {
     std::array<Friction, Blocks> friction{};
     Duration longest_hold{};  ///< T_max; > 0
     Parts parts{};
-    bool shared_account = false;  ///< other ports pay into the account; see energy_cap
+    bool shared_account = false;  ///< other ports can credit the account (see energy_cap)
   };
 
   /// Throws std::invalid_argument with the names of the part and its field.
@@ -171,21 +161,20 @@ class AolPlus {
   /// **true** ledger, and can be negative by at most the energy that rounding can hide.
   double spendable() const noexcept;
 
-  /// SharesAccount. Both functions change the exact and the robust ledger alike.
+  /// SharesAccount. `credit` and `withdraw` change the exact and the robust ledger alike.
   void credit(double energy) noexcept;
   void withdraw(double energy) noexcept;
   double payable() const noexcept { return spendable() - reserved(); }
-  /// Accounts for the knee (a bound of F/s lets F through whole), the forces under way and shaping.
+  /// Includes the knee (a bound of F/s passes all of F), the forces under way and shaping.
   double worst_loss(const Vec<kSize>& force) const noexcept;
 
-  /// Sets lower bounds of the friction. Does nothing without the part adaptive_friction.
+  /// Sets lower bounds of the friction. Does nothing without adaptive_friction.
   void adapt(const std::array<Friction, Blocks>& friction) noexcept;
 
-  /// Sets T_max (> 0) for the next `limit` and all later ones.
+  /// Takes effect with the next `limit`. T_max must be positive.
   void hold_at_most(Duration longest_hold) noexcept;
 
-  /// Returns the number of intervals with a larger acceleration than bounded_acceleration allows.
-  std::uint64_t broken_assumptions() const noexcept { return broken_; }
+  std::uint64_t broken_assumptions() const noexcept { return broken_; }  ///< intervals that broke bounded_acceleration
 
  private:
   double account() const noexcept;
@@ -224,7 +213,6 @@ class AolPlus {
   bool acceleration_holds_ = false;
   std::uint64_t broken_ = 0;
 
-  /// The velocity behind the filters of the damper.
   Vec<kSize> once_smoothed_ = Vec<kSize>::Zero();  ///< u₁, m/s
   Vec<kSize> smoothed_ = Vec<kSize>::Zero();       ///< u, m/s
   Vec<kSize> slow_ = Vec<kSize>::Zero();           ///< s, m/s

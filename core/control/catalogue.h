@@ -28,7 +28,6 @@ namespace tendon {
 // The catalogue of the laws. A new law is an enumerator and a row here. Scenes, `tendon-lab`, the property tests and
 // the golden numbers find it through laws().
 
-/// The stability controllers that a scene can choose. Each has its own file in core/control.
 enum class Law : std::uint8_t {
   kNone,
   kClamp,
@@ -50,18 +49,16 @@ enum class Law : std::uint8_t {
   kAolPlus,  ///< must be the last enumerator
 };
 
-/// Name and description of a law.
 struct LawInfo {
   Law law;
   std::string_view name;  ///< in scenes, tables and command lines
   std::string_view what;  ///< one line
-  /// The theory of the law guarantees that the ledger is never negative, **whatever** the remote environment requests.
-  /// The other laws are passive in some environments, or correct a deficit afterwards.
+  /// The ledger is provably never negative, **whatever** the remote environment requests. The other laws are passive in
+  /// some environments, or correct a deficit afterwards.
   bool passive;
   bool needs_stiffness;  ///< for demands without a stiffness
 };
 
-/// Returns all laws in the order of the tables.
 std::span<const LawInfo> laws() noexcept;
 const LawInfo& info(Law law) noexcept;
 std::optional<Law> law_named(std::string_view name) noexcept;
@@ -71,7 +68,7 @@ struct LimiterConfig {
   Law law = Law::kAolPlus;
   Friction friction{};      ///< lower bounds of the friction (per axis for kAolPerAxis and kAolBox)
   Duration longest_hold{};  ///< T_max; > 0
-  /// How the `passive` laws adapt if a force is held longer than T_max. If this is empty, T stays T_max.
+  /// Used by the `passive` laws if a force is held longer than T_max. If this is empty, T stays T_max.
   std::optional<HoldBound::Follow> follow_holds = HoldBound::Follow{};
   AolPlus<1, 3>::Parts parts{};                   ///< of kAolPlus
   double max_force = 0;                           ///< N, of kClamp
@@ -86,10 +83,8 @@ struct LimiterConfig {
 
 namespace catalogue {
 
-/// m/(N·s): a force of 1 N yields by at most 1 mm per period at 1 kHz.
-inline constexpr double kMostMobility = 1;
+inline constexpr double kMostMobility = 1;  ///< m/(N·s): 1 N yields by at most 1 mm per period at 1 kHz
 
-/// Description and factory of a law.
 template <class Make>
 struct LawRow {
   LawInfo info;
@@ -98,7 +93,6 @@ struct LawRow {
 template <class Make>
 LawRow(LawInfo, Make) -> LawRow<Make>;
 
-/// Row i is enumerator i of Law.
 inline constexpr std::tuple kRows{
     LawRow{{Law::kNone, "none", "no limiter, for comparison", false, false},
            [](const LimiterConfig& c) { return Unlimited<3>({c.friction}); }},
@@ -219,10 +213,10 @@ struct Laws<const std::tuple<Rows...>> : Union<std::variant<>, Rows...> {};
 
 }  // namespace catalogue
 
-/// Any law of the catalogue. Laws of the same class share one alternative.
+/// Laws of the same class share one alternative.
 using AnyLaw = catalogue::Laws<decltype(catalogue::kRows)>::Type;
 
-/// Creates the law that `config` names. Throws std::invalid_argument if a value is out of range.
+/// Throws std::invalid_argument if a value is out of range.
 AnyLaw make_law(const LimiterConfig& config);
 
 }  // namespace tendon

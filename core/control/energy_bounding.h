@@ -8,30 +8,22 @@
 
 namespace tendon {
 
-/// The energy-bounding algorithm, which bounds a force by the previous force and the last motion.
-///
-/// f = −F is the reflective force, f_e the wanted one and Δx the displacement in the last interval. f(n) is the force
-/// nearest to f_e that satisfies
-///
+/// The energy-bounding algorithm, which bounds a force by the previous force and the last motion. f = −F is the
+/// reflective force, f_e the wanted one, and Δx the last displacement. f(n) is the nearest force to f_e with
 ///     (i)   f(n)·Δx ≤ f(n−1)·Δx + c₁ ‖Δx‖²              the slope is at most c₁
 ///     (ii)  ‖f(n)‖² ≤ ‖f(n−1)‖² + 2 c₂ f(n)·Δx           it stores no more than was put in
-///
 /// with c₂ ≤ c₁ ≤ b/T in N/m. If c₂ > c₁, the conditions can contradict each other. The law displays at most about c₁,
 /// half of what force bounding and the AOL display with the same friction.
 ///
-/// The port is passive because E(n) ≥ ‖f(n)‖²/(2c₂), even if the device shortens the force. The proof requires that no
-/// force is held longer than `longest_hold` (see Limiter). The law restarts from zero force after an interval that was
-/// not measured or is not finite.
+/// The port is passive because E(n) ≥ ‖f(n)‖²/(2c₂), even if the device shortens the force. The proof requires holds of
+/// at most `longest_hold`. The law restarts from zero force after an interval that is not finite or was not measured.
 ///
 /// Source: Kim & Ryu, IROS 2004; Int. J. Robotics Research 29(6), 2010 (recalled; the exact published form of (ii) is
-/// unchecked). Proof: core/PROOFS.md, "Comparison laws". The vector form is ours. It is the intersection of a ball and
-/// a half-space, in which the nearest force has a closed form. For N = 1 these are the two intervals of the paper,
-/// except that the paper keeps f(n−1) for Δx = 0. Here only (ii) applies, so an unwanted force can vanish while the
-/// hand is at rest.
-///
-/// For N = 6 the same b must be valid for every component (similar joints).
-///
-/// Thread-safe: no. Realtime-safe: all but the constructor.
+/// unchecked). Proof: core/PROOFS.md, "Comparison laws". The vector form is ours: the intersection of a ball and a
+/// half-space, in which the nearest force has a closed form. For N = 1 these are the two intervals of the paper, except
+/// that the paper keeps f(n−1) for Δx = 0. Here only (ii) applies, so an unwanted force can vanish while the hand is at
+/// rest. For N = 6 the same b must be valid for every component (similar joints).
+/// Thread-safe: no. Realtime-safe: yes, except the constructor.
 template <int N>
 class EnergyBounding {
  public:

@@ -6,22 +6,16 @@
 
 namespace tendon {
 
-/// The less conservative force-bounding algorithm, which bounds a force by the energy that the current contact has
-/// earned.
-///
+/// The less conservative force-bounding algorithm, which bounds a force by the energy of the current contact.
 ///     E(n)  = E(n−1) − F(n−1)·Δx + b ‖Δx‖²/T(n)         E(n−1) := 0 first, when F(n−1) = 0 (no contact)
 ///     F(n)  = F_wanted · min(1, F_max/‖F_wanted‖),       F_max = 2 √( b max(E, 0)/T_max )
-///
 /// F is in N on the hand, Δx in m, E in J. Within one contact this is the Adjusting Output-Limiter without Coulomb
-/// friction. The reset of a positive E between contacts softens the first millimetres of each contact, and prevents
-/// energy from free motion from feeding a vibration.
-///
-/// The port is passive for every demand if each force is held for at most T_max, because E never exceeds the ledger of
-/// the port (core/PROOFS.md, "Discarded credit").
+/// friction. The reset of a positive E between contacts softens the first millimetres of each contact, and keeps energy
+/// from free motion out of a vibration. The port is passive for every demand if each force is held for at most T_max,
+/// because E never exceeds the ledger of the port (core/PROOFS.md, "Discarded credit").
 ///
 /// Source: Kim, Baek, Ryu, 2015 (recalled; form as in published code), B = b/T · I.
-///
-/// Thread-safe: no. Realtime-safe: all but the constructor.
+/// Thread-safe: no. Realtime-safe: yes, except the constructor.
 template <int N>
 class ForceBounding {
  public:
@@ -38,7 +32,7 @@ class ForceBounding {
   LimitedForce<N> limit(const Demand<N>& demand) noexcept;
   double energy() const noexcept { return port_.energy(); }
 
-  /// Sets T_max (> 0) for the next `limit` and all later ones.
+  /// Takes effect with the next `limit`. T_max must be positive.
   void hold_at_most(Duration longest_hold) noexcept { viscous_per_hold_ = viscous_ / seconds(longest_hold); }
 
  private:
@@ -50,26 +44,21 @@ class ForceBounding {
 };
 
 /// The more conservative force-bounding algorithm, which bounds a force by the previous force and the last motion only.
-///
 ///     ‖F(n)‖ ≤ ‖F(n−1) − 2b Δx/T‖
-///
-/// F is in N on the hand, F(n−1) is the applied force, and T the longest hold time. A wall appears as a spring of 2b/T.
-/// The law does not save an unused bound. A force therefore only grows while the hand moves into the wall, and shrinks
-/// by 2b/T times the distance of the hand from its deepest point.
-///
-/// The port is passive for every demand, because E(n) ≥ T ‖F(n)‖²/(4b) in every step. If a force was held longer than
-/// T, the law divides the viscous term by the measured time.
+/// F is in N on the hand, F(n−1) is the applied force, and T the longest hold time. A wall feels like a spring of 2b/T.
+/// An unused bound is not saved, so a force only grows while the hand moves into the wall, and shrinks by 2b/T times
+/// the distance of the hand from its deepest point. The port is passive for every demand, because E(n) ≥ T ‖F(n)‖²/(4b)
+/// in every step. If a force was held longer than T, the viscous term is divided by the measured time.
 ///
 /// Source: Kim, Baek, Ryu, 2015, "more conservative" form with ξ = 1 (recalled; form as in published code);
 /// core/PROOFS.md, "Comparison laws".
-///
-/// Thread-safe: no. Realtime-safe: all but the constructor.
+/// Thread-safe: no. Realtime-safe: yes, except the constructor.
 template <int N>
 class MemorylessForceBounding {
  public:
   using Config = typename ForceBounding<N>::Config;
 
-  /// Throws std::invalid_argument when a field is out of its range.
+  /// Throws std::invalid_argument if a field is out of range.
   explicit MemorylessForceBounding(const Config& config);
 
   void observe(const Interval<N>& interval) noexcept;

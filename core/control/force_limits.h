@@ -9,15 +9,12 @@
 
 namespace tendon {
 
-/// A force after a memoryless limit, and the reason for a change.
 struct Limited {
   Vec3 force;
   Reasons reasons;
 };
 
-/// Bounds the norm of a force and keeps its direction: ‖F‖ ≤ max (N).
-///
-/// Thread-safe, realtime-safe.
+/// Bounds the norm of a force and keeps its direction: ‖F‖ ≤ max (N). Thread-safe, realtime-safe.
 inline Limited saturate(const Vec3& wanted, double max) noexcept {
   const double size = wanted.norm();
   if (size <= max) return {wanted, {}};
@@ -25,9 +22,7 @@ inline Limited saturate(const Vec3& wanted, double max) noexcept {
 }
 
 /// Bounds the rate of change of a force, ‖F − F_before‖ ≤ rate · elapsed, and keeps the direction of the change. `rate`
-/// is in N/s; an infinite rate changes nothing. If `elapsed` is not positive, the force stays `before`.
-///
-/// Thread-safe, realtime-safe.
+/// is in N/s and can be infinite. If `elapsed` is not positive, the force stays `before`. Thread-safe, realtime-safe.
 inline Limited limit_slew(const Vec3& wanted, const Vec3& before, double rate, Duration elapsed) noexcept {
   if (std::isinf(rate)) return {wanted, {}};  // ∞ · 0 s would not be a number
   const Vec3 change = wanted - before;

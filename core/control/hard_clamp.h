@@ -7,12 +7,10 @@
 namespace tendon {
 
 /// Bounds the norm of a force and keeps its direction.
-///
 ///     F(n) = F_wanted(n) · min(1, F_max / ‖F_wanted(n)‖)
 ///
-/// **Not** passive: an instability becomes a limit cycle with the amplitude F_max.
-///
-/// Thread-safe: no. Realtime-safe: all but the constructor.
+/// This is **not** passive: an unstable system has a limit cycle with the amplitude F_max.
+/// Thread-safe: no. Realtime-safe: yes, except the constructor.
 template <int N>
 class HardClamp {
  public:

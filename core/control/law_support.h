@@ -10,7 +10,7 @@
 #include "core/base/expect.h"
 #include "core/control/stability_controller.h"
 
-/// Implementation details that the laws of core/control share.
+/// Implementation details of the laws.
 namespace tendon::law_support {
 
 /// Returns T_max in seconds. Throws std::invalid_argument if it is not positive.
@@ -19,7 +19,7 @@ inline double checked_hold(Duration longest_hold) {
   return seconds(longest_hold);
 }
 
-/// Returns b. Throws std::invalid_argument if it is not positive. For laws that need viscous friction.
+/// Returns b. Throws std::invalid_argument if it is not positive.
 inline double checked_viscous(double viscous) {
   expect_above_zero(viscous, "friction.viscous");
   return viscous;
@@ -43,27 +43,24 @@ bool finite(const Demand<N>& demand) noexcept {
   return demand.force.allFinite() && demand.stiffness.allFinite();
 }
 
-/// Returns the result for a demand that is not finite.
 template <int N>
 LimitedForce<N> refused(double permitted) noexcept {
   return {Vec<N>::Zero(), permitted, Reason::kNotFinite};
 }
 
-/// Returns `v`, shortened to `length` if it is longer.
 template <int N>
 Vec<N> shortened(const Vec<N>& v, double length) noexcept {
   const double size = v.stableNorm();
   return size <= length ? v : Vec<N>(v * (length / size));
 }
 
-/// Returns the wanted force shortened to `bound`, with `reason` if it was longer.
+/// Limits the norm of the wanted force to `bound`. If the force was larger, `reason` is set.
 template <int N>
 LimitedForce<N> bounded(const Vec<N>& wanted, double bound, Reason reason) noexcept {
   if (wanted.stableNorm() <= bound) return {wanted, bound, {}};
   return {shortened<N>(wanted, bound), bound, reason};
 }
 
-/// Eigendecomposition of a symmetric matrix.
 template <int N>
 struct Principal {
   Vec<N> values;   ///< eigenvalues, ascending
@@ -74,7 +71,7 @@ struct Principal {
 template <int N>
 Principal<N> principal_stiffness(const Mat<N>& stiffness) noexcept;
 
-/// Returns the largest singular value of a stiffness (N/m), the largest slope of the force. N = 1, 3, 6.
+/// The largest singular value of a stiffness (N/m) is the largest slope of the force. N = 1, 3, 6.
 template <int N>
 double spectral_norm(const Mat<N>& stiffness) noexcept;
 

@@ -8,29 +8,21 @@
 
 namespace tendon {
 
-/// A virtual coupling with a slope condition. It passes every static force law that is not steeper than the friction of
-/// the device allows, and connects all others to the hand through a spring of that slope.
-///
-/// A spring K_max connects the hand to a proxy. The reflective force f = −F becomes g while the proxy does not move,
-/// and f(n) if it moves by (g − f(n))/K_max. P is the energy that the proxy has received so far:
-///
+/// A virtual coupling with a slope condition. A static force law passes if it is not steeper than the friction of the
+/// device allows. All others are connected to the hand through a spring of that slope. The spring K_max connects the
+/// hand to a proxy. The reflective force f = −F becomes g while the proxy does not move, and f(n) if it moves by (g −
+/// f(n))/K_max. P is the energy that the proxy has received so far:
 ///     g    = f(n−1) + K_max Δx(n)
 ///     f(n) = the force nearest to f_e with  P(n) = P(n−1) + f(n)·(g − f(n))/K_max ≥ 0      (a ball about g/2)
-///
 /// in N, m and J, with P(0) = 0. The port is passive for every demand if
-///
 ///     b ≥ K_max T/2
-///
 /// because E(n) ≥ ‖f(n)‖²/(2 K_max) + P(n). A static field that starts at rest, with a convex potential and slopes in
-/// [0, K_max], passes unchanged. A late or stiffer field appears as a spring of K_max that yields.
-///
-/// The device may shorten the force. The law restarts from zero force, with the current P, after an interval that was
-/// not measured or is not finite.
+/// [0, K_max], passes unchanged. A late or stiffer field feels like a spring of K_max. The device may shorten the
+/// force. After an interval that was not measured or not finite, the law restarts from zero force with the current P.
 ///
 /// Source: the slope condition is that of the nonlinear virtual coupling of Lee & Lee (ref. [17] of IEEE TCST 17(4),
 /// 2009), whose formula is lost. The law and the proofs are ours: core/PROOFS.md, "Comparison laws".
-///
-/// Thread-safe: no. Realtime-safe: all but the constructor.
+/// Thread-safe: no. Realtime-safe: yes, except the constructor.
 template <int N>
 class NonlinearCoupling {
  public:
@@ -48,8 +40,7 @@ class NonlinearCoupling {
   LimitedForce<N> limit(const Demand<N>& demand) noexcept;
   double energy() const noexcept { return port_.energy(); }
 
-  /// Returns P in J, the energy that the proxy has received and can return.
-  double account() const noexcept { return account_; }
+  double account() const noexcept { return account_; }  ///< P, J
 
  private:
   double max_slope_;

@@ -9,20 +9,16 @@
 namespace tendon {
 
 /// Scales a whole force field by one factor, such that the friction of the device pays for sampling and delay.
-///
 ///     F = γ F_wanted,    γ = min(1, b / (K_max (T/2 + t_d)))
-///
 /// K_max (N/m) is the steepest slope of the field: the larger of `stiffness` and the spectral norm of the stiffest
-/// demand so far. γ therefore never increases. If the slope is unknown, the force is zero.
+/// demand so far. So γ never increases. If the slope is unknown, the force is zero. Soft parts become softer, too.
 ///
 /// The port is passive for a static field with a convex potential and slopes up to K_max, if it is sampled in every
-/// period, delivered t_d late (a multiple of the period), and applied unchanged. There is no guarantee for a field that
-/// changes with time. The soft parts of the field become softer as well.
+/// period, delivered t_d late (a multiple of the period), and applied unchanged. The field must not change with time.
 ///
 /// Source: Mahvash & Hayward, IEEE Trans. Robotics 21(1), 2005 (recalled); proof: core/PROOFS.md, "Comparison laws".
-/// Learning K_max from the demands is ours. A new slope only has an effect from then on.
-///
-/// Thread-safe: no. Realtime-safe: all but the constructor.
+/// Learning K_max from the demands is ours; it only affects later forces.
+/// Thread-safe: no. Realtime-safe: yes, except the constructor.
 template <int N>
 class PassiveSynthesis {
  public:

@@ -8,42 +8,34 @@
 
 namespace tendon {
 
-/// The method that observes the energy E that has gone into the environment. f = −F is the reflective force.
+/// How the energy E that has gone into the environment is observed. f = −F is the reflective force.
 enum class PassivityObserver : std::uint8_t {
   /// As published in 2002: Σ f(n)·Δx(n) of the force of the environment, plus the energy that the controller has
   /// dissipated. It combines the motion of an interval with the force that **follows** it, so it cannot observe the
-  /// energy that a sampled spring generates:
-  ///     Σ K x(n) Δx(n) = K x²/2 + K/2 Σ Δx² ≥ 0 for every motion
+  /// energy that a sampled spring generates: Σ K x(n) Δx(n) = K x²/2 + K/2 Σ Δx² ≥ 0 for every motion.
   kSameSample,
-  /// Σ f(n−1)·Δx(n) of the applied force, which is exact for a zero-order hold. The result for a spring is K x²/2 − K/2
-  /// Σ Δx². The controller uses the prediction E + f_e(n)·Δx(n), which assumes that the next motion is equal to the
-  /// last one.
+  /// Σ f(n−1)·Δx(n) of the applied force, which is exact for a zero-order hold: a spring gives K x²/2 − K/2 Σ Δx². The
+  /// controller uses the prediction E + f_e(n)·Δx(n), which assumes that the next motion is equal to the last one.
   kZohExact,
 };
 
-/// Returns α = min( missing · T/‖Δx‖², max_damping ) in N·s/m. This is the damper that dissipates `missing` J in
-/// another interval like this one (T = `held`). The result is 0 if `missing` is not positive or if the speed is at most
-/// `min_speed`.
+/// Returns α = min( missing · T/‖Δx‖², max_damping ) in N·s/m, the damper that dissipates `missing` J in another
+/// interval like this one (T = `held`). Returns 0 if `missing` is not positive or if the speed is at most `min_speed`.
 double series_damping(double missing, double squared_motion, Duration held, double min_speed,
                       double max_damping) noexcept;
 
-/// The time-domain passivity observer and controller in series (impedance causality). It adds damping if the observer
+/// The time-domain passivity observer and controller in series (impedance causality). It adds damping when the observer
 /// finds that the environment generates energy.
-///
 ///     α(n) = −E(n) / (T ‖v(n)‖²)  when E(n) < 0, within [0, max_damping]       v = Δx/T, m/s
 ///     F(n) = F_wanted(n) − α(n) v(n)
-///
 /// The port is not guaranteed to be passive, because the correction acts one interval late and assumes that the motion
 /// continues. The controller does not need a model or friction. It chatters in stiff contact. A digital damper is
-/// unstable above 2m/T (m is the mass of the device), so max_damping must be far smaller.
-///
-/// For N = 6 the same α is used for all components.
+/// unstable above 2m/T (m is the mass of the device), so max_damping must be far smaller. All components share α.
 ///
 /// Source: Hannaford & Ryu, IEEE Trans. Robotics & Automation 18(1), 2002 (recalled); kZohExact: Ryu, Kim, Hannaford,
 /// IEEE Trans. Robotics 20(2), 2004 (recalled). The vector form uses scalar products. core/PROOFS.md, "Comparison
 /// laws".
-///
-/// Thread-safe: no. Realtime-safe: all but the constructor.
+/// Thread-safe: no. Realtime-safe: yes, except the constructor.
 template <int N>
 class PassivityController {
  public:
@@ -62,8 +54,7 @@ class PassivityController {
   LimitedForce<N> limit(const Demand<N>& demand) noexcept;
   double energy() const noexcept { return port_.energy(); }
 
-  /// Returns E of the observer in J, without the friction of the device.
-  double observed() const noexcept { return observed_; }
+  double observed() const noexcept { return observed_; }  ///< E of the observer, J, without the friction of the device
 
  private:
   Config config_;
@@ -74,19 +65,15 @@ class PassivityController {
 };
 
 /// The passivity observer and controller in parallel (admittance causality). It reduces the motion of the environment
-/// if the observer finds that the environment generates energy.
-///
+/// when the observer finds that the environment generates energy.
 ///     1/α(n) = −E(n) / (T ‖f(n)‖²)  when E(n) < 0, within [0, max_mobility]
 ///     v₁ = v₂ + f/α           hand v₁, environment v₂ (m/s), f = −F (N)
-///
 /// The environment is then at x − δ with δ = Σ T f/α, and the stiffness of the demand gives its force there: F =
-/// F_wanted + K δ. The controller has no effect if the demand has no stiffness. A known weakness is that hand and
-/// environment drift apart by δ. The controller resets δ if both the force and the stiffness of the demand are zero.
-/// The linear model can pull the hand where the true environment would release it.
-///
-/// The port is not guaranteed to be passive. See PassivityController, also for the observers and sources.
-///
-/// Thread-safe: no. Realtime-safe: all but the constructor.
+/// F_wanted + K δ. The controller has no effect if the demand has no stiffness. Hand and environment drift apart by δ,
+/// a known weakness. δ is reset when both the force and the stiffness of the demand are zero. The linear model can pull
+/// the hand although the true environment would release it. The port is not guaranteed to be passive. See
+/// PassivityController, also for the observers and sources.
+/// Thread-safe: no. Realtime-safe: yes, except the constructor.
 template <int N>
 class ParallelPassivityController {
  public:
@@ -105,10 +92,8 @@ class ParallelPassivityController {
   LimitedForce<N> limit(const Demand<N>& demand) noexcept;
   double energy() const noexcept { return port_.energy(); }
 
-  /// Returns E of the observer in J, without the friction of the device.
-  double observed() const noexcept { return observed_; }
-  /// Returns δ in m, the displacement of the hand relative to the environment.
-  const Vec<N>& offset() const noexcept { return offset_; }
+  double observed() const noexcept { return observed_; }  ///< E of the observer, J, without the friction of the device
+  const Vec<N>& offset() const noexcept { return offset_; }  ///< δ, m
 
  private:
   Config config_;

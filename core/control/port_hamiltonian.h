@@ -6,31 +6,23 @@
 
 namespace tendon {
 
-/// An energy-consistent sampled port-Hamiltonian system: a spring whose state is given by the energy that was really
-/// put in.
-///
+/// An energy-consistent sampled port-Hamiltonian system: a spring whose state follows from the energy put in.
 ///     H(n) = H(n−1) + f(n−1)·Δx(n)                  J, f = −F as applied: exact for a zero-order hold
 ///     q(n) = √(2 H(n)/K)                            m, the corresponding state
 ///     F(n) = F_wanted · min(1, K q(n)/‖F_wanted‖)
-///
 /// K (N/m) is the stiffness of the demand along its force if that is positive, else `stiffness`. A plain sampled spring
-/// has the energy ½ K x² although only ½ K x² − Σ ½ K Δx² was put in. Here the storage pays for the difference, so the
+/// has the energy ½ K x², although only ½ K x² − Σ ½ K Δx² was put in. Here the storage pays for the difference, so the
 /// state lags behind the position. Two amounts are booked as debt, and half of all later income repays it:
-///
 ///     leap       while the hand moves into the force, q is at least the last motion, because the spring could not
 ///                load from q = 0 otherwise: ½ K ‖Δx‖² − H
 ///     overdraft  H < 0, because the hand moved further out than the state: H := 0
-///
 /// So H ≥ 0. Debt grows by at most ½ K ‖Δx‖² per interval, so the port is passive for every demand if
-///
 ///     K ≤ 2b/T
-///
 /// The storage is emptied if the environment demands no force.
 ///
 /// Source: Stramigioli, Secchi, van der Schaft, Fantuzzi, IEEE Trans. Robotics 21(4), 2005 (abstract read, rest
 /// recalled). The booking rules and the theorem are ours: core/PROOFS.md, "Comparison laws".
-///
-/// Thread-safe: no. Realtime-safe: all but the constructor.
+/// Thread-safe: no. Realtime-safe: yes, except the constructor.
 template <int N>
 class PortHamiltonian {
  public:

@@ -13,8 +13,7 @@
 
 namespace tendon {
 
-/// Sets of parts that were measured together (tests/tools/bench/RESULTS.md). A scene can use a preset instead of single
-/// parts.
+/// Sets of parts that were measured together (tests/tools/bench/RESULTS.md). A scene can use one instead of parts.
 enum class Preset : std::uint8_t {
   kFeel,
   kFeelUnconditional,
@@ -26,25 +25,24 @@ struct PresetInfo {
   std::string_view what;  ///< one line: the device it is for
 };
 
-/// Returns all presets. The first one is the recommended default.
+/// The first preset is the recommended default.
 std::span<const PresetInfo> presets() noexcept;
 const PresetInfo& info(Preset preset) noexcept;
 
-/// The device that a preset is configured for.
 struct PresetDevice {
   Friction friction{};      ///< lower bounds
   Duration longest_hold{};  ///< T_max
   double encoder_step = 0;  ///< Δ in m; 0 if exact, without a robust ledger
 };
 
-/// The parts of a preset. Only values that follow from the device depend on T.
+/// Only values that follow from the device depend on T.
 struct PresetParts {
   AolPlus<1, 3>::Parts parts{};
   std::optional<LearnedModel::Config> learned_model{};
 };
 PresetParts preset_parts(Preset preset, const PresetDevice& device) noexcept;
 
-/// Returns the guarantee of a limiter as a sentence without a full stop, for example "passive whatever the hand does".
+/// Returns a phrase such as "passive whatever the hand does".
 std::string promise_of(const LimiterConfig& limiter);
 
 }  // namespace tendon

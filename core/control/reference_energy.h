@@ -7,23 +7,18 @@
 
 namespace tendon {
 
-/// Passivity control that follows a reference energy. It adds damping as soon as the environment contains less energy
-/// than an ideal one.
-///
+/// Passivity control with a reference energy. It adds damping if the environment has less energy than an ideal spring.
 ///     E(n)     = Σ f(n−1)·Δx(n)                        energy that was put in (J), f = −F as applied
 ///     E_ref(n) = ½ F_wanted(n)ᵀ K⁻¹ F_wanted(n)        energy of a spring K at that force (J)
 ///     α(n)     = (E_ref − E − f_e·Δx)/(T ‖v‖²)  when E + f_e·Δx < E_ref, within [0, max_damping]
 ///     F(n)     = F_wanted(n) − α(n) v(n)               v = Δx/T, m/s
-///
-/// K is the symmetric part of the stiffness of the demand, or `stiffness` if the demand has none. Directions without
-/// stiffness contain no energy. The law is quiet on stiff walls if the environment is this spring and its force is
-/// fresh in every period. Otherwise it can brake unnecessarily or too late. The port is not guaranteed to be passive
-/// (see PassivityController).
+/// K is the symmetric part of the stiffness of the demand, or `stiffness` if the demand has none. There is no energy in
+/// directions without stiffness. The law is quiet on stiff walls if the environment is this spring and its force is
+/// fresh in every period. Otherwise it can brake unnecessarily or too late. The port is not guaranteed to be passive.
 ///
 /// Source: Ryu, Preusche, Hannaford, Hirzinger, IEEE TCST 13(5), 2005 (recalled). The trigger uses the predicted
 /// energy, like PassivityObserver::kZohExact. core/PROOFS.md, "Comparison laws".
-///
-/// Thread-safe: no. Realtime-safe: all but the constructor.
+/// Thread-safe: no. Realtime-safe: yes, except the constructor.
 template <int N>
 class ReferenceEnergyController {
  public:
@@ -42,10 +37,8 @@ class ReferenceEnergyController {
   LimitedForce<N> limit(const Demand<N>& demand) noexcept;
   double energy() const noexcept { return port_.energy(); }
 
-  /// Returns E in J.
-  double observed() const noexcept { return observed_; }
-  /// Returns E_ref of a demand in J.
-  double reference(const Demand<N>& demand) const noexcept;
+  double observed() const noexcept { return observed_; }     ///< E, J
+  double reference(const Demand<N>& demand) const noexcept;  ///< E_ref, J
 
  private:
   Config config_;

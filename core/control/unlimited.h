@@ -6,7 +6,7 @@
 
 namespace tendon {
 
-/// Passes every finite force unchanged, and keeps the ledger. Use it only with simulated devices.
+/// Returns every finite force unchanged, and keeps the ledger. Use it only with simulated devices.
 template <int N>
 class Unlimited {
  public:

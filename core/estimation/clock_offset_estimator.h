@@ -18,32 +18,24 @@ struct ClockExchange {
   LocalTime answered_at;  ///< T4, answer received; ≥ T1
 };
 
-/// Estimates the offset and drift of the clock of the peer, and an error bound of the offset.
-///
-/// The one-way delays of an exchange are unknown but not negative, and the offset θ (peer − local) drifts by at most ρ.
-/// At the midpoint of the exchange this gives
-///
+/// Estimates the offset and drift of the clock of the peer, and an error bound of the offset. One-way delays are
+/// unknown but not negative, and the offset θ (peer − local) drifts by at most ρ. At the midpoint of an exchange
 ///     θᵢ = ((T2 − T1) + (T3 − T4)) / 2,   δᵢ = (T4 − T1) − (T3 − T2),   |θ(tᵢ) − θᵢ| ≤ (δᵢ + ρ (T4 − T1)) / 2 = eᵢ
-///
 /// Time is divided into blocks. Each block keeps the exchange with the smallest e, and a line is fitted to these with
 /// the weights 1 / (δ₀ + 2 eᵢ − 2 e_min). The line is then moved into the range that all of them allow at time t:
-///
 ///     maxᵢ (θᵢ − eᵢ − ρ|t − tᵢ|) ≤ θ(t) ≤ minᵢ (θᵢ + eᵢ + ρ|t − tᵢ|)
-///
 /// The error bound is the distance to the farther end of this range. It is proved for a given ρ (core/PROOFS.md, "Clock
-/// offset"). If the range is empty, the clock of the peer was set. The estimator then forgets the past and increments
-/// `steps`.
+/// offset"). If the range is empty, the clock of the peer was set: `steps` increases and the past is forgotten.
 ///
-/// A block contains at least 16 exchanges and 3.2 s. Eight blocks of 16 exchanges at 5 Hz were the best of six
-/// estimators in measurements between three pairs of hosts.
-///
+/// A block has at least 16 exchanges and 3.2 s. This was the best of six estimators in measurements at 5 Hz between
+/// three pairs of hosts, with eight blocks.
 /// Thread-safe: no. Realtime-safe: yes.
 class ClockOffsetEstimator {
  public:
   static constexpr std::size_t kBlocks = 8;
   static constexpr int kExchangesPerBlock = 16;
   static constexpr Duration kLeastBlock = std::chrono::milliseconds(3200);
-  /// δ₀: smaller differences of the round trip are due to the scheduler, not to the path.
+  /// δ₀. Smaller differences of the round trip are due to the scheduler, not to the path.
   static constexpr Duration kResolution = std::chrono::microseconds(100);
 
   struct Estimate {
@@ -56,19 +48,16 @@ class ClockOffsetEstimator {
     LocalTime to_local(PeerTime theirs) const noexcept { return LocalTime(theirs.time_since_epoch() - offset); }
   };
 
-  /// `fastest_drift` is ρ in s/s. 200 ppm is more than the drift of any quartz. Throws std::invalid_argument if it is
-  /// not within 0 … 0.01.
+  /// `fastest_drift` is ρ in s/s. No quartz drifts by 200 ppm. Throws std::invalid_argument if not in 0 … 0.01.
   explicit ClockOffsetEstimator(double fastest_drift = 200e-6);
 
-  /// Ignores an impossible exchange (T4 < T1, T3 < T2, or a negative round trip that the drift does not explain).
-  /// `answered_at` should not decrease.
+  /// Ignores T4 < T1, T3 < T2, and a negative round trip that exceeds the drift. `answered_at` should not decrease.
   void observe(const ClockExchange& exchange) noexcept;
 
-  /// Returns the estimate at `at`, past or future. It is empty before the first exchange.
+  /// `at` can be in the past or future. Empty before the first exchange.
   std::optional<Estimate> estimate(LocalTime at) const noexcept;
 
-  /// Returns how often the clock of the peer was set.
-  std::uint64_t steps() const noexcept { return steps_; }
+  std::uint64_t steps() const noexcept { return steps_; }  ///< times that the peer's clock was set
 
  private:
   struct Sample {

@@ -5,33 +5,26 @@
 
 namespace tendon {
 
-/// The memory of a recursive least-squares estimator. Units follow the parameters θ and the output y.
+/// Units follow the parameters θ and the output y.
 struct LeastSquaresConfig {
-  /// Weight of a sample relative to the next one, (0, 1]; 1 never forgets.
-  double forgetting = 0.95;
+  double forgetting = 0.95;  ///< λ, (0, 1]; 1 never forgets
   /// After a reset P is this times the identity: the squared error of a parameter over the squared noise of y. Scale
   /// the regressor so that one value fits all parameters.
   double prior_variance = 1e8;
-  /// Smaller errors are ignored. Set it to about the noise of y; 0 uses all samples.
-  double dead_zone = 0;
+  double dead_zone = 0;  ///< smaller errors are ignored; about the noise of y, or 0
 };
 
-/// Fits y = φᵀθ to a stream of samples. The covariance P stays positive definite, also in float32. After n samples θ is
-/// the minimum of
-///
+/// Fits y = φᵀθ to a stream of samples. The covariance P stays positive definite, even in float32. θ minimizes
 ///     λⁿ/p0 · |θ − θ0|² + Σ_i λ^(n−i) · (y_i − φ_iᵀθ)²
-///
 /// θ0 is the estimate at the last reset. These weights apply while the cap below is inactive. The textbook recursion P
 /// ← (P − K φᵀP)/λ subtracts nearly equal numbers, and becomes indefinite within tens of samples if the regressors are
 /// almost parallel. Here P = U D Uᵀ with U unit upper triangular, and D is only multiplied by positive numbers.
 ///
 /// **Forgetting is capped:** a sample forgets by max(λ, min(1, tr P / (M p0))), so tr P never exceeds its value after a
-/// reset. Directions without excitation do not wind up.
-///
-/// A sample that is not finite, or so large that D would under- or overflow, is ignored.
+/// reset. Directions that are not excited do not wind up. A sample is ignored if not finite or if D under- or
+/// overflows.
 ///
 /// Source: Bierman, "Factorization Methods for Discrete Sequential Estimation", 1977, ch. V.
-///
 /// Thread-safe: no. Realtime-safe: yes; O(M²) per sample. Instantiated for M = 1…4, float and double.
 template <int M, class Scalar = double>
 class UdLeastSquares {
@@ -42,7 +35,7 @@ class UdLeastSquares {
   /// Throws std::invalid_argument with the name of the field if it is out of range.
   explicit UdLeastSquares(const LeastSquaresConfig& config = {});
 
-  /// Takes the next sample. Returns false if it had no effect (dead zone, or not usable).
+  /// Returns false if the sample had no effect (dead zone, or not usable).
   bool observe(const Vector& regressor, Scalar y) noexcept;
 
   const Vector& estimate() const noexcept { return estimate_; }
@@ -50,10 +43,9 @@ class UdLeastSquares {
   /// Replaces θ, for example by its projection into bounds. P stays.
   void set_estimate(const Vector& estimate) noexcept { estimate_ = estimate; }
 
-  /// P ← p0 · I, so that the next samples dominate. θ stays.
-  void reset() noexcept;
+  void reset() noexcept;  ///< resets P to p0 · I, so that the next samples dominate. θ does not change.
 
-  /// Returns the diagonal of D in P = U D Uᵀ. P is positive definite if and only if all elements are positive.
+  /// The diagonal of D. P is positive definite if and only if all elements are positive.
   const Vector& pivots() const noexcept { return d_; }
 
   Matrix covariance() const noexcept { return u_ * d_.asDiagonal() * u_.transpose(); }

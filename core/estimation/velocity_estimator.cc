@@ -45,13 +45,12 @@ Vec<N> VelocityEstimatorOf<N>::observe(LocalTime at, const Vec<N>& position) noe
   const auto rate_to = [&](const Sample& past) { return 1e9 / static_cast<double>((at - past.at).count()); };
 
   for (Eigen::Index axis = 0; axis < N; ++axis) {
-    // The slopes to samples at the same position are 0. The oldest of them has the smallest r(i), so only its test
-    // matters.
+    // Samples at the same position have the slope 0. Only the oldest of them matters, because its r(i) is the smallest.
     const std::size_t first = std::max<std::size_t>(same_[static_cast<std::size_t>(axis)], 1);
     if (first < count_) {
       for (; known < first; ++known) rate[known] = rate_to(now[known]);
     }
-    // A line of slope v through the newest sample passes within `resolution` of sample i if and only if v is within
+    // The line of slope v through the newest sample passes within `resolution` of sample i if and only if v is within
     // resolution · r(i) of the slope to it. Keep the intersection of these ranges.
     const double x = position[axis];
     const double resolution = resolution_;

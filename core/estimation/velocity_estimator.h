@@ -9,38 +9,29 @@
 
 namespace tendon {
 
-/// Estimates the velocity from positions that an encoder has rounded.
-///
-/// The backward difference is useless at low speed: one count of 30 µm at 1 kHz reads as 30 mm/s. First-order adaptive
-/// windowing takes, per axis, the longest window in which the line between its ends passes within one count of every
-/// sample:
-///
+/// Estimates the velocity from positions that an encoder has rounded. The backward difference cannot be used at low
+/// speed: a count of 30 µm at 1 kHz is 30 mm/s. First-order adaptive windowing takes, per axis, the longest window in
+/// which the line between its ends passes within one count of every sample:
 ///     v = (x(k) − x(k−n)) · r(n),        r(n) = 1 / (t(k) − t(k−n)),
 ///     n = max { n ≤ window : |v − (x(k) − x(k−i)) · r(i)| ≤ resolution · r(i), 0 < i < n }
-///
 /// The estimate is smooth at low speed and fast at high speed, without a cut-off frequency. With resolution 0 (exact
-/// positions) it is the backward difference, except on a straight line.
+/// positions) it is the backward difference, except on a straight line. A sample costs the length of the window of each
+/// axis, without the counts during which the axis has not moved.
 ///
 /// Source: Janabi-Sharifi, Hayward, Chen, "Discrete-time adaptive windowing for velocity estimation", IEEE TCST 8(6),
 /// 2000 (end-fit form), with measured time stamps in place of a fixed period. Error: core/PROOFS.md, "Velocity
 /// estimator".
-///
-/// The cost of a sample is the length of the window of each axis, without the counts during which the axis has not
-/// moved.
-///
 /// Thread-safe: no. Realtime-safe: yes; at most N · kWindow steps per sample.
 template <int N>
 class VelocityEstimatorOf {
  public:
-  /// A longer window is smoother at low speed, but detects a reversal later. With a 30 µm encoder, 16 ms at 1 kHz
-  /// resolve 2 mm/s.
+  /// A longer window is smoother at low speed but slower to detect a reversal. For 30 µm at 1 kHz this resolves 2 mm/s.
   static constexpr std::size_t kWindow = 16;
 
-  /// `resolution`: one encoder count at the handle, m; 0 = exact. Throws std::invalid_argument if it is negative or not
-  /// finite.
+  /// `resolution`: one encoder count at the handle, m; 0 = exact. Throws std::invalid_argument unless ≥ 0 and finite.
   explicit VelocityEstimatorOf(double resolution);
 
-  /// Takes the next sample and returns the velocity in m/s. Ignores a sample that is not finite or not newer.
+  /// Returns the velocity in m/s. The sample is ignored if it is not finite or not newer.
   Vec<N> observe(LocalTime at, const Vec<N>& position) noexcept;
 
  private:
@@ -51,12 +42,12 @@ class VelocityEstimatorOf {
   static constexpr std::size_t kSlots = 2 * kWindow;
 
   double resolution_;
-  /// From `newest_` on, newest first. A newer sample is put before it. When there is no room, the samples of a window
+  /// Newest first, from `newest_` on. A newer sample is put before it; when there is no room, the samples of a window
   /// move to the end. (A ring would need a wrap per sample and step.)
   std::array<Sample, kSlots> samples_{};
   std::size_t newest_ = kSlots;
   std::size_t count_ = 0;  ///< from `newest_` on, at most kWindow + 1
-  /// Per axis: the number of samples before the newest with the identical position.
+  /// Per axis, the number of samples before the newest with the identical position.
   std::array<std::size_t, static_cast<std::size_t>(N)> same_{};
   Vec<N> velocity_ = Vec<N>::Zero();
 };

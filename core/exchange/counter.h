@@ -6,12 +6,11 @@
 
 namespace tendon {
 
-/// A counter that one thread writes and any thread can read.
-///
-/// Thread-safe: `value` from any thread, the rest from one. Realtime-safe.
+/// A counter that one thread writes and any thread can read. Thread-safe: `value` from any thread, the rest from one.
+/// Realtime-safe.
 class Counter {
  public:
-  /// With one writer a load and a store are sufficient, without an atomic read-modify-write.
+  /// An atomic read-modify-write is not needed, because there is only one writer.
   void add() noexcept { set(value() + 1); }
   void set(std::uint64_t count) noexcept { count_.store(count, std::memory_order_relaxed); }
   std::uint64_t value() const noexcept { return count_.load(std::memory_order_relaxed); }

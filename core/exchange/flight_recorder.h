@@ -11,11 +11,10 @@
 
 namespace tendon {
 
-/// Keeps the last values of a loop that cannot wait for a file. If a fault freezes the recorder, another thread can
-/// read the values before the fault and thaw it. Only the constructor allocates memory.
-///
-/// Thread-safe: one thread records and freezes; another reads and thaws, only while it is frozen.
-/// Realtime-safe when copying T is.
+/// Stores the last values of a loop that must not wait for a file. If a fault freezes it, another thread can read the
+/// values before the fault. Only the constructor allocates memory.
+/// Thread-safe: one thread may record and freeze, and another may read and thaw while it is frozen. Realtime-safe if
+/// copying T is.
 template <typename T>
 class FlightRecorder {
  public:
@@ -32,7 +31,6 @@ class FlightRecorder {
     ++count_;
   }
 
-  /// Recording thread. Stops overwriting values.
   void freeze() noexcept { frozen_.store(true, std::memory_order_release); }
 
   bool frozen() const noexcept { return frozen_.load(std::memory_order_acquire); }
@@ -43,10 +41,10 @@ class FlightRecorder {
     frozen_.store(false, std::memory_order_release);
   }
 
-  /// Returns the number of values. Must be frozen, or called from the recording thread.
+  /// Must be frozen, or called from the recording thread. This is also true for operator[].
   std::size_t size() const noexcept { return count_ < capacity_ ? count_ : capacity_; }
 
-  /// Returns the i-th oldest value, i < size(). Must be frozen, or called from the recording thread.
+  /// Returns the i-th oldest value, i < size().
   const T& operator[](std::size_t i) const noexcept {
     return values_[count_ < capacity_ ? i : (count_ + i) & (capacity_ - 1)];
   }

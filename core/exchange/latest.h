@@ -7,11 +7,9 @@
 
 namespace tendon {
 
-/// A wait-free slot that passes the newest value from one thread to another. If the reader is slow, it misses older
-/// values. Use it for values that are only useful while they are new, such as the remote force or the device state.
-///
-/// There are three slots: one of the writer, one of the reader, and one that they exchange through an atomic byte.
-///
+/// A wait-free slot that passes the newest value from one thread to another. A slow reader misses older values. Use it
+/// for values that are only useful while they are new, such as the remote force or the device state. There are three
+/// slots: one of the writer, one of the reader, and one that they exchange through an atomic byte.
 /// Thread-safe: one writer thread, one reader thread. Realtime-safe when copying T is.
 template <typename T>
 class Latest {
@@ -25,8 +23,7 @@ class Latest {
   T& back() { return slots_[back_]; }
   void put() { back_ = middle_.exchange(back_ | kFresh, std::memory_order_acq_rel) & kIndex; }
 
-  /// Reader only. Returns the newest value, or null if nothing was put since the last `take`. Valid until the next
-  /// `take`.
+  /// Reader only. Returns the newest value, valid until the next `take`, or null if nothing was put since the last.
   const T* take() {
     if ((middle_.load(std::memory_order_relaxed) & kFresh) == 0) return nullptr;
     front_ = middle_.exchange(front_, std::memory_order_acq_rel) & kIndex;

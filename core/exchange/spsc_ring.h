@@ -11,10 +11,8 @@
 
 namespace tendon {
 
-/// A wait-free queue from one thread to another. If the queue is full, `try_push` returns false and does not take the
-/// value. Use it if a loss must be detected, for example for the recording or for commands. Only the constructor
-/// allocates memory.
-///
+/// A wait-free queue from one thread to another, for values whose loss must be detected, such as the recording or
+/// commands. Only the constructor allocates memory.
 /// Thread-safe: one writer thread, one reader thread. Realtime-safe when copying T is.
 template <typename T>
 class SpscRing {
@@ -27,7 +25,7 @@ class SpscRing {
   }
 
   /// Writer only. Returns the slot of the next value, or null if the ring is full. The slot contains an older value,
-  /// and the reader does not see it before `push`. For large values that are written in place.
+  /// and is not visible to the reader before `push`. For large values that are written in place.
   T* back() {
     const std::size_t head = head_.load(std::memory_order_relaxed);
     if (head - tail_.load(std::memory_order_acquire) > mask_) return nullptr;

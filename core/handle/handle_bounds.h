@@ -8,10 +8,8 @@
 namespace tendon {
 
 /// Limits that no real handle exceeds. A value beyond a limit is refused, because it is almost always in the wrong unit
-/// (ms instead of s, mm instead of m, g instead of kg). The limits leave a large margin: the largest known arms have a
-/// reach of 1.5 m, and admittance devices have a friction of 20 N·s/m and a mass of 10 kg.
-///
-/// For a rotation, the units are rad, kg·m² and N·m instead of m, kg and N.
+/// (ms instead of s, mm instead of m, g instead of kg). The margin is large: known arms have a reach of 1.5 m, and
+/// admittance devices 20 N·s/m of friction and 10 kg. For a rotation, m, kg and N become rad, kg·m² and N·m.
 struct HandleBounds {
   double travel = 0;         ///< m, from end to end
   double least_inertia = 0;  ///< kg

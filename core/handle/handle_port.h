@@ -13,21 +13,18 @@
 
 namespace tendon {
 
-/// The limiter of a port that is not a point in space: the wrench of a handle that turns, or its gripper. The law is
-/// AOL+ (AolPlus) with its parts, AOL (AOL+ without parts), or none, which books but does not bound. It keeps the
+/// The limiter of a port other than a point in space: the wrench of a handle that can turn, or its gripper. The law is
+/// AOL+ (AolPlus) with its parts, AOL (AOL+ without parts), or none, which does not limit the force. It keeps the
 /// guarantee of Limiter: E ≥ 0 through overruns, because its T follows the longest hold (HoldBound).
-///
 ///     HandlePort<2, 3>   a wrench: F (N) with Δx (m), τ (N·m) with Δθ (rad), friction of each, **one account**:
 ///                            E(n) = Σₖ [ −F·Δx − τ·Δθ + f_c ‖Δx‖ + b ‖Δx‖²/T + τ_c ‖Δθ‖ + b_r ‖Δθ‖²/T ]
 ///                        and one factor γ for force and torque, so the wrench keeps its direction
 ///     HandlePort<1>      a gripper: N and m at its fingers
-///
 /// Δθ is the rotation vector between two samples, in base frame axes. If the axis of the handle turns during the
 /// interval, the true energy can be lower than the booked one by up to (‖τ‖T/b_r)²/48 of the viscous friction of the
-/// interval. A bound of friction that is 2 % below the truth covers this while ‖τ‖ ≤ b_r/T (core/PROOFS.md, "Several
+/// interval. A friction bound that is 2 % below the truth covers this while ‖τ‖ ≤ b_r/T (core/PROOFS.md, "Several
 /// coordinates").
-///
-/// Satisfies StabilityController and SharesAccount. Thread-safe: no. Realtime-safe: all but the constructor.
+/// Satisfies StabilityController and SharesAccount. Thread-safe: no. Realtime-safe: yes, except the constructor.
 template <int Blocks, int Size = 1>
 class HandlePort {
  public:
@@ -40,12 +37,10 @@ class HandlePort {
     Duration longest_hold{};  ///< T_max; > 0
     std::optional<HoldBound::Follow> follow_holds = HoldBound::Follow{};
     typename Plus::Parts parts{};  ///< of kAolPlus
-    /// Other ports credit the account. The energy cap then leaves room for this (AolPlus::EnergyCap).
-    bool shared_account = false;
+    bool shared_account = false;   ///< other ports credit the account. See AolPlus::EnergyCap.
   };
 
-  /// Throws std::invalid_argument with the name of the field, also for another law, and for a `shared_account` with law
-  /// none.
+  /// Throws std::invalid_argument with the name of the field, also if the law is not supported or cannot share.
   explicit HandlePort(const Config& config);
 
   void observe(const Interval<kSize>& interval) noexcept;
@@ -57,8 +52,8 @@ class HandlePort {
 
   double energy() const noexcept { return law_.energy(); }
 
-  /// SharesAccount, J; `force` is N, or a wrench. Force and torque of a wrench share one account. Law none ignores
-  /// `credit` and `withdraw`; its `payable` is 0 and its `worst_loss` is +∞.
+  /// SharesAccount, J; `force` is N, or a wrench. Force and torque of a wrench share one account. For law none,
+  /// `credit` and `withdraw` do nothing, `payable` is 0 and `worst_loss` is +∞.
   void credit(double energy) noexcept {
     if (limits_) law_.credit(energy);
   }
@@ -72,8 +67,7 @@ class HandlePort {
 
   void adapt(const std::array<Friction, Blocks>& friction) noexcept { law_.adapt(friction); }
 
-  /// Returns T, the longest time for which the next force can be applied.
-  Duration longest_hold() const noexcept { return holds_ ? holds_->in_force() : longest_hold_; }
+  Duration longest_hold() const noexcept { return holds_ ? holds_->in_force() : longest_hold_; }  ///< T
   std::uint64_t broken_assumptions() const noexcept { return law_.broken_assumptions(); }
 
  private:
@@ -89,11 +83,9 @@ class HandlePort {
 
 /// The account of a handle with motors that move it and turn it.
 using WrenchPort = HandlePort<2, 3>;
-/// The account of a gripper.
 using GripPort = HandlePort<1>;
 
-/// Limits of the rotation of a handle. wrench_config() combines them with the law, friction, holds, parts and shared
-/// account of `point`.
+/// Limits of the rotation of a handle. wrench_config() takes the other values from `point`.
 struct RotationLimits {
   Friction friction{};                        ///< τ_c, N·m, and b_r, N·m·s/rad: lower bounds
   double max_torque = 0;                      ///< N·m, > 0
@@ -107,7 +99,6 @@ struct RotationLimits {
 /// Throws std::invalid_argument if the point lists a part without a value for rotation.
 WrenchPort::Config wrench_config(const LimiterConfig& point, const RotationLimits& rotation);
 
-/// Limits of the motor of a gripper.
 struct GripLimits {
   Friction friction{};                                        ///< N and N·s/m at the fingers: lower bounds
   double arm = 0;                                             ///< m/rad, travel of the fingers per opening; > 0
@@ -115,12 +106,11 @@ struct GripLimits {
   double max_slew = std::numeric_limits<double>::infinity();  ///< N/s, > 0
 };
 /// The parts energy_cap, fading_contact, knee and latency_reserve of `point` apply to the gripper as well; the others
-/// are specific to the position. The account of the gripper is shared if that of `point` is, through a separate tank.
+/// are specific to the position. The account is shared if that of `point` is, through a separate tank.
 GripPort::Config grip_config(const LimiterConfig& point, const GripLimits& grip);
 
-/// A wrench after a memoryless limit, and the reason. `saturate` applies the first s, `limit_slew` the second one to
-/// the change; s ≤ 1 is the largest value with
-///
+/// A wrench after a memoryless limit. `saturate` applies the first s to the wrench, and `limit_slew` the second s to
+/// its change. s ≤ 1 is the largest value with
 ///     ‖s F‖ ≤ max_force,   ‖s τ‖ ≤ max_torque
 ///     ‖s (F − F_before)‖ ≤ max_slew · T,   ‖s (τ − τ_before)‖ ≤ max_torque_slew · T
 struct LimitedWrench {
@@ -131,7 +121,6 @@ LimitedWrench saturate(const Vec<6>& wanted, double max_force, double max_torque
 LimitedWrench limit_slew(const Vec<6>& wanted, const Vec<6>& before, double force_rate, double torque_rate,
                          Duration elapsed) noexcept;
 
-/// Returns (force, torque).
 inline Vec<6> wrench_of(const Vec3& force, const Vec3& torque) noexcept {
   Vec<6> wrench;
   wrench << force, torque;

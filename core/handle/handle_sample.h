@@ -11,8 +11,8 @@ namespace tendon {
 struct HandleSample {
   std::optional<Turning> turning{};  ///< empty: not measured
   std::optional<Grip> grip{};        ///< empty: no gripper
-  Vec3 torque = Vec3::Zero();        ///< N·m, on the hand, really held
-  double grip_force = 0;             ///< N, on the fingers, really held
+  Vec3 torque = Vec3::Zero();        ///< N·m, on the hand, as applied
+  double grip_force = 0;             ///< N, on the fingers, as applied
 };
 
 }  // namespace tendon

@@ -14,7 +14,6 @@
 
 namespace tendon {
 
-/// The result of one run.
 struct RunEstimate {
   std::string place;
   double direction = 0;  ///< +1 or −1
@@ -24,38 +23,34 @@ struct RunEstimate {
   Friction integral_error;  ///< one standard deviation of `integral.friction`, N and N·s/m
 };
 
-/// The combined result of all runs of one place.
 struct PlaceEstimate {
   std::string place;
   bool both_directions = false;  ///< if false, f_c includes any constant force (gravity, bias)
-  /// b: minimum of both directions; f_c: mean of both, in which a constant force cancels.
+  /// b is the minimum of both directions, and f_c the mean of both, in which a constant force cancels.
   Friction integral;
-  Friction integral_error;  ///< one standard deviation, increased if the runs scatter more
-  /// Kelly's estimate from the slowest ramp of each direction, combined in the same way.
-  Friction kelly;
+  Friction integral_error;   ///< one standard deviation, increased if the runs scatter more
+  Friction kelly;            ///< Kelly's estimate from the slowest ramp of each direction, combined in the same way
   bool kelly_valid = false;  ///< the validity test passed in all directions
   std::string kelly_flaw;    ///< otherwise: place and cause
 };
 
-/// The methods that are trusted.
 enum class Trust {
   kIntegral,  ///< Kelly's validity test failed
-  kBoth,      ///< it passed and both agree; the smaller value is published
-  kNeither,   ///< it passed but the two disagree, so neither is a bound; the mass can be wrong
+  kBoth,      ///< the test passed and both agree, so the smaller value is published
+  kNeither,   ///< the test passed but they disagree, so neither is a bound; the mass may be wrong
 };
 
-/// "integral", "both" or "neither".
 std::string_view to_string(Trust trust) noexcept;
 
 struct Identification {
   std::vector<RunEstimate> runs;      ///< in the order given
   std::vector<PlaceEstimate> places;  ///< in the order of the first runs
   double force_noise = 0;             ///< N, one standard deviation of a sample, from all runs
-  double mass = 0;                    ///< kg, given or mean of the fitted masses
+  double mass = 0;                    ///< kg, as given or the mean of the fitted masses
   Friction estimate;                  ///< minimum over the places: best estimate of the friction
-  /// Bounds for a limiter. They are the minimum over all places of the integral estimate − 3 standard deviations and,
-  /// where it is valid, of Kelly's estimate, and never negative. Kelly's b does not depend on the mass: if the mass is
-  /// 30 % too small, the b of the integral fit is 9 % too large at 0.26 N·s/m.
+  /// The bounds for a limiter are the minimum over all places of the integral estimate − 3 standard deviations and of
+  /// Kelly's estimate if it is valid, or 0 if that is negative. Unlike Kelly's b, that of the integral fit depends on
+  /// the mass: it is 9 % too large at 0.26 N·s/m if the mass is 30 % too small.
   Friction lower_bound;
   Trust trust = Trust::kIntegral;
   std::string reason;                 ///< of `trust`, as a sentence
@@ -65,24 +60,21 @@ struct Identification {
 /// Identifies viscous and Coulomb friction from runs of the ramp experiment (RampRun) with Kelly's procedure and the
 /// integral fit, and selects the method to trust.
 ///
-/// Kelly's fit is valid at a place if, in each direction, the slowest ramp s and one that is at least 1.5 times as fast
-/// both slide for 4 m/b after break-away and give f_c > 0, and if their b agree within 10 %. (On 0.25 m of travel the
-/// difference is 1.5 % at b = 0.26 N·s/m, and 19 % or more where the fit is wrong.) The two methods agree if b differs
-/// by at most 10 %.
-///
-/// A friction that differs between the directions looks like a constant force, and its mean is published as f_c. Only a
-/// stop of a free handle in both directions could distinguish them.
+/// Kelly's fit is valid at a place if there are two ramps in each direction, the slowest and one that is at least 1.5
+/// times as fast, which both slide for 4 m/b after break-away and give f_c > 0, and if their b agree within 10 %. (On
+/// 0.25 m of travel the difference is 1.5 % at b = 0.26 N·s/m, and 19 % or more where the fit is wrong.) The two
+/// methods agree if b differs by at most 10 %. A friction that differs between the directions looks like a constant
+/// force, and its mean is published as f_c. Only a stop of a free handle in both directions could distinguish them.
 struct IdentificationConfig {
-  std::optional<double> mass;  ///< kg, of handle and mechanism; empty: fitted
+  std::optional<double> mass;  ///< kg, of the handle and the mechanism, or empty if it is fitted
   double encoder_step = 0;     ///< m, one count
 };
 
-/// Fits one run. RunEstimate::integral_error is not set, because it needs all runs. Throws std::invalid_argument with
-/// the message of slide_of, kelly_fit or integral_fit. Thread-safe: yes. Realtime-safe: no.
+/// Fits one run. RunEstimate::integral_error is not set, because it needs all runs. Throws the std::invalid_argument of
+/// slide_of, kelly_fit or integral_fit. Thread-safe: yes. Realtime-safe: no.
 RunEstimate fit_run(const RampRun& run, const IdentificationConfig& config);
 
-/// Combines the fits of all runs. Throws std::invalid_argument if there are no runs. Thread-safe: yes. Realtime-safe:
-/// no.
+/// Throws std::invalid_argument if there are no runs. Thread-safe: yes. Realtime-safe: no.
 Identification identify_friction(std::vector<RunEstimate> runs);
 
 /// Fits and combines all runs. Throws std::invalid_argument if there are no runs, or "run i: …" (counted from 1) with

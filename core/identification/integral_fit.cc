@@ -44,7 +44,7 @@ Regression regression_of(const Slide& slide, std::optional<double> mass) {
       const double dt = now.t - before.t;
       r.steps(i - 1) = dt;
       area += dt * (x + before.position - samples.front().position) / 2;
-      integral += dt * (impulse + dt * before.force / 2);  // exact for a force that is held
+      integral += dt * (impulse + dt * before.force / 2);  // exact because the force is held
       impulse += dt * before.force;
     }
     const double tau = now.t - samples.front().t;

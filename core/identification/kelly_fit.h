@@ -8,14 +8,12 @@ namespace tendon {
 
 /// The identification method of the paper. Under a force that rises as s·t, the speed approaches a line with slope μ,
 /// which intersects the time axis at t_i:
-///
 ///     (12)  b   = s/μ                  N·s/m
 ///     (11)  f_c = s t_i − m μ          N
-///
 /// The fit uses the last 40 % of the slide, and a parabola of the position, so it needs no derivative.
 ///
-/// **The line is only an asymptote**, valid some m/b after break-away. Before that the handle still accelerates, so μ
-/// is too small and b too large: with 0.25 m of travel 0.005 N·s/m appears as 0.07 to 0.25. A single run can only be
+/// **The line is only an asymptote** and valid some m/b after break-away. Before that the handle still accelerates, so
+/// μ is too small and b too large: with 0.25 m of travel 0.005 N·s/m appears as 0.07 to 0.25. A single run can only be
 /// tested with `long_enough` and a positive f_c. Comparing two slopes needs two runs (friction_identification.h).
 ///
 /// Source: Kelly, Llamas and Campa, IEEE TIM 49(4), 2000 (recalled); eqs (11), (12) of Lee & Lee 2009; core/PROOFS.md,
@@ -30,8 +28,7 @@ struct KellyFit {
   bool plausible() const noexcept { return long_enough() && friction.coulomb > 0; }
 };
 
-/// `mass`: kg, > 0. Throws std::invalid_argument if it is not, or if `ramp_of` throws. Thread-safe: yes. Realtime-safe:
-/// no.
+/// `mass`: kg. Throws std::invalid_argument if it is not > 0 or `ramp_of` throws. Thread-safe: yes. Realtime-safe: no.
 KellyFit kelly_fit(const Slide& slide, double mass);
 
 }  // namespace tendon

@@ -11,7 +11,7 @@ namespace tendon {
 struct RampSample {
   double t = 0;         ///< s
   double position = 0;  ///< m, encoder reading at t
-  double force = 0;     ///< N, of the device on the handle, along +x, held from t to the next sample
+  double force = 0;     ///< N, the force of the device on the handle along +x, which is held from t to the next sample
 };
 
 /// One run of the friction experiment on a free handle. The other axes are constrained and gravity is compensated. The
@@ -21,14 +21,13 @@ struct RampRun {
   std::vector<RampSample> samples;
 };
 
-/// The part of a run in which the handle slides, mirrored if necessary so that it slides along +x.
-///
-/// It begins when the handle is more than 5 counts away from its start, because it can bend before it slides. It ends 5
-/// counts and 2 samples before the farthest point, to exclude the rest at the end of the workspace. Both limits use the
-/// median of 5 samples, so a single wrong sample has no effect.
+/// The part of a run in which the handle slides, mirrored if necessary so that it slides along +x. The first sample is
+/// more than 5 counts away from the start, because the handle can bend before it slides. The end is 5 counts and 2
+/// samples before the farthest point, so that the rest at the end of the workspace is not included. The median of 5
+/// samples excludes outliers.
 struct Slide {
   std::vector<RampSample> samples;
-  double direction = 0;  ///< +1 or −1, of the motion in the coordinates of the run
+  double direction = 0;  ///< +1 or −1, the direction of the motion in the coordinates of the run
 };
 
 /// Throws std::invalid_argument if a value is not finite, time does not increase, or the handle moves less than 50
@@ -36,7 +35,7 @@ struct Slide {
 /// samples. The message contains the cause and the index of the sample, counted from 0.
 Slide slide_of(const RampRun& run, double encoder_step);
 
-/// Least-squares line rate · (t − start) through the force of a slide.
+/// The least-squares line rate · (t − start) of the force of a slide.
 struct Ramp {
   double rate = 0;   ///< s, N/s
   double start = 0;  ///< s, zero of the line

@@ -7,20 +7,14 @@
 
 namespace tendon {
 
-/// The energy ledger of a port: a lower bound of the energy that the hand has supplied to the device and not received
-/// back.
-///
+/// A lower bound of the energy that the hand has supplied to the device through a port and not received back.
 ///     E(n) = Σₖ [ f(k−1)·Δx(k) + f_c ‖Δx(k)‖ + b ‖Δx(k)‖²/T(k) ],   E(0) = 0
-///
 /// f = −F is the reflective force that was **really held** in interval k (F is on the hand), Δx the displacement in it,
 /// and T(k) its **measured** length. For every motion the work W of the hand satisfies W(n) + KE(0) ≥ E(n), so the port
-/// is passive as long as E ≥ 0.
-///
-/// The bound holds for exact positions. For an encoder use RobustLedger. `N` is the number of coordinates with
+/// is passive as long as E ≥ 0. Use RobustLedger if the positions are not exact. `N` is the number of coordinates with
 /// isotropic friction: 3 for the joint form, 1 per axis for the form of the paper.
 ///
 /// Source: Lee & Lee 2009, eqs (5), (6); the vector form: core/PROOFS.md, "Energy ledger".
-///
 /// Thread-safe: no. Realtime-safe: yes.
 class EnergyLedger {
  public:
@@ -28,8 +22,7 @@ class EnergyLedger {
   explicit EnergyLedger(const Friction& friction);
 
   /// Books one interval and returns E in J. The device held the force `applied` (N, on the hand) for the time `held`,
-  /// while the hand moved by `dx` (m). The function ignores an interval that is not finite, and gives no viscous credit
-  /// if `held` is not positive.
+  /// while the hand moved by `dx` (m). Non-finite intervals are ignored. There is no viscous credit unless `held` > 0.
   template <int N>
   double observe(const Eigen::Matrix<double, N, 1>& applied, const Eigen::Matrix<double, N, 1>& dx,
                  Duration held) noexcept {
@@ -37,26 +30,20 @@ class EnergyLedger {
     return book(-applied.dot(dx), squared, held);
   }
 
-  /// Books the worst possible motion for an interval without a position measurement. This happens if the watchdog of
-  /// the device ends the hold, or if a reading fails. The device held a force of norm `applied` (N) for at most
-  /// `at_most`, and then the force vanished:
-  ///
+  /// Books the worst motion of an interval without a position measurement, because the watchdog of the device ended the
+  /// hold or a reading failed. A force of norm `applied` (N) was held for at most `at_most` and then vanished:
   ///     ΔE = −at_most · (‖F‖ − f_c)₊² / (4b)
-  ///
-  /// If b is 0, a force above f_c has no such bound. The function then books nothing, because the limiter keeps the
-  /// force at f_c.
+  /// If b is 0, a force above f_c has no such bound. Then nothing is booked; the limiter keeps the force at f_c.
   double observe_unseen(double applied, Duration at_most) noexcept;
 
   /// Adds energy (J) from the account of another port, or subtracts it if the value is negative. E is then a shared
   /// account (EnergyTank). Ignores a value that is not finite.
   void transfer(double energy) noexcept;
 
-  /// Sets the lower bounds of friction from the next interval on. Negative values and values that are not finite are
-  /// ignored.
+  /// Sets the lower bounds of friction from the next interval on. Ignores values that are negative or not finite.
   void adapt(const Friction& friction) noexcept;
 
-  /// Returns E in J. It can be negative after a hold that was longer than the limiter expected (see OutputBound), or if
-  /// no limiter bounds the force.
+  /// Returns E in J. Negative if there is no limiter, or after a longer hold than it expected (see OutputBound).
   double energy() const noexcept { return energy_.value(); }
 
  private:

@@ -9,10 +9,8 @@
 namespace tendon {
 
 /// Lower bounds of friction that depend on the position, from an identification at several places. A single bound for
-/// the whole workspace would have to be the minimum.
-///
-/// At x each bound is the minimum over the place nearest to x and all places within `reach` of x.
-///
+/// the whole workspace would have to be the minimum. Each bound at x is the minimum over the nearest place and all
+/// places within `reach` of x.
 /// Thread-safe: yes (immutable). Realtime-safe: `at`, which is linear in the number of places.
 class FrictionMap {
  public:
@@ -24,8 +22,7 @@ class FrictionMap {
     std::vector<Place> places;  ///< 1 to kMostPlaces
     double reach = 0.05;        ///< m, ≥ 0: about the distance between neighbouring places
   };
-  /// Four along each edge of a cube: about 0.2 µs per haptic step.
-  static constexpr std::size_t kMostPlaces = 64;
+  static constexpr std::size_t kMostPlaces = 64;  ///< four along each edge of a cube: about 0.2 µs per step
 
   /// Throws std::invalid_argument with the name of the field if the number of places or a value is out of range.
   explicit FrictionMap(Config config);

@@ -5,42 +5,36 @@
 
 namespace tendon {
 
-/// The bound T on the time for which the next force can be held. It follows the measured times, and OutputBound uses
-/// it.
-///
+/// The bound T on the time for which the next force can be held. It follows the measured times, for OutputBound.
 ///     T(0)   = T_max                                        from the scene
 ///     T(n+1) = min((1 + margin) · held, most · T_max)       if held > T(n); never below T(n)
 ///     T(n+1) = T(n) − max(1 ns, (T(n) − T_max) · held/memory), not below T_max            otherwise
-///
 /// T rises immediately and falls slowly, so a machine that is late again within `memory` already has a suitable bound.
-/// T is exactly T_max while no interval is longer.
+/// T is equal to T_max if no interval was longer.
 ///
-/// If a force F is held for T_act > T, it can take E below zero, but by no more than
-///
+/// A force F that is held for T_act > T can take E below zero, but by no more than
 ///     (T_act − T)(‖F‖ − f_c)₊²/(4b)  ≤  (T_act/T − 1) · E
 ///
 /// Source: core/PROOFS.md, "Late holds".
-///
-/// Thread-safe: no. Realtime-safe: all but the constructor.
+/// Thread-safe: no. Realtime-safe: yes, except the constructor.
 class HoldBound {
  public:
   struct Follow {
     double margin = 0.25;  ///< ≥ 0: the relative margin of T
     /// > 0. Time constant of the return to T_max. Overruns of ordinary kernels are minutes apart.
     Duration memory = std::chrono::seconds(60);
-    /// ≥ 1: the largest T, in T_max. An interval that is longer shows that the machine was stopped, not how much it
-    /// jitters. With 4 T_max the limiter still permits half of the force above f_c.
+    /// ≥ 1: the largest T, in T_max. If an interval is longer than this, the machine was stopped, so it does not show
+    /// the jitter. With 4 T_max the limiter still permits half of the force above f_c.
     double most = 4;
   };
 
   /// `longest_hold`: T_max, > 0. Throws std::invalid_argument with the name of the field if a value is out of range.
   HoldBound(Duration longest_hold, const Follow& follow);
 
-  /// Updates T with the length of the last interval. Ignores a length that is not positive.
+  /// Updates T with the length of the last interval. Does nothing if it is not positive.
   void observe(Duration held) noexcept;
 
-  /// Returns T.
-  Duration in_force() const noexcept { return longest_hold_ + excess_; }
+  Duration in_force() const noexcept { return longest_hold_ + excess_; }  ///< T
 
  private:
   Follow follow_;

@@ -9,15 +9,14 @@
 
 namespace tendon {
 
-// The port of a device is the interface, as a force and a displacement, through which energy flows between the hand and
-// the device.
+// The port of a device is where energy flows between the hand and the device, as a force times a displacement.
 
 template <int N>
 using Vec = Eigen::Matrix<double, N, 1>;
 template <int N>
 using Mat = Eigen::Matrix<double, N, N>;
 
-/// What the port measured in the last haptic period.
+/// The measurements of the port in the last haptic period.
 template <int N>
 struct Interval {
   Vec<N> applied;   ///< N, the force on the hand that was really applied
@@ -25,9 +24,7 @@ struct Interval {
   Duration held{};  ///< T_act, measured length
 };
 
-/// The force that the remote environment requests for the next period. It is linearized at the current position of the
-/// hand:
-///
+/// The force that the remote environment requests for the next period, linearized at the current position of the hand:
 ///     F(x + ξ) ≈ force − stiffness · ξ
 template <int N>
 struct Demand {
@@ -39,7 +36,6 @@ struct Demand {
 /// Value of LimitedForce::permitted for a law without a bound.
 inline constexpr double kNoBound = std::numeric_limits<double>::infinity();
 
-/// The force that a law returns, and the reasons why it differs from the demand.
 template <int N>
 struct LimitedForce {
   Vec<N> force;      ///< N, on the hand

@@ -7,23 +7,18 @@
 
 namespace tendon {
 
-/// The energy ledger for positions that an encoder has rounded: a lower bound of the E of EnergyLedger for the true
-/// positions.
-///
-/// Measured positions are the centres of counts of Δ, so each component is wrong by at most Δ/2. Therefore:
-///
+/// The energy ledger for positions from an encoder. It is a lower bound of the E of EnergyLedger for the true
+/// positions. A position is rounded to a count of Δ, so the error of each component is at most Δ/2. Therefore:
 ///     work       Σ f·dx measured ≤ Σ f·dx true + (Δ/2) Σ ‖f(k) − f(k−1)‖₁ + (Δ/2) ‖f(n)‖₁      (Abel summation);
 ///                the ledger subtracts the two terms
 ///     Coulomb    credits f_c times the net travel since the last turning point, each component reduced by Δ. The path
 ///                is never shorter. A handle at rest on the edge of a count earns nothing
 ///     viscous    credits b ‖D‖² / (T₁ + … + T_N) once per `window` of N intervals, each component of the net travel D
 ///                reduced by Δ (Cauchy–Schwarz). Per interval, one count of 30 µm at 1 kHz would count as 30 mm/s
-///
 /// Credit arrives late and is never too large, so E − (Δ/2)‖f‖₁ may be spent. Net travel replaces a play filter per
 /// axis, which would follow a diagonal as a staircase and over-credit it by √N.
 ///
 /// Source: core/PROOFS.md, "Encoder counts".
-///
 /// One account for N components with isotropic friction. Thread-safe: no. Realtime-safe: yes.
 template <int N>
 class RobustLedger {
@@ -37,16 +32,14 @@ class RobustLedger {
   /// Throws std::invalid_argument with the name of the field if a value is out of range.
   explicit RobustLedger(const Config& config);
 
-  /// Books one interval. An interval that is not finite is not booked.
+  /// Ignores an interval that is not finite.
   void observe(const Interval<N>& interval) noexcept;
 
-  /// As EnergyLedger::observe_unseen. The travel restarts at zero, because the position is unknown.
+  /// As in EnergyLedger. The travel restarts at zero after `observe_unseen`, because the position is unknown.
   void observe_unseen(const Vec<N>& applied, Duration at_most) noexcept;
 
-  /// As EnergyLedger::transfer.
   void transfer(double energy) noexcept;
 
-  /// As EnergyLedger::adapt.
   void adapt(const Friction& friction) noexcept;
 
   double energy() const noexcept { return energy_.value(); }        ///< E, J

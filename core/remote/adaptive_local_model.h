@@ -10,24 +10,17 @@
 namespace tendon {
 
 /// Follows the hand between two remote forces with the stiffness from the engine, and blends from one model to the
-/// next.
-///
-/// The model of answer j, and the prediction at time t after the next answer was received at t_r:
-///
+/// next. The model of answer j, and the prediction at time t after the next answer was received at t_r:
 ///     F_j(x) = f_j − share · K_j (x′ − x_j),   x′ the position nearest to x in the model's valid radius of x_j
 ///     F(x, t) = (1 − s) F_{j−1}(x) + s F_j(x),   s = clamp((t − t_r)/slow period, 0, 1)
-///
 /// A new answer that differs by ΔF at the same x therefore adds ΔF · dt/period per step. A sudden change would generate
 /// |ΔF · dx| at the next motion; blending spreads this energy, and the limiter accounts for it. If the environment has
 /// not changed, old and new model are the same line, and the prediction does not lag. The slow period is the time
-/// between the motions that two answers belong to, at most `max_blend`.
-///
-/// A force without a model counts as a model with K = 0. The contact and the table of an answer are ignored, because
-/// they cannot be blended.
+/// between the motions of the two answers, and at most `max_blend`. A force without a model counts as a model with K =
+/// 0. The contact and the table of an answer are ignored, because they cannot be blended.
 ///
 /// Source: Barbagli et al., IJRR 24(9), 2005 (recalled): stable if share · K does not exceed the true stiffness. K must
 /// be a `believed` one (answer.h). See core/PROOFS.md, "Local models".
-///
 /// Thread-safe: no. Realtime-safe: yes.
 class AdaptiveLocalModel {
  public:
@@ -41,12 +34,10 @@ class AdaptiveLocalModel {
   /// Throws std::invalid_argument with the name of the field if it is out of range.
   explicit AdaptiveLocalModel(const Config& config);
 
-  /// Takes an answer to a newer motion than before. Returns false, without an effect, if the answer is not newer or not
-  /// finite. The first answer is not blended.
+  /// Returns false and does nothing if its motion is not newer or if it is not finite. The first answer is not blended.
   bool observe(const RemoteForce& force) noexcept;
 
-  /// Returns the force of the environment at `hand.position` and `hand.at`. The result is empty before the first
-  /// answer, and for a position that is not finite.
+  /// Returns the force for `hand.position` and `hand.at`, or nothing before the first answer or if it is not finite.
   std::optional<Prediction> predict(const Motion& hand) const noexcept;
 
  private:

@@ -5,8 +5,7 @@
 #include "core/remote/prediction.h"
 #include "core/remote/remote_force.h"
 
-// How the device loop uses one answer of a remote engine until the next one arrives: the part of the answer that it
-// trusts, and the force that the answer means at the current position of the hand.
+// The device loop uses these functions to compute the force at the current position from the newest answer.
 
 namespace tendon {
 
@@ -14,20 +13,15 @@ namespace tendon {
 bool is_sound(const RemoteForce& answer) noexcept;
 
 /// Returns the part of a sound answer that the loop uses (core/PROOFS.md, "Local models"):
-///
 ///     topology_changed   only the force; the model is dropped
 ///     stiffness          (K + Kᵀ)/2 with its eigenvalues clamped to [0, max_stiffness], which cannot generate energy
 ///     table              adjacent entries from the one nearest to the answered depth, as long as neighbours differ by
 ///                        at most max_stiffness · step
 ///     normal             of unit length
-///
-/// `max_stiffness` is in N/m.
-///
-/// Realtime-safe: yes.
+/// `max_stiffness` is in N/m. Realtime-safe: yes.
 RemoteForce believed(const RemoteForce& answer, double max_stiffness) noexcept;
 
-/// Returns the part of a sound torque that the loop uses. Its stiffness is treated as above, with
-/// `max_angular_stiffness` in N·m/rad.
+/// Treats the stiffness of a sound torque as above, with `max_angular_stiffness` in N·m/rad.
 RemoteTorque believed(const RemoteTorque& torque, double max_angular_stiffness) noexcept;
 
 /// Returns the torque (N·m) of an answer at the orientation `q`, from its model (RotationModel). It is zero if the
@@ -40,22 +34,18 @@ Vec3 within(const LocalModel& model, const Vec3& position) noexcept;
 
 /// Returns the force of an answer at `position`. With x′ = within(model, x), the depth d = −n·(x − at) since the
 /// answer, and the linear model L(x) = force − K (x′ − at):
-///
 ///     no model    F = force
 ///     no contact  F = L
 ///     contact     F = N n + s (I − n nᵀ) L,    N = max(0, n·L), but 0 where the gap, gap + n·(x − at), is above
 ///                                              max(0, gap): a surface does not pull, and ends at its own position
 ///     table       the same with N = table(d), which is also valid beyond the radius
-///
 /// s = N / (n·force), clamped to [0, 1]: the tangential force fades with the normal force. The stiffness is −∂F/∂x for
-/// constant s. It is zero beyond the radius and at the ends of the table, and counts as zero where a table falls.
+/// constant s. It is zero beyond the radius, at the ends of the table, and where the table decreases.
 ///
-/// Source: compared with hold, extrapolation in time and secants, the table is best below 50 answers per second and the
-/// stiffness above (tests/tools/lab/experiments/reconstruction_test.cc). Engines that send their model: James and Pai,
-/// "A unified treatment of elastostatic contact simulation for real-time haptics", Haptics-e 2(1), 2001; Mahvash and
-/// Hayward, IEEE CG&A 24(2), 2004 (curves of force against depth).
-///
-/// Realtime-safe: yes.
+/// Source: in a comparison with hold, extrapolation in time and secants, the table was best below 50 answers per second
+/// and the stiffness above (tests/tools/lab/experiments/reconstruction_test.cc). Engines that send their model: James
+/// and Pai, "A unified treatment of elastostatic contact simulation for real-time haptics", Haptics-e 2(1), 2001;
+/// Mahvash and Hayward, IEEE CG&A 24(2), 2004 (curves of force against depth). Realtime-safe: yes.
 Prediction reconstruct(const RemoteForce& answer, const Vec3& position) noexcept;
 
 }  // namespace tendon

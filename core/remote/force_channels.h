@@ -10,16 +10,13 @@
 
 namespace tendon {
 
-/// Combines the forces of several engines into one demand. Each engine has a channel with its own HeldForce.
-///
+/// Combines the forces of several engines into one demand. There is a channel with a HeldForce for each engine.
 ///     F  =  Σ Fᵢ  over the channels of rule kSum  +  Σ wⱼ Fⱼ  over those of rule kPriority
-///
 /// The first channel of rule kPriority with a fresh force (or with the freshest, if no force is fresh) gets all the
 /// weight. Its w goes to 1 at a rate of 1 per `ramp_in`, and the others keep their proportions, so Σ w = 1 and the
 /// engines are cross-faded. Stiffnesses, torques and grip forces are combined in the same way. The limiter bounds the
 /// result, even if the engines oppose each other (core/PROOFS.md, "Several channels").
-///
-/// Thread-safe: no. Realtime-safe: yes, but for the constructor.
+/// Thread-safe: no. Realtime-safe: yes, except the constructor.
 class ForceChannels {
  public:
   struct Config {
@@ -28,8 +25,7 @@ class ForceChannels {
   };
 
   struct Wanted : HeldForce::Wanted {
-    /// The channel with the freshest force, to which `mode` and `age` belong.
-    std::size_t channel = 0;
+    std::size_t channel = 0;  ///< with the freshest force, to which `mode` and `age` belong
   };
 
   /// Throws std::invalid_argument if there is no channel, and what HeldForce throws.
@@ -37,18 +33,17 @@ class ForceChannels {
 
   std::size_t size() const noexcept { return channels_.size(); }
 
-  /// Takes a newer force of one channel. Returns false if it was refused because it is not sound.
+  /// Returns false if the force is refused because it is not sound.
   bool observe(std::size_t channel, const RemoteForce& force) noexcept {
     return channels_[channel].held.observe(force);
   }
-  /// The remote environment of a channel has disconnected.
+  /// Must be called when the remote environment of a channel has disconnected.
   void release(std::size_t channel, std::uint32_t source, LocalTime now) noexcept {
     channels_[channel].held.release(source, now);
   }
-  /// Forgets all forces.
   void disengage() noexcept;
 
-  /// Returns the demand for this haptic step. Must be called once per step.
+  /// Must be called once per haptic step.
   Wanted wanted(const Motion& hand, const Quat* orientation = nullptr) noexcept;
 
   /// Returns the force that a channel holds. It is empty when idle.

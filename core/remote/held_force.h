@@ -14,58 +14,45 @@
 
 namespace tendon {
 
-/// The torque and the grip force that are wanted in addition to the force.
+/// The demands other than the force.
 struct HandleWanted {
   Vec3 torque = Vec3::Zero();  ///< N·m, on the hand
-  double grip = 0;             ///< N, on the fingers, > 0 opens them
+  double grip = 0;             ///< N; opens the fingers if positive
 };
 
-/// Holds the newest remote force between arrivals, and fades it out if no more arrive.
-///
-/// With age = now − received and v = valid_for (clipped to max_valid_for):
-///
+/// Holds the newest remote force between arrivals, and fades it out if no more arrive. With age = now − received and v
+/// = valid_for (clipped to max_valid_for):
 ///     age ≤ v                        Active     F(x)                    as it was sent
 ///     age ≤ v + hold                 Holding    F(x)
 ///     age < v + safe_stop            Decaying   F(x) · e^(−(age − v − hold)/decay)
 ///     otherwise                      SafeStop   0, until a fresh force arrives
-///
 /// F(x) follows the hand between two arrivals:
-///
 ///     without a part         the local model of the remote environment, with its contact and table, or the constant
 ///                            force if there is no model                        (reconstruct, core/remote/answer.h)
 ///     adaptive_local_model   blends from one stiffness to the next              (AdaptiveLocalModel)
 ///     output_estimator       learns a model of the environment                  (OutputEstimator)
 ///     learned_model          learns how the force depends on the position, for answers without a model (LearnedModel)
-///
-/// A torque follows its own model of rotation (answer.h), and a grip force is constant. Both are held, faded and ramped
-/// in together with the force. Only the trusted part of an answer is used, and an answer that is not sound is refused
-/// (answer.h).
+/// A torque follows its own model of rotation, and a grip force is constant. They are held, faded and ramped in like
+/// the force. Only the trusted part of an answer is used, and an answer that is not sound is refused (answer.h). The
+/// result must be bounded by a limiter.
 ///
 /// The first force, the first one after a safe stop, and the first one from another source are ramped in linearly over
 /// `ramp_in`, starting from the current force. A fresh force during the decay is ramped in over (1 − gain) · ramp_in.
-/// So the force does not jump if an engine returns, stutters or takes over.
-///
-/// The result is a demand, and the limiter bounds it.
-///
+/// The force does not jump if an engine returns, stutters or takes over.
 /// Thread-safe: no. Realtime-safe: yes.
 class HeldForce {
  public:
   struct Config {
-    /// Covers two lost datagrams of a 100 Hz engine.
-    Duration hold = std::chrono::milliseconds(20);
-    /// Time constant. 90 % is gone after 115 ms: too slow to be felt as a kick, too fast to lean on.
+    Duration hold = std::chrono::milliseconds(20);  ///< covers two lost datagrams of a 100 Hz engine
+    /// Time constant. The force is reduced by 90 % after 115 ms, which is not felt as a kick and cannot be leaned on.
     Duration decay = std::chrono::milliseconds(50);
     /// Time from the end of validity to the safe stop. The force is then below 1 %.
     Duration safe_stop = std::chrono::milliseconds(250);
     Duration ramp_in = std::chrono::milliseconds(100);
-    /// Upper limit of valid_for.
-    Duration max_valid_for = std::chrono::milliseconds(500);
-    /// N/m, > 0: the limit of the stiffness between two forces.
-    double max_stiffness = 5000;
-    /// N·m/rad, > 0: the same for rotation.
-    double max_angular_stiffness = 5;
-    /// At most one of these three. An empty part is not used and costs nothing.
-    std::optional<AdaptiveLocalModel::Config> adaptive_local_model{};
+    Duration max_valid_for = std::chrono::milliseconds(500);  ///< upper limit of valid_for
+    double max_stiffness = 5000;                              ///< N/m, > 0; limits the stiffness between two forces
+    double max_angular_stiffness = 5;                         ///< N·m/rad, > 0; the same for rotation
+    std::optional<AdaptiveLocalModel::Config> adaptive_local_model{};  ///< at most one of these three
     std::optional<OutputEstimator::Config> output_estimator{};
     std::optional<LearnedModel::Config> learned_model{};
   };
@@ -75,23 +62,22 @@ class HeldForce {
     Mat3 stiffness = Mat3::Zero();  ///< −∂F/∂x, N/m; zero without a local model
     Mode mode = Mode::kIdle;
     Reasons reasons;
-    Duration age{};                        ///< since it was received; 0 when idle
-    Duration loop_age{};                   ///< since the sample of the answered motion; 0 when idle
+    Duration age{};                        ///< time since it was received, or 0 when idle
+    Duration loop_age{};                   ///< time since the sample of the answered motion, or 0 when idle
     std::optional<HandleWanted> handle{};  ///< empty if there is no torque or grip force
   };
 
-  /// Throws std::invalid_argument with the name of the field if a duration is negative, decay is not positive,
-  /// safe_stop is shorter than hold, max_stiffness is not positive, a part refuses its configuration, or several parts
-  /// are listed.
+  /// Throws std::invalid_argument with the name of the field if a duration is negative, decay or max_stiffness is not
+  /// positive, safe_stop is shorter than hold, a part is not valid, or there are several parts.
   explicit HeldForce(const Config& config);
 
-  /// Takes a newer force. Returns false, without an effect, if it is not sound.
+  /// Returns false, without an effect, if the force is not sound.
   bool observe(const RemoteForce& force) noexcept;
 
-  /// The remote environment `source` has disconnected. If its force is held, it is no longer fresh from `now` on.
+  /// Must be called when the remote environment `source` has disconnected. Its force expires at `now`.
   void release(std::uint32_t source, LocalTime now) noexcept;
 
-  /// Drops the force. The next fresh one is ramped in.
+  /// The next fresh force is ramped in.
   void disengage() noexcept {
     newest_.reset();
     mode_ = Mode::kIdle;
@@ -99,11 +85,11 @@ class HeldForce {
     handle_rendered_.reset();
   }
 
-  /// The force wanted at `hand.position` at `hand.at`, and the torque wanted at `orientation`. Call it once in each
-  /// haptic step: an estimator learns from it. Without an orientation no model of rotation is followed.
+  /// Returns the demand for `hand.position`, `hand.at` and `orientation`. Must be called once per haptic step, because
+  /// an estimator learns from it. If there is no orientation, the model of rotation is not used.
   Wanted wanted(const Motion& hand, const Quat* orientation = nullptr) noexcept;
 
-  /// The force that is held, as it is believed; empty when idle.
+  /// Returns the trusted part of the held force, or nothing when idle.
   const std::optional<RemoteForce>& newest() const noexcept { return newest_; }
 
  private:
@@ -116,7 +102,7 @@ class HeldForce {
   Mode mode_ = Mode::kIdle;
   LocalTime engaged_{};       ///< start of the ramp
   Duration ramp_{};           ///< its length
-  Vec3 from_ = Vec3::Zero();  ///< N, the force it starts from
+  Vec3 from_ = Vec3::Zero();  ///< N, the force at the start of the ramp
   double presence_ = 0;       ///< share of the environment in `rendered_`, 0 to 1
   Vec3 rendered_ = Vec3::Zero();
   std::optional<HandleWanted> handle_from_;

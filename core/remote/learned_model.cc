@@ -12,7 +12,7 @@ constexpr double kOtherSide = 3e-4;   // m: a zero force at this distance from t
 constexpr double kSameObject = 3e-3;  // m: a force that reverses within this is of one object
 constexpr double kBeyond = 1.5;       // limit of predictions, in F_late
 constexpr double kOfLate = 1;         // s, time constant of F_late
-constexpr double kOfTheNewGap = 0.2;  // weight of a new gap in the mean time between answers
+constexpr double kOfTheNewGap = 0.2;  // the weight of a new value in the mean time between answers
 
 }  // namespace
 
@@ -32,8 +32,7 @@ void LearnedModel::observe(const Motion& hand) noexcept {
   ++next_;
 }
 
-/// The position of the hand in the last step not after `at`. Binary search, because the time stamps in the ring
-/// increase.
+/// Returns the position of the hand in the last step not after `at`. The time stamps in the ring increase.
 std::optional<Vec3> LearnedModel::place_at(LocalTime at) const noexcept {
   std::uint64_t low = next_ > kSlots ? next_ - kSlots : 0;
   std::uint64_t high = next_;

@@ -13,38 +13,29 @@
 namespace tendon {
 
 /// Learns from the answers how the remote force changes with the position of the hand, and moves the newest answer to
-/// the current position. This compensates the delay, and interpolates between two answers.
-///
-/// x_a is the position of the hand that answer F_a belongs to. At a new answer, with the last pair (F_p, x_p) that was
-/// used, p = x_a − x_p, and if ‖p‖ ≥ ℓ (`least_travel`):
-///
+/// the current position. This compensates the delay, and interpolates between answers. x_a is the position that answer
+/// F_a belongs to. At a new answer, with the last pair (F_p, x_p) that was used, p = x_a − x_p, if ‖p‖ ≥ ℓ:
 ///     q = K p                                                              N, prediction of the model
 ///     N ← λ N − (F_a − F_p)·q,   D ← λ D + ‖q‖²,   θ = clamp(N/D, 0, 1)    trust; 0 before two lessons
 ///     K ← K + g (−(F_a − F_p) − q) pᵀ / (‖p‖² + ℓ²/10)                     N/m, 3 × 3
 ///     (F_p, x_p) ← (F_a, x_a)
-///
 /// and in every haptic step, with d = x − x_a:
-///
 ///     F = F_a − θ K d + r,   ‖θ K d‖ ≤ max_stiffness ‖d‖,   ‖F − r‖ ≤ 1.5 F_late;   r ← r τ_r/(τ_r + T)
-///
 /// r is set such that F does not jump at an answer. τ_r is the smaller of `blend` and `blend_share` of the mean time
-/// between answers. F_late is the largest recent answer, forgotten within 1 s. The trust θ decreases if the force
-/// changes with time.
+/// between answers. F_late is the largest recent answer (within 1 s). θ decreases if the force changes with time.
 ///
 /// One-sided contact: if an answer is exactly zero, at least 0.3 mm from the last force, the object only pushes. F then
-/// fades to zero along F_a but does not reverse, F_a = 0 predicts zero, and pairs with a zero are not used. This ends
-/// if a force reverses within 3 mm.
+/// fades to zero along F_a without reversing, F_a = 0 predicts zero, and pairs with a zero are not used. This ends if a
+/// force reverses within 3 mm.
 ///
-/// The result is a demand, and a limiter bounds it. Use `reconstruct` for answers that have a model.
+/// The result must be bounded by a limiter. Use `reconstruct` for answers that have a model.
 ///
 /// Source: core/PROOFS.md, "Local models". The update is the normalized least-mean-squares step (Nagumo and Noda, IEEE
 /// Trans. Automatic Control 12(3), 1967).
-///
 /// Thread-safe: no. Realtime-safe: yes; observe and predict O(1), correct O(log kSlots).
 class LearnedModel {
  public:
-  /// The number of stored steps. Older answers are held without a model.
-  static constexpr std::size_t kSlots = 1024;
+  static constexpr std::size_t kSlots = 1024;  ///< number of stored steps; there is no model for older answers
 
   struct Config {
     double least_travel = 2e-4;                     ///< ℓ, m, > 0: about seven encoder counts
@@ -58,17 +49,17 @@ class LearnedModel {
   /// Throws std::invalid_argument with the name of the field if it is out of range.
   explicit LearnedModel(const Config& config);
 
-  /// Stores the motion of this haptic step. Ignores a motion that is not finite or not newer.
+  /// Stores the motion of this haptic step. Does nothing if the motion is not finite or is not newer.
   void observe(const Motion& hand) noexcept;
 
   /// Takes a newer answer. Uses only `force` and `answers`.
   void correct(const RemoteForce& answer) noexcept;
 
-  /// Returns the answer predicted for the newest motion, or nothing before the first answer. Must be called once per
+  /// Returns the predicted answer to the newest motion, or nothing before the first answer. Must be called once per
   /// haptic step, because each call reduces r.
   std::optional<Prediction> predict() noexcept;
 
-  /// Resets everything except the stored motion. Call this if the environment changes.
+  /// Resets everything except the stored motion. Must be called if the environment changes.
   void forget() noexcept;
 
   double trust() const noexcept { return trust_; }               ///< θ
@@ -92,7 +83,7 @@ class LearnedModel {
 
   Config config_;
   std::array<Place, kSlots> places_{};
-  std::uint64_t next_ = 0;  ///< number of the step that comes next
+  std::uint64_t next_ = 0;  ///< the number of the next step
 
   Mat3 stiffness_ = Mat3::Zero();
   double came_ = 0;       ///< N, of the trust

@@ -13,42 +13,32 @@
 
 namespace tendon {
 
-/// Learns the remote environment from its infrequent and late forces, and predicts the answer to the current position
-/// in every haptic step.
-///
+/// Learns the remote environment from its infrequent and late forces, and predicts the answer in every haptic step.
 /// Each axis has a separate model with two parameters θ in N/m, of the displacement x = position − origin along that
 /// axis. A spring that pushes the hand back has θ₁ > 0 and F = −θ₁ x. Forces are on the hand. With ℓ = `scale`:
-///
 ///     kPolynomial     F = −(θ₁ x + θ₂ x|x|/ℓ) − off           −∂F/∂x = θ₁ + 2 θ₂ |x|/ℓ
 ///     kSpringAndBias  F = −(θ₁ x + θ₂ ℓ) − off                −∂F/∂x = θ₁
 ///     kOutputError    F(k) = a F(k−1) − θ₂ x(k)               −∂F/∂x = θ₂, of this step
-///
 /// A force that answers the motion at time t is compared with the force of the model for that motion, so the time and
 /// the order of arrival have no effect. Then:
-///
 ///     e = −F − φᵀθ
 ///     if |e| > reset_error, and reset_cooldown answers since the last one:  P ← p0 I  (θ stays)
 ///     θ, P ← least squares with forgetting, capped, outside the dead zone
 ///     θ ← into its bounds: stiffness 0 … max_stiffness (other parameters either sign), |a| ≤ 0.9
 ///     re-anchor on the newest motion that was answered: off = −F − φᵀθ, or F(k) computed again since
-///
-/// An axis does not learn if the hand has moved by less than three encoder counts since the last lesson. Before the
-/// first lesson the prediction is the held force. The pole is bounded, because a pole fitted to 25 Hz data is often
-/// unstable at 1 kHz. The prediction is bounded as well, because it can be wrong by some newtons after a change of the
-/// environment. The result is a demand, and a limiter bounds it.
-///
-/// The axes are independent. A wall at an angle to the axes appears as three springs that are only right along the
-/// direction of the last press. Engines can send a LocalModel instead (see AdaptiveLocalModel).
+/// An axis does not learn if the hand has moved by less than three encoder counts since the last lesson. The prediction
+/// is the held force until the first lesson. The pole is bounded, because a pole fitted to 25 Hz data is often unstable
+/// at 1 kHz. The prediction is bounded, too, because its error can be some newtons after a change of the environment.
+/// The result must be bounded by a limiter. The axes are independent: a wall at an angle to the axes appears as three
+/// springs that are only right along the direction of the last press. Engines can send a LocalModel instead.
 ///
 /// Source: Lee and Lee, "Multirate output estimation for real-time haptic rendering" (only the abstract is available,
 /// so the condition of the P reset is a guess). Cap, cooldown, bounds, freeze and re-anchoring are ours:
 /// core/PROOFS.md, "Local models".
-///
 /// Thread-safe: no. Realtime-safe: yes; observe and predict O(1), correct at most kSlots steps.
 class OutputEstimator {
  public:
-  /// Number of stored steps. Older answers are ignored.
-  static constexpr std::size_t kSlots = 1024;
+  static constexpr std::size_t kSlots = 1024;  ///< stored steps; older answers are ignored
   static constexpr double kMaxPole = 0.9;
   static constexpr double kFreezeCounts = 3;
 
@@ -56,31 +46,21 @@ class OutputEstimator {
 
   struct Config {
     Model model = Model::kPolynomial;
-    /// m; the position at which the environment is at rest.
-    Vec3 origin = Vec3::Zero();
-    /// ℓ in m, about the travel. Both parameters then have the same magnitude.
-    double scale = 0.01;
-    /// Per answer. At 25 Hz, 0.95 forgets half in 0.5 s.
-    double forgetting = 0.95;
-    /// (N/m)²/N²: errors of 500 N/m of a parameter and 0.05 N of a force.
-    double prior_variance = 1e8;
-    /// N; about the noise of the engine's force.
-    double dead_zone = 0;
-    /// N; a larger error indicates another environment.
-    double reset_error = 0.3;
-    /// Answers between two resets. This must be more than the number of parameters.
-    int reset_cooldown = 3;
-    /// N/m
-    double max_stiffness = 5000;
-    /// N, per axis
-    double max_force = 30;
-    /// m; one encoder count at the handle, 0 = exact.
-    double resolution = 0;
+    Vec3 origin = Vec3::Zero();  ///< m, the rest position of the environment
+    double scale = 0.01;       ///< ℓ, m; should be about the travel, so that both parameters have the same magnitude
+    double forgetting = 0.95;  ///< per answer; 0.95 forgets half in 0.5 s at 25 Hz
+    double prior_variance = 1e8;  ///< (N/m)²/N²: errors of 500 N/m of a parameter and 0.05 N of a force
+    double dead_zone = 0;         ///< N; should be about the noise of the engine's force
+    double reset_error = 0.3;     ///< N; a larger error indicates another environment
+    int reset_cooldown = 3;       ///< answers between two resets; more than the number of parameters
+    double max_stiffness = 5000;  ///< N/m
+    double max_force = 30;        ///< N, per axis
+    double resolution = 0;        ///< m; one encoder count at the handle, 0 = exact
   };
 
   struct Counts {
     std::uint64_t corrections = 0;  ///< answers used
-    std::uint64_t ignored = 0;      ///< answers to unknown, too old or already answered motions, or not finite
+    std::uint64_t ignored = 0;      ///< answers that are not finite, or to unknown, too old or answered motions
     std::uint64_t resets = 0;       ///< of P, over all axes
     std::uint64_t frozen = 0;       ///< axes without enough motion to learn from an answer
   };
@@ -88,18 +68,18 @@ class OutputEstimator {
   /// Throws std::invalid_argument with the name of the field if it is out of range.
   explicit OutputEstimator(const Config& config);
 
-  /// Stores the motion of this haptic step. Ignores a motion that is not finite or not newer.
+  /// Stores the motion of this haptic step. Does nothing if the motion is not finite or is not newer.
   void observe(const Motion& hand) noexcept;
 
   /// Learns from a remote force. Returns false if it was ignored. Uses only `force` and `answers`.
   bool correct(const RemoteForce& force) noexcept;
 
   /// Returns the predicted answer at `hand.position`, in the step of `hand.at` or, if that was not observed, in the
-  /// step after the newest. The result is empty before the first correction and for a position that is not finite. The
+  /// step after the newest. Returns nothing before the first correction and if the position is not finite. The
   /// stiffness of an axis at ±max_force is zero.
   std::optional<Prediction> predict(const Motion& hand) const noexcept;
 
-  /// Returns θ of an axis in N/m. For kOutputError it is (a, θ₂) with the dimensionless a.
+  /// Returns θ of an axis in N/m, for kOutputError (a, θ₂) with the dimensionless a.
   Eigen::Vector2d parameters(int axis) const noexcept;
 
   const Counts& counts() const noexcept { return counts_; }

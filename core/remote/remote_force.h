@@ -12,33 +12,29 @@
 namespace tendon {
 
 /// The force along the normal of a contact at several depths. force[i] is along +normal, with the tool `depth_i = first
-/// + i · step` deeper than at the answer, at the position `at − depth_i · normal`. The force is interpolated linearly,
-/// and constant beyond the ends.
+/// + i · step` deeper than at the answer, at the position `at − depth_i · normal`. Linear in between, constant beyond.
 struct ForceTable {
   static constexpr std::size_t kMinEntries = 2;
-  static constexpr std::size_t kMaxEntries = 16;  ///< 0.3 mm apart over 5 mm; 128 bytes of a datagram
+  static constexpr std::size_t kMaxEntries = 16;  ///< 5 mm with 0.3 mm between entries; 128 bytes of a datagram
   double first = 0;                               ///< m; negative: nearer to the hand
   double step = 0;                                ///< m, > 0
   std::uint32_t size = 0;                         ///< entries, kMinEntries … kMaxEntries
   std::array<double, kMaxEntries> force{};        ///< N
 };
 
-/// A surface that the tool touches or is about to touch. If there is no table, it can only push.
+/// A surface at or near the tool. It can only push if there is no table.
 struct Contact {
   static constexpr double kUnitTolerance = 1e-3;  ///< for the length of the normal
-  Vec3 normal = Vec3::UnitX();                    ///< unit vector, out of the body, to the hand
+  Vec3 normal = Vec3::UnitX();                    ///< unit vector from the body to the hand
   double gap = 0;  ///< m, distance from the surface to the tool along the normal; negative: penetration
   std::optional<ForceTable> table{};
 };
 
-/// The remote environment near one position, linearized so that the device loop can follow the hand between two forces:
-///
+/// The remote environment linearized near one position, so that the device loop can follow the hand between two forces:
 ///     F(x) = force − stiffness · (x − at)          N, with stiffness = −∂F/∂x in N/m
-///
-/// A spring has a positive stiffness; a wall with normal n has k·n·nᵀ. core/remote/answer.h defines the use of the
-/// other members.
+/// A spring has a positive stiffness; a wall with normal n has k·n·nᵀ. For the other members see core/remote/answer.h.
 struct LocalModel {
-  Vec3 at = Vec3::Zero();         ///< m, the position the force was computed for
+  Vec3 at = Vec3::Zero();         ///< m, the position for which the force was computed
   Mat3 stiffness = Mat3::Zero();  ///< N/m
   /// m, ≥ 0: the distance from `at` up to which the stiffness is valid; +infinity if unknown.
   double valid_radius = std::numeric_limits<double>::infinity();
@@ -47,13 +43,11 @@ struct LocalModel {
 
 /// The change of a torque with the orientation of the handle. With K = `stiffness` and p = (w, v) the rotation from
 /// `at` to the orientation of the handle, p = q · at⁻¹:
-///
 ///     τ(q) = torque − 2 (w K v + v × K v)          N·m
-///
 /// This is −K θ for a small rotation θ, and the gradient of the energy 2 vᵀ K v (J), so a closed path generates no
 /// energy. p and −p give the same torque.
 struct RotationModel {
-  Quat at;                        ///< the orientation that the torque was computed for
+  Quat at;                        ///< the orientation for which the torque was computed
   Mat3 stiffness = Mat3::Zero();  ///< N·m/rad, −∂τ/∂θ, base frame axes
 };
 
@@ -63,12 +57,10 @@ struct RemoteTorque {
   std::optional<RotationModel> model{};
 };
 
-/// The force on the hand that a remote physics engine requests.
-///
-/// **Sign, everywhere in Tendon:** a force is exerted by the device *on the hand*, so a wall that resists motion along
-/// +x sends −x. (The reflective force f of Lee & Lee 2009 is its negative.)
+/// The force on the hand that a remote physics engine requests. **Sign, everywhere in Tendon:** a force is exerted by
+/// the device *on the hand*, so a wall that resists motion along +x sends −x. (Lee & Lee 2009 use f = −F.)
 struct RemoteForce {
-  std::uint64_t sequence = 0;      ///< strictly increasing per session; 0 means "none yet"
+  std::uint64_t sequence = 0;      ///< increases strictly within a session; 0 if there is no force yet
   std::uint64_t answers_tick = 0;  ///< the haptic step with the answered motion
   LocalTime answers{};             ///< sample time of that motion; now − answers is the age of the loop
   LocalTime received{};            ///< arrival time
@@ -76,12 +68,12 @@ struct RemoteForce {
   std::optional<LocalModel> model{};
   Duration valid_for{};      ///< from `received`; an older force is not fresh
   std::uint32_t source = 0;  ///< identifies the sender, because the first force of another engine is ramped in
-  /// The body was cut or torn since the previous answer, so the model of neither answer is valid.
+  /// If true, the body was cut or torn since the previous answer, and the models of both answers are not valid.
   bool topology_changed = false;
   std::uint8_t way = 0;           ///< number of the solver path in the engine; 0: unknown. For diagnostics only
-  std::optional<double> error{};  ///< N, ≥ 0: the engine's own estimate of the error of `force`
+  std::optional<double> error{};  ///< N, ≥ 0; the error of `force` that the engine estimates
   std::optional<RemoteTorque> torque{};
-  std::optional<double> grip_force{};  ///< N, on the fingers of the gripper; > 0 opens them
+  std::optional<double> grip_force{};  ///< N; opens the fingers of the gripper if positive
 };
 
 }  // namespace tendon

@@ -9,12 +9,10 @@ namespace tendon {
 
 /// The boundaries of a sampled spring with Coulomb friction and an encoder, without a virtual damper. B ≠ 0 throws.
 ///
-/// Returns the largest K (N/m) at which friction dissipates the energy of one held count: min(2b/T, 2 f_c/Δ), or 2b/T
-/// if Δ is 0. Throws if d ≠ 0. Source: Abbott and Okamura, IEEE T-RO 21(5):952, 2005. Thread-safe: yes. Realtime-safe:
-/// no.
+/// Returns the largest K (N/m) at which friction dissipates the energy of a count: min(2b/T, 2 f_c/Δ), or 2b/T if Δ is
+/// 0. Throws if d ≠ 0. Source: Abbott and Okamura, IEEE T-RO 21(5):952, 2005. Thread-safe: yes. Realtime-safe: no.
 double abbott_okamura_stiffness(const SampledSpring& spring);
 
-/// The behavior of a sampled spring, according to the three numbers of Diolaiti.
 enum class DiolaitiRegion {
   kPassive,          ///< always comes to rest
   kLimitCycle,       ///< slows down, but about one count of motion can remain
@@ -29,16 +27,13 @@ struct Diolaiti {
   double sigma = 0;  ///< f_c/(KΔ); infinite for K = 0 or Δ = 0
   double tau = 0;    ///< delay in periods: d
   DiolaitiRegion region = DiolaitiRegion::kPassive;
-  /// m/s; infinite if β ≥ ½ + τ:
-  ///     v_lim = (4/π) f_c/(K (T/2 + dT) − b)
-  /// The velocity amplitude of the limit cycle from its describing function, for slow oscillations (KT² ≪ m). In
-  /// simulation motion decays at 0.94 of it and grows at 1.18.
+  /// m/s, v_lim = (4/π) f_c/(K (T/2 + dT) − b), or infinite if β ≥ ½ + τ. The velocity amplitude of the limit cycle
+  /// from its describing function, for KT² ≪ m. In simulation the motion decays at 0.94 v_lim and grows at 1.18 v_lim.
   double speed_limit = 0;
 };
 
-/// Returns the numbers and the region. The motion slows down from any speed if β ≥ ½ + τ, and comes to rest if σ ≥ ½.
-/// Source: Diolaiti et al., IEEE T-RO 22(2), 2006; σ as in Abbott and Okamura; v_lim: core/PROOFS.md, "Stability
-/// boundaries".
+/// If β ≥ ½ + τ, the motion slows down from any speed. If σ ≥ ½, it comes to rest. Source: Diolaiti et al., IEEE T-RO
+/// 22(2), 2006; σ as in Abbott and Okamura; v_lim: core/PROOFS.md, "Stability boundaries".
 Diolaiti diolaiti(const SampledSpring& spring);
 
 }  // namespace tendon

@@ -5,20 +5,17 @@
 
 namespace tendon {
 
-/// A virtual spring and damper, sampled and held, on a real handle. The literature has closed-form boundaries for this
-/// system, and all functions of core/stability take it. For the handle,
-///
+/// A virtual spring and damper on a real handle, for which the literature has closed-form boundaries. For the handle,
 ///     m dv/dt = F − b v − f_c sgn(v),
 ///     F(t) = −[ K x(k−d) + B (x(k−d) − x(k−d−1))/T ]    for kT ≤ t < (k+1)T        (N, on the hand)
-///
 /// where x(k) is the position at kT, rounded to the encoder step. There is no hand and no unilateral contact.
 ///
-/// These functions throw std::invalid_argument with the field, its value and the expected range, even for a field that
-/// they do not use. They are not realtime-safe.
+/// All functions of core/stability take this struct. They throw std::invalid_argument with the field, its value and the
+/// expected range, even for a field that they do not use. They are not realtime-safe.
 struct SampledSpring {
   double mass = 0;          ///< m, kg
-  double viscous = 0;       ///< b, N·s/m, of the device
-  double coulomb = 0;       ///< f_c, N, of the device
+  double viscous = 0;       ///< b, N·s/m, the friction of the device
+  double coulomb = 0;       ///< f_c, N, the friction of the device
   double stiffness = 0;     ///< K, N/m, virtual
   double damping = 0;       ///< B, N·s/m, virtual, on the backward difference of the position
   Duration period{};        ///< T, > 0
@@ -32,11 +29,10 @@ inline constexpr int kMaxDelaySamples = 200;
 /// Returns the mean age of the held force, T/2 + d T, in s. Most boundaries compare friction with stiffness × this age.
 double mean_age(const SampledSpring& spring);
 
-/// Throws as described above unless all fields are finite, all but B are not negative, T > 0 and 0 ≤ d ≤
-/// kMaxDelaySamples. The laws call this function.
+/// Throws unless all fields are finite, all but B are not negative, T > 0 and 0 ≤ d ≤ kMaxDelaySamples.
 void check(const SampledSpring& spring);
 
-/// Throws if B ≠ 0, for laws without a virtual damper.
+/// For laws without a virtual damper. Throws if B ≠ 0.
 void check_without_damper(const SampledSpring& spring);
 
 }  // namespace tendon

@@ -17,11 +17,10 @@
 
 namespace tendon {
 
-/// One end of a coupling between two devices: engaging, clutch, loss of the peer, position mapping, law, and energy
-/// exchange. Both ends use this class in the haptic loop of their device; the network only transfers PortStates.
+/// Implements one end of a coupling between two devices: engaging, clutch, loss of the peer, position mapping, law, and
+/// energy exchange. There is an object in the haptic loop of each device; the network only transfers PortStates.
 ///
 /// **In each period**, in this order:
-///
 ///     coupling.receive(state of the peer)            any number of states, possibly late or duplicated
 ///     limiter.observe(interval)                      the account: L − given + taken
 ///     coupling.observe(interval, limiter.payable())
@@ -31,62 +30,58 @@ namespace tendon {
 ///     coupling.conclude(applied, contact)            the end of the period
 ///     send(coupling.message())
 ///
-/// **Displacements.** Each end has an offset p₀ and sends u = p − p₀ in its own axes. If an end is not *live*, its u
-/// is constant and p₀ moves with the handle. The leader is live if it is engaged and the follower has answered the
-/// act. The follower is live if it is engaged. When the follower becomes live, it sets its u to the mapped u of the
-/// leader, so that the force of the law is 0. The u of the leader is 0 at the start of each act and continues from
-/// its last value after the clutch. The clutch therefore does not move the other end.
+/// **Displacements.** Each end has an offset p₀ and sends u = p − p₀ in its own axes. If an end is not *live*, its u is
+/// constant and p₀ moves with the handle. The leader is live if it is engaged and the follower has answered the act.
+/// The follower is live if it is engaged, and it then sets its u to the mapped u of the leader, so that the force of
+/// the law is 0. The u of the leader is 0 at the start of each act and continues from its last value after the clutch,
+/// which does not move the other end.
 ///
-/// **Phases.** The function `next` (phase_machine.h) contains the table of phases. The device is ready if it is
-/// connected, armed, and has no fault. The leader engages if its operator calls engage() or presses the button, the
-/// leader is ready, and the peer is fresh and in the phase coupled, engaged, or clutched. The follower engages if it
-/// receives an act that is newer than all previous acts and belongs to the current epoch of the follower. An act ends
-/// if the peer starts again or is no longer engaged in this act. The leader also ends the act if the peer knows the
-/// act and is not engaged, if the peer is not ready, or if there is no answer within kAnswerWithin. If the leader is
-/// clutched, the follower stays engaged and holds its position.
+/// **Phases** (the table is in phase_machine.h). The device is ready if it is connected, armed, and has no fault. The
+/// leader engages if its operator calls engage() or presses the button, the leader is ready, and the peer is fresh and
+/// in the phase coupled, engaged, or clutched. The follower engages if it receives an act that is newer than all
+/// previous acts and belongs to the current epoch of the follower. An act ends if the peer has restarted or is no
+/// longer engaged in this act. The leader also ends the act if the peer knows the act and is not engaged, if the peer
+/// is not ready, or without an answer within kAnswerWithin. If it is clutched, the follower stays engaged and holds its
+/// position.
 ///
 /// The force increases within `ramp` and decreases within ForceRamp::kFade, so there are no steps. A fault sets the
 /// force to 0 immediately. If there is no position in a period, the gain decreases at the same rate.
 ///
 /// **A new peer** (renew). A client that takes over a channel may have an epoch that is not larger than that of the
-/// previous one. The function renew() resets the peer, so that each epoch is accepted, and increments the own epoch,
-/// so that previous totals and acts are not used. The act ends and the force fades.
+/// previous one. renew() resets the peer, so that each epoch is accepted, and increments the own epoch, so that
+/// previous totals and acts are not used. The act ends and the force decreases to 0.
 ///
-/// **Scales that change** (set_scale, MappedEnd). The displacement of the leader is multiplied by the old s_x over
-/// the new s_x, so that its mapped position does not change. The force changes within ForceRamp::kFade. The methods
-/// waves and passivity cannot change their scales (keeps_scales), and a coupling of grippers cannot do so either.
+/// **Scales that change** (set_scale, MappedEnd). The displacement of the leader is multiplied by the old s_x over the
+/// new s_x, so that its mapped position does not change. The force changes within ForceRamp::kFade. The methods waves
+/// and passivity (keeps_scales) and a coupling of grippers cannot change their scales.
 ///
 /// **Loss of the peer** (LossStages). If the peer is silent, the force decreases. If the peer is gone, the phase is
-/// `lost` and the force is 0. A link with a delay of more than max_delay counts as lost. A robot (`holds_place`)
-/// holds its last position with a spring of K and B along all axes if it is ready and not live. The ramp blends this
-/// spring with the law. After a loss, the round trip is measured again, so that the spring of the next act does not
+/// `lost` and the force is 0. A link with a delay of more than max_delay counts as lost. A robot (`holds_place`) that
+/// is ready and not live holds its last position with a spring of K and B along all axes, and the ramp blends this
+/// spring with the law. After a loss the round trip is measured again, so that the spring of the next act does not
 /// depend on the silence. The pair loses the energy that the network has not delivered.
 ///
-/// **Laws.** The folder methods/ contains one law per method. K, D, and B are the values of the leader, and the
-/// values of the follower are smaller by s_f s_x. The norm of all forces is at most max_force.
+/// **Laws.** The folder methods/ contains one law per method. K, D, and B are the values of the leader, and the values
+/// of the follower are smaller by s_f s_x. The norm of all forces is at most max_force.
 ///
 /// **Energy tank.** If Config::tank is set, the port exchanges energy with its peer (EnergyTank). It only gives energy
 /// if it is live and the peer is engaged and not silent. A pair is only passive with an energy tank if the method is
-/// position-position, set-position, or passivity. Without an energy tank, a limiter at each end keeps this end passive
-/// and the follower cannot move. This is also true for the other methods except for waves.
+/// position-position, set-position, or passivity. If there is no energy tank, each end is passive because of its
+/// limiter, and the follower cannot move. This is also true for the other methods except for waves.
 ///
-/// **The rest of a handle.** Config::turn couples the orientations (TurnCoupling), and Config::grip couples the
-/// grippers (GripCoupling). They use the same phases and the same ramp. The force and the torque share one account,
-/// which `settle` changes. `settle_grip` changes the account of the gripper. The ends disengage if their orientations
-/// differ by more than 150°.
+/// **The rest of a handle.** Config::turn couples the orientations (TurnCoupling), and Config::grip the grippers
+/// (GripCoupling), with the same phases and ramp. The force and the torque share one account, which `settle` changes.
+/// `settle_grip` changes that of the gripper. The coupling disengages if the orientations differ by more than 150°.
 ///
-/// **Bad input.** The coupling ignores a state and increments `refused` if one of its values is not finite or out of
-/// bounds, if it answers a state that was never sent, if `energy_in` has decreased within the epoch, or if the tank
-/// refuses it. The coupling ignores a state that is not newer. If the position or the velocity of the hand is not
-/// finite or larger than 10¹², the demand is not finite and the limiter sets the force to 0. The same is true for the
-/// orientation and the opening if they are coupled. A measured force that is not finite is replaced with 0, and a
-/// contact force that is not finite counts as not measured.
+/// **Bad input.** A state is ignored and counted in `refused` if one of its values is not finite or out of bounds, if
+/// it answers a state that was never sent, if `energy_in` has decreased within the epoch, or if the tank refuses it.
+/// Older states and duplicates are ignored. If the position or the velocity of the hand is not finite or larger than
+/// 10¹², the demand is not finite and the limiter sets the force to 0. The same is true for the orientation and the
+/// opening if they are coupled. A measured force that is not finite becomes 0; a contact force counts as not measured.
 ///
-/// **Share.** If a follower has several leaders (Couplings), K, D, B, max_force, and the contact force of each pair
-/// are multiplied by its share α at both ends. The follower sends α (PortState::share). The leader changes its α at
-/// most as fast as Shares::kHandOver allows, so that a late state does not cause a step. If the follower does not
-/// send α, it is 1.
-///
+/// **Share.** If a follower has several leaders (Couplings), K, D, B, max_force, and the contact force of each pair are
+/// multiplied by its share α at both ends. If the follower does not send α (PortState::share), it is 1. The rate of α
+/// at the leader is limited as in Shares::kHandOver, so that a late state does not cause a step.
 /// Thread-safe: no. Realtime-safe: yes, except the constructor.
 class Coupling {
  public:
@@ -104,49 +99,43 @@ class Coupling {
 
   void receive(const PortState& peer, LocalTime now) noexcept;
 
-  /// Starts an act of the leader; a follower ignores it. Returns true if the coupling is engaging or was engaged
-  /// before. Returns false and does nothing in the phases alone, lost and fault, and if the peer is not ready.
+  /// Starts an act; must be called at the leader. Returns true if the coupling is engaging or was engaged before.
+  /// Returns false and does nothing if the phase is alone, lost or fault, or if the peer is not ready.
   bool engage() noexcept;
-  /// Ends the act. Can be called at both ends.
-  void disengage() noexcept;
+  void disengage() noexcept;  ///< ends the act; can be called at both ends
 
-  /// Must be called if the peer has been replaced or has restarted.
-  void renew() noexcept;
+  void renew() noexcept;  ///< must be called if the peer has been replaced or has restarted
 
   /// Sets the scales of the leader, 0.01 … 100. Returns false and does nothing while the coupling is engaged or
-  /// aligning, for a method or grippers that cannot change their scales, at a follower, and if a scale is out of
-  /// bounds.
+  /// aligning, for a method or grippers that cannot change their scales, at a follower, and if a scale is out of range.
   bool set_scale(double position_scale, double force_scale) noexcept;
   /// Sets the share α of a follower with Config::share for the next `command`. `others` is the gain of the ramp of
   /// another leader. A robot only holds its position with the remaining part.
   void set_share(double share, double others) noexcept;
 
-  /// Uses the previous interval. `payable` is the account after the interval in J (SharesAccount::payable), and +∞
-  /// for a port without a limiter. Must not be called if the interval was not measured.
+  /// `payable` is the account after the previous interval in J (SharesAccount::payable), or +∞ for a port without a
+  /// limiter. Must not be called if the interval was not measured.
   void observe(const Interval<3>& interval, double payable) noexcept;
 
   /// Returns the requested force for this period and −∂F/∂x. `hand` is in the axes of the base frame. `handle` must
   /// contain at least the coupled values.
   Demand<3> command(const Motion& hand, std::uint32_t buttons, bool ready,
                     const HandleSample* handle = nullptr) noexcept;
-  /// The other requests of this period. They are 0 if they are not coupled.
   const Vec3& torque() const noexcept { return torque_; }     ///< N·m, on the hand, in the axes of the base frame
   double grip_force() const noexcept { return grip_force_; }  ///< N, on the fingers; > 0 opens them
-  /// Must be called instead of `command` if there is no position. Updates the phase only; the force is 0.
+  /// Must be called instead of `command` if there is no position. This only updates the phase. The force is 0.
   void command_unseen(LocalTime now, bool ready) noexcept;
 
-  /// Returns the changes of the account. Must be called after `command` and before the limiter. Without an energy tank
-  /// or waves, both values are 0.
+  /// Returns the changes of the account, 0 without a tank or waves. Must be called between `command` and the limiter.
   EnergyTank::Settlement settle(double payable, double loss, Duration elapsed) noexcept;
 
-  /// Returns the changes of the account of the gripper. Both values are 0 if the grippers are not coupled.
+  /// The same for the account of the gripper. Both values are 0 if the grippers are not coupled.
   EnergyTank::Settlement settle_grip(double payable, double loss, Duration elapsed) noexcept;
 
-  /// Ends the period. `applied`, `torque`, and `grip` are the values of the device in N, N·m, and N, and `contact` is
-  /// the force on the tool in N.
+  /// Ends the period. `applied` (N), `torque` (N·m), and `grip` (N) are by the device, `contact` (N) on the tool.
   void conclude(const Vec3& applied, const std::optional<Vec3>& contact, const Vec3& torque = Vec3::Zero(),
                 double grip = 0) noexcept;
-  /// Returns the state to send in this period. This function must be called after `conclude`.
+  /// Returns the state to send in this period. Must be called after `conclude`.
   PortState message() const noexcept;
 
   PortPhase phase() const noexcept { return phase_; }
@@ -203,7 +192,7 @@ class Coupling {
   PortPhase phase_ = PortPhase::kAlone;
   std::uint64_t sequence_ = 0;    ///< number of periods
   std::uint64_t engagement_ = 0;  ///< of the newest act that was made (leader) or followed (follower)
-  std::uint64_t seen_ = 0;        ///< follower: acts up to this one are ignored
+  std::uint64_t seen_ = 0;        ///< at the follower, acts up to this one are ignored
   bool answered_ = false;         ///< leader: the follower is engaged in this act
   bool ready_ = false;
   std::uint64_t act_sequence_ = 0;   ///< the first state that contains the act
@@ -215,7 +204,7 @@ class Coupling {
   LocalTime now_{};
   Duration elapsed_{};
 
-  PortState newest_;  ///< of the peer; sequence 0: no state
+  PortState newest_;  ///< newest state of the peer; there is none if its sequence is 0
   LossStages loss_stages_;
   LossStages::Stage loss_stage_;
   bool peer_anew_ = false;  ///< the epoch has changed in this period
@@ -231,9 +220,9 @@ class Coupling {
   bool rescaled_ = false;  ///< The scales have changed in this period.
   ForceRamp ramp_;
   double share_ = 1;    ///< α
-  double others_ = 0;   ///< follower only; the gain of another leader
+  double others_ = 0;   ///< the gain of another leader, only at the follower
   double taken_ = 0;    ///< J; received from waves or acts since the last `settle`
-  double given_ = 0;    ///< J, sent by waves since the last `settle`
+  double given_ = 0;    ///< J, the energy that waves have sent since the last `settle`
   double payable_ = 0;  ///< J, after the newest interval
   double loss_ = 0;     ///< J; the reserve of the limiter for the last force
 

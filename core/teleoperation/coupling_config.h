@@ -18,25 +18,22 @@
 
 namespace tendon {
 
-/// The configuration of an absolute map, in which u is the position p at both ends and p_f = s_x R p_l. There is no
-/// clutch. Each act starts with the alignment of the leader (Alignment), and the follower does not move in this phase.
-/// The limiter only allows the motion of the leader if there is enough energy in the account. Each act adds `energy` to
-/// the account, so the limiter ensures that L ≥ −energy · acts. If `energy` is 0, the hand must move the handle.
+/// An absolute map, in which u is the position p at both ends and p_f = s_x R p_l. There is no clutch. Each act starts
+/// with the alignment of the leader (Alignment), in which the follower does not move. The limiter only allows the
+/// motion of the leader if there is enough energy in the account. Each act adds `energy` to the account, so L ≥ −energy
+/// · acts. If `energy` is 0, the hand must move the handle.
 struct CouplingAbsolute {
   double within = 0.02;  ///< m, > 0; the leader can engage if the distance is smaller
   double energy = 0;     ///< J, ≥ 0; added to the account of the leader at each act
 };
 
-/// Configures one end of a coupling.
 struct CouplingConfig {
   PortRole role = PortRole::kLeader;
   CouplingMethod method = CouplingMethod::kPositionPosition;
   PoseMap::Config map{};
-  /// The values of `stiffness`, `damping`, and `own_damping` are those of the leader. The other values are those of
-  /// this end.
+  /// `stiffness`, `damping`, and `own_damping` are those of the leader. The others are for this end.
   PositionPosition<3>::Config spring{};
-  /// The value of `start` is in joules of the leader. The values of `max_power` and `max_account` are those of this
-  /// end. The constructor sets `peers`, `joule`, and `epoch`.
+  /// `start` is in joules of the leader, `max_power` and `max_account` of this end. The constructor sets the others.
   std::optional<EnergyTank::Config> tank{};
   /// Used by the follower if the method is `surface`, in the scale of the follower.
   SurfaceEstimator<3>::Config surface{
@@ -44,29 +41,26 @@ struct CouplingConfig {
   /// Requires a method with positions (has_places) and no clutch. If it is empty, the map is relative.
   std::optional<CouplingAbsolute> absolute{};
   std::optional<CouplingButton> clutch{};               ///< leader only
-  std::optional<std::uint32_t> engage_by{};             ///< leader only; the bit of a button that calls engage()
+  std::optional<std::uint32_t> engage_by{};             ///< the bit of a button that calls engage(), only at the leader
   Duration ramp = std::chrono::milliseconds(300);       ///< > 0
-  Duration peer_period = std::chrono::milliseconds(1);  ///< > 0; the time between two states of the peer
+  Duration peer_period = std::chrono::milliseconds(1);  ///< > 0, the time between the states of the peer
   double encoder_step = 0;                              ///< m, ≥ 0; of the device; used by waves; 0: exact
-  bool holds_place = false;                             ///< only for a follower: the device is a robot
-  /// The initial value of α (0 to 1) if the follower has several leaders (can_be_shared).
-  std::optional<double> share{};
-  double drift_rate = 100;                     ///< λ, 1/s, ≥ 0; used if the method is passivity
-  std::optional<RateControl> rate{};           ///< required if the method is rate
-  double centring = 0;                         ///< K_c, N/m, ≥ 0; used by the leader if the method is rate
-  Duration max_delay = Duration::max();        ///< > 0; the longest delay of a usable link
+  bool holds_place = false;                             ///< the device of the follower is a robot
+  std::optional<double> share{};         ///< initial α (0 to 1) if the follower has several leaders (can_be_shared)
+  double drift_rate = 100;               ///< λ, 1/s, ≥ 0; used if the method is passivity
+  std::optional<RateControl> rate{};     ///< required if the method is rate
+  double centring = 0;                   ///< K_c, N/m, ≥ 0; used by the leader if the method is rate
+  Duration max_delay = Duration::max();  ///< > 0; the longest delay of a usable link
   std::optional<TurnCoupling::Config> turn{};  ///< couples the orientations
   std::optional<GripCoupling::Config> grip{};  ///< couples the grippers
 };
 
-/// An error in a configuration.
 struct CouplingReason {
-  std::string_view key;  ///< The name of the field.
-  std::string sentence;  ///< The expected value.
+  std::string_view key;
+  std::string sentence;  ///< the expected value
 };
 
-/// Checks the rules for the combination of fields and returns all errors. Returns an empty vector if there are none.
-/// The constructor of Coupling checks the bounds of each number.
+/// Returns all errors in the combination of fields. The constructor of Coupling checks the bounds of each number.
 std::vector<CouplingReason> check(const CouplingConfig& config);
 
 }  // namespace tendon

@@ -36,7 +36,6 @@ void Coupling::place(const Vec3& position, const HandleSample* handle) noexcept 
   if (turn_ && live() && !turn_->within_reach()) disengage();
 }
 
-/// Returns true if all coupled values were measured.
 bool Coupling::shows_handle(const HandleSample* handle) const noexcept {
   if (!turn_ && !grip_) return true;
   if (handle == nullptr) return false;
@@ -80,7 +79,7 @@ void Coupling::command_handle(const HandleSample& handle, bool changed, bool pla
   if (grip_) grip_force_ = grip_->command(*handle.grip, now);
 }
 
-/// Returns the force of the law along the coupled axes, without the ramp. The function must be called in each period.
+/// Returns the force of the law along the coupled axes, without the ramp. Must be called in each period.
 Demand<3> Coupling::law(const Vec3& velocity) noexcept {
   const Vec3 speed = frame_.coupled(velocity);
   Demand<3> demand = std::visit(
@@ -95,8 +94,7 @@ Demand<3> Coupling::law(const Vec3& velocity) noexcept {
   return demand;
 }
 
-/// Returns the force of the law multiplied by the gain g of the ramp. A robot adds the spring that holds its position,
-/// multiplied by 1 − g.
+/// Returns the gain g of the ramp times the law. For a robot, adds 1 − g times the spring that holds its position.
 Demand<3> Coupling::blended(const Motion& hand) noexcept {
   Demand<3> demand = law(hand.velocity);
   const PositionPosition<3>::Config& spring = config_.spring;
@@ -133,7 +131,7 @@ void Coupling::follow_share() noexcept {
   share_ = std::clamp(newest_.share.value_or(1), share_ - most, share_ + most);
 }
 
-/// Updates the position that a robot holds. Returns true if it is new.
+/// Returns true if the position that a robot holds is new.
 bool Coupling::hold_place(const Vec3& position, const ForceRamp::Change& change) noexcept {
   if (phase_ == PortPhase::kFault || ramp_.gain() == 1 || others_ == 1) {
     place_.reset();
@@ -167,7 +165,6 @@ Demand<3> Coupling::command(const Motion& hand, std::uint32_t buttons, bool read
   return demand;
 }
 
-/// Ends a period without a position. The force is 0, and the gain of the ramp decreases.
 void Coupling::skip() noexcept {
   spring_.command(frame_.coupled(u_), Vec3::Zero());
   std::visit([this](auto& law) { law.skip(law_period(), elapsed_); }, law_);

@@ -5,11 +5,8 @@
 
 namespace tendon {
 
-/// The data of one period of a Coupling for the laws of the other parts of a handle (TurnCoupling, GripCoupling).
-/// Their force is
-///
+/// The data of one period of a Coupling for the other parts of a handle (TurnCoupling, GripCoupling). Their force is
 ///     gain · law  +  (1 − gain) · spring that holds the position of a robot  +  fade · left
-///
 /// where `left` is the difference to the previous force when the source of the force changes.
 struct CouplingPeriod {
   bool in_act = false;    ///< engaged or clutched

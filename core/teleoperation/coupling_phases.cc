@@ -74,7 +74,6 @@ void Coupling::advance_leader(std::uint32_t buttons) noexcept {
   take(clutch_.asks(*config_.clutch, buttons, buttons_) ? PhaseInput::kClutch : PhaseInput::kRelease);
 }
 
-/// Uses the position of the handle in the last period.
 void Coupling::advance_aligning() noexcept {
   const Vec3 apart = frame_.coupled(u_) - frame_.mapped(newest_.position);
   alignment_.observe(apart.norm(), config_.absolute->within, now_);
@@ -156,7 +155,6 @@ bool Coupling::set_scale(double position_scale, double force_scale) noexcept {
   return true;
 }
 
-/// Updates all values that depend on the scales.
 void Coupling::follow_scales() noexcept {
   rescaled_ = true;
   std::visit([](auto& law) { law.forget(); }, law_);

@@ -12,60 +12,54 @@
 
 namespace tendon {
 
-/// One of several leaders of a follower.
 struct CoupledLeader {
-  std::uint32_t channel = 0;  ///< of the follower's device; receives the states of the leader
+  std::uint32_t channel = 0;  ///< the channel of the follower's device that receives the states of the leader
   double share = 1;           ///< initial α
 };
 
-/// The couplings of one device: one coupling, or the couplings of a follower with 2 to 4 leaders. The leaders do not
-/// know about each other and only communicate with the follower.
-///
+/// The couplings of one device: a single one, or one per leader of a follower with 2 to 4 leaders.
 ///     F = Σ α_i (K (y_i − u_i) + D (ẏ_i − u̇_i) − B u̇_i)       at the follower
 ///     F_i = α_i (K (u_i − y_i) + D (u̇_i − ẏ_i) − B ẏ_i)        at leader i
-///
 /// In free motion x_f = Σ α_i x_i over the engaged leaders, where the α_i are divided by their sum. Each pair is a
 /// coupling with α_i K, α_i D and α_i B, so its properties are those of a single pair (PositionPosition: α K ≤ 2 α
 /// B/T_loop). If all leaders are engaged, the follower renders B once. With position-force, leader i feels α_i times
 /// the contact force (core/PROOFS.md, "Coupling springs").
 ///
-/// **Phases.** Each coupling has its own phases, clutch, offsets and loss of the peer. A leader that is not engaged
-/// does not contribute, and the other shares do not change; use set_share to change them. A robot (`holds_place`)
-/// holds its position with the part that no leader uses.
+/// **Phases.** The phases, clutch, offsets and loss of the peer are separate for each coupling. A leader that is not
+/// engaged does not contribute, and the other shares do not change unless set_share is called. A robot (`holds_place`)
+/// holds its position with the unused part.
 ///
-/// **One account.** All couplings use the account of the device's limiter, one after the other, and each only sees
-/// the remaining energy. This satisfies the condition of the theorem in energy_tank.h: before the bound, coupling j
-/// gives ΔG_j ≤ max(A_j, 0) with A_j = A + Σ_{k≤j} R_k − Σ_{k<j} ΔG_k. Therefore Σ ΔG ≤ max(A + Σ R, 0), and only R
-/// increases A. The force is limited once, after all couplings. If α changes while a spring is stretched, the account
-/// pays for the work ½ ΔK δ², and the limiter reduces the force if there is not enough energy.
+/// **One account.** All couplings use the account of the device's limiter, one after the other, and each only sees the
+/// remaining energy. This satisfies the condition of the theorem in energy_tank.h: before the bound, coupling j gives
+/// ΔG_j ≤ max(A_j, 0) with A_j = A + Σ_{k≤j} R_k − Σ_{k<j} ΔG_k. Therefore Σ ΔG ≤ max(A + Σ R, 0), and only R increases
+/// A. The limiter is called once, after all couplings. If α changes while a spring is stretched, the account pays for
+/// the work ½ ΔK δ², and the limiter reduces the force if there is not enough energy.
 ///
-/// **Messages.** A leader receives its part of the account and the need, α_i A and α_i n. The ratio A/n, which
+/// **Messages.** Each leader receives its part of the account and the need: α_i A and α_i n. The ratio A/n, which
 /// determines the payments, is the same for all. If each leader received the entire need, each would send all of the
 /// missing energy: 2 to 4 leaders that pushed together then exchanged 7 to 17 % more energy without a larger force.
-/// The guarantees do not depend on this.
+/// This does not affect the guarantees.
 ///
 /// **Trust.** Each peer has its own tank with max_power and max_account. If n peers are dishonest, this port still
 /// guarantees that L ≥ −n (max_account + max_power · t).
-///
 /// Thread-safe: no. Realtime-safe: yes, except the constructor.
 class Couplings {
  public:
   static constexpr std::size_t kMost = Shares::kMost;
 
-  /// `leaders` is empty for one coupling, and contains 2 … kMost leaders otherwise. All use `config`, which must then
-  /// only couple positions. Throws std::invalid_argument with the name of the field, its value and the expected
-  /// value.
+  /// `leaders` is empty for one coupling, and contains 2 … kMost leaders otherwise, whose `config` must only couple
+  /// positions. Throws std::invalid_argument with the name of the field, its value and the expected value.
   explicit Couplings(const Coupling::Config& config, std::span<const CoupledLeader> leaders = {});
 
   std::size_t size() const noexcept { return all_.size(); }
-  /// Returns a coupling. Callers use receive, engage, disengage, conclude, and message.
+  /// For receive, engage, disengage, conclude, and message.
   Coupling& operator[](std::size_t which) noexcept { return all_[which]; }
   const Coupling& operator[](std::size_t which) const noexcept { return all_[which]; }
 
-  /// Changes the share to `share`, starting with the next period (Shares).
+  /// Takes effect with the next period (Shares).
   void set_share(std::size_t which, double share) noexcept { shares_.set(which, share); }
 
-  // These functions call the functions of Coupling for all couplings.
+  // These functions call Coupling for all couplings. The result of `settle` is the sum of all settlements.
   void observe(const Interval<3>& interval, double payable) noexcept;
   Demand<3> command(const Motion& hand, std::uint32_t buttons, bool ready,
                     const HandleSample* handle = nullptr) noexcept;
@@ -75,9 +69,7 @@ class Couplings {
   EnergyTank::Settlement settle_grip(double payable, double loss, Duration elapsed) noexcept {
     return all_.front().settle_grip(payable, loss, elapsed);
   }
-  /// Returns the sum of all settlements.
   EnergyTank::Settlement settle(double payable, double loss, Duration elapsed) noexcept;
-  /// Returns the newest settlement of one coupling.
   const EnergyTank::Settlement& settled(std::size_t which) const noexcept { return settled_[which]; }
   bool live() const noexcept;  ///< at least one coupling is live
 

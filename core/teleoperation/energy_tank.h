@@ -26,60 +26,50 @@ struct EnergyTankMessage {
   static constexpr double kMostTotal = 1e6;
 };
 
-/// An energy tank (Franken et al.) for each of several coupled ports, which exchange energy. The ports are passive
+/// An energy tank (Franken et al.) for one of several coupled ports, which exchange energy. The ports are passive
 /// together, and each of them may generate net energy.
 ///
 /// A limiter at each of two coupled devices makes each device passive **by itself**, but a follower that must not do
 /// net work cannot move. Only the sum of all ports must be passive. Therefore each port gives energy from its account
 /// to the others, and its limiter bounds the force by this account instead of its own ledger. Port i has
-///
 ///     L_i       its ledger (EnergyLedger), with the applied force
 ///     G_ij      the total given to j;    R_ji the largest received G_ji
 ///     A_i = L_i − Σ_j G_ij + Σ_j R_ji − discarded_i          the account: Limiter::energy
-///
-/// and in each period, in this order: **observe** the interval, **add** the received energy, **give**, **limit** the
-/// force. The function share() does the second and the third step.
+/// and per period, in this order: **observe** the interval, **add** and **give** energy (share()), **limit** the force.
 ///
 /// **Theorem** (core/PROOFS.md, "Energy tank"). If each port gives 0 ≤ ΔG_ij with Σ_j ΔG_ij ≤ max(A_i, 0) before it
 /// limits its force, then A_i ≥ 0 at all times at each port, and Σ_i L_i ≥ 0: together the ports do not generate
-/// energy, for every delay, loss, order, duplication, pause and motion. Proof. The limiter requires that only
-/// observed work and R increase A_i (core/PROOFS.md, "Output bound"). Giving keeps A_i ≥ 0 and is done before the
-/// bound. R_ij ≤ G_ij, because totals do not decrease and only the largest received one is used. So Σ L_i = Σ A_i + Σ
-/// (G_ij − R_ij) + Σ discarded_i ≥ 0, because each term is ≥ 0. ∎ The theorem requires no common clock, no
-/// acknowledgement and no retransmission. All holds must be at most T_max long; see OutputBound for longer holds.
-/// Several tanks may use one account one after the other, each with the remaining energy as `payable` (Couplings).
-/// Their sum then satisfies the condition of the theorem.
+/// energy, for every delay, loss, order, duplication, pause and motion. Proof. The limiter requires that only observed
+/// work and R increase A_i (core/PROOFS.md, "Output bound"). Giving keeps A_i ≥ 0 and is done before the bound. R_ij ≤
+/// G_ij, because totals do not decrease and only the largest received one is used. So Σ L_i = Σ A_i + Σ (G_ij − R_ij) +
+/// Σ discarded_i ≥ 0, because each term is ≥ 0. ∎ The theorem requires no common clock, no acknowledgement and no
+/// retransmission. All holds must be at most T_max long; see OutputBound for longer holds. Several tanks may use one
+/// account one after the other, each with the remaining energy as `payable` (Couplings). This satisfies the condition.
 ///
-/// **Amount.** The ports give energy so that the ratio of account to need becomes equal, including the energy in
-/// transit:
-///
+/// **Amount.** The ports equalize the ratio of account to need, including the energy in transit:
 ///     n_i = ℓ_i(F_wanted) + ε          ℓ: SharesAccount::worst_loss;  ε > 0, so that a port at rest can start to move
 ///     Â_j = A_j(received) + G_ij − R_ij(received)
 ///     ΔG_ij = (ρ n_j − Â_j)₊,     ρ = (A_i + Σ Â_j) / (n_i + Σ n_j)    over i and the peers that receive energy
-///
-/// For one peer this is (A_i n_j − Â_j n_i)₊/(n_i + n_j). If the sum exceeds max(A_i, 0) because a received account
-/// is negative, all amounts are reduced in proportion. Nothing is given to a peer without a message, or if `giving`
-/// is false.
+/// For one peer this is (A_i n_j − Â_j n_i)₊/(n_i + n_j). If the sum exceeds max(A_i, 0) because a received account is
+/// negative, all amounts are reduced in proportion. Nothing is given without a message, or if `giving` is false.
 ///
 /// **Scales.** With x_f = s_x x_l and F_l = s_f F_f, one joule of the leader is s_x/s_f joules of the follower.
-/// `joule` is the value of a joule of the **peer** at this end: s_f/s_x at the leader and s_x/s_f at the follower.
-/// Then W_l + (s_f/s_x) W_f ≥ 0.
+/// `joule`, that of the **peer**, is s_f/s_x at the leader and s_x/s_f at the follower: W_l + (s_f/s_x) W_f ≥ 0.
 ///
 /// **Changes of the scales.** Energy that was given at one value must not be credited at a higher one, and an account
-/// must not become more valuable for the peer. Therefore, a port that changes `joule` (revalue) discards the energy
-/// in transit until the peer knows the new value, and the follower gives up the part of its account by which
-/// (s_f/s_x) A has increased. No change of the scales increases the sum of the accounts in joules of the leader.
+/// must not become more valuable for the peer. Therefore, a port that changes `joule` (revalue) discards the energy in
+/// transit until the peer knows the new value, and the follower gives up the part of its account by which (s_f/s_x) A
+/// has increased. No change of the scales increases the sum of the accounts in joules of the leader.
 ///
-/// **Epochs.** If a port restarts, it loses its totals. Its new tank must have an epoch above all previous ones (a
+/// **Epochs.** A port that restarts loses its totals. Its new tank must have an epoch above all previous ones (a
 /// persistent counter, or the time of day at the start; clocks of two machines are not compared). Totals belong to a
 /// pair of epochs. A higher epoch of the peer resets both totals. Messages of a lower epoch, and totals for another
 /// epoch of this port, are ignored. No total is therefore counted twice. Energy in transit is lost, which is safe.
 ///
-/// **Trust.** The sum is ≥ 0 if the peers keep their accounts correctly. Against other peers, this port alone keeps L
-/// ≥ −(max_account + max_power · t): received energy is credited up to an allowance, which starts at max_account and
-/// increases by max_power and by the given energy up to max_account. The rest is discarded. If an account is larger
-/// than max_account, the difference is also discarded. Discarding is always safe (core/PROOFS.md, "Discarded
-/// credit").
+/// **Trust.** The sum is ≥ 0 if the peers keep their accounts correctly. Against other peers, this port alone keeps L ≥
+/// −(max_account + max_power · t): received energy is credited up to an allowance, which starts at max_account and
+/// increases by max_power and by the given energy up to max_account. The rest is discarded, and so is the part of an
+/// account above max_account. Discarding is always safe (core/PROOFS.md, "Discarded credit").
 ///
 /// **Bad input.** A message is refused and counted in `refused` if a value is not finite or out of bounds, if `taken`
 /// exceeds the given total, or if a total decreases although its sequence increases. A message that is not newer is
@@ -87,7 +77,6 @@ struct EnergyTankMessage {
 ///
 /// Source: derived here; related to the two-layer tank (Franken et al. 2011) and energy-reflecting TDPA (Ryu et al.
 /// 2010).
-///
 /// Thread-safe: no. Realtime-safe: yes, except the constructor.
 class EnergyTank {
  public:
@@ -108,12 +97,10 @@ class EnergyTank {
   /// May be called at any time before settle(). Does nothing unless peer < Config::peers.
   void receive(std::size_t peer, const EnergyTankMessage& message) noexcept;
 
-  /// Resets all peers, so that any epoch is accepted, and starts an epoch above all previous ones. Energy in transit
-  /// is lost.
+  /// Resets all peers, so that any epoch is accepted, and starts a higher epoch. Energy in transit is lost.
   void renew(std::uint64_t epoch) noexcept;
 
-  /// Sets the value of a joule of the peer and ε. Received energy that was not credited is lost, because its value is
-  /// unknown.
+  /// Sets the value of a joule of the peer and ε. Energy received but not credited is lost, as its value is unknown.
   void revalue(std::size_t peer, double joule, double start) noexcept;
   /// Discards received energy that the peer gave before it knew about the change.
   void forgo(std::size_t peer) noexcept;
@@ -132,8 +119,7 @@ class EnergyTank {
   };
   Settlement settle(const Period& period) noexcept;
 
-  /// Returns the message to a peer after settle(), or one with epoch 0 if the peer does not exist. Each message has
-  /// its own sequence.
+  /// Returns the next message to a peer after settle(), with its own sequence. The epoch is 0 if there is no such peer.
   EnergyTankMessage message(std::size_t peer) noexcept;
 
   double account() const noexcept { return account_; }              ///< A after the last settle, J
@@ -141,8 +127,7 @@ class EnergyTank {
   double discarded() const noexcept { return discarded_.value(); }  ///< total, J
   std::uint64_t refused() const noexcept { return refused_; }       ///< number of messages
   double given(std::size_t peer) const noexcept;                    ///< G, J, in the current epochs
-  /// R, in joules of the peer, in the current epochs.
-  double taken(std::size_t peer) const noexcept;
+  double taken(std::size_t peer) const noexcept;                    ///< R, J of the peer, in the current epochs
 
  private:
   struct Peer {

@@ -9,15 +9,13 @@
 
 namespace tendon {
 
-/// Maps values between this end of a coupling and its peer. The leader can change the scales while the program runs.
-/// The states of the leader contain the new scales, and the follower uses the scales of the newest state. If a joule
-/// of the follower is worth more after the change, the follower only keeps a part of its account. The pair therefore
-/// does not generate energy.
-///
+/// Maps values from the peer to this end of a coupling. The leader can change the scales while the program runs. Its
+/// states contain the new scales, and the follower uses those of the newest state. If a joule of the follower is worth
+/// more after the change, the follower only keeps a part of its account, so the pair does not generate energy.
 /// Thread-safe: no. Realtime-safe: yes, except the constructor.
 class MappedEnd {
  public:
-  static constexpr double kLeast = 0.01;  ///< The minimum of a scale.
+  static constexpr double kLeast = 0.01;
   static constexpr double kMost = 100;
 
   /// Throws the same exceptions as PoseMap.
@@ -26,15 +24,14 @@ class MappedEnd {
   bool leads() const noexcept { return role_ == PortRole::kLeader; }
   const PoseMap& map() const noexcept { return map_; }
 
-  /// Returns a position (m) or a velocity (m/s) of the peer in the frame of this end.
+  /// `displacement` is a position (m) or a velocity (m/s) of the peer.
   Vec3 mapped(const Vec3& displacement) const noexcept {
     return leads() ? map_.to_leader(displacement) : map_.to_follower(displacement);
   }
-  /// Returns the component of the vector along the coupled axes.
   Vec3 coupled(const Vec3& vector) const noexcept {
     return leads() ? map_.coupled_at_leader(vector) : map_.coupled_at_follower(vector);
   }
-  /// Returns the value of a joule of the peer at this end.
+  /// Returns how many joules at this end are equal to one joule of the peer.
   double joule() const noexcept { return leads() ? map_.leader_joule() : map_.follower_joule(); }
   /// Converts an energy in J from the leader to this end.
   double worth(double at_leader) const noexcept { return at_leader * (leads() ? 1 : map_.follower_joule()); }
@@ -43,20 +40,20 @@ class MappedEnd {
     return leads() ? at_leader : map_.stiffness_at_follower(at_leader);
   }
 
-  /// Sets the scales. `told` is true if they are not the scales of the scene.
+  /// `told` is true if these are not the scales of the scene.
   void rescale(double position_scale, double force_scale, bool told) noexcept {
     const double joule = map_.leader_joule();
     map_ = map_.scaled(position_scale, force_scale);
     if (!leads() && map_.leader_joule() > joule) kept_ *= joule / map_.leader_joule();
     told_ = told;
   }
-  /// Sets the scales of a follower to the scales of the scene. Returns false if this is not necessary.
+  /// Sets the scales of a follower to those of the scene. Returns false if this is not necessary.
   bool rescale_as_scene() noexcept {
     if (leads() || !told_) return false;
     rescale(scene_.position_scale, scene_.force_scale, false);
     return true;
   }
-  /// Sets the scales of a follower to the scales in the state of the leader.
+  /// Sets the scales of a follower to those in the state of the leader.
   void rescale_as_told(const PortState& leader) noexcept {
     const bool told = leader.position_scale > 0 && leader.force_scale > 0;
     rescale(told ? leader.position_scale : scene_.position_scale, told ? leader.force_scale : scene_.force_scale, told);

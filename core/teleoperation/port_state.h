@@ -11,8 +11,7 @@
 
 namespace tendon {
 
-/// The phase of one end of a coupling. Only `kEngaged` has a force, apart from the fade after it and a robot that
-/// holds its position.
+/// The phase of a coupling. There is only a force in `kEngaged`, in the fade after it, and if a robot holds still.
 enum class PortPhase : std::uint8_t {
   kAlone = 1,  ///< no peer
   kCoupled,    ///< receives states; waits for the operator to engage; no force
@@ -23,17 +22,16 @@ enum class PortPhase : std::uint8_t {
   kFault,      ///< the device is not armed or has a fault; no force
 };
 
-/// Returns a name such as "engaged", and what the phase waits for.
+/// Returns the name and what the phase waits for, such as "coupled: waiting for the leader to engage".
 std::string_view to_string(PortPhase phase) noexcept;
 
 enum class PortRole : std::uint8_t { kLeader, kFollower };
 
 enum class CouplingMethod : std::uint8_t {
-  kPositionPosition = 1,  ///< a spring and a damper at both ends (PositionPosition), with an energy tank
+  kPositionPosition = 1,  ///< springs and dampers at both ends, with an energy tank (PositionPosition)
   kPositionForce,         ///< spring at the follower; the leader feels the measured contact force
   kWaves,                 ///< wave variables with playout (WavePort)
-  kSurface,               ///< as position-force, but the leader feels a model of the surface that the follower has
-                          ///< found
+  kSurface,               ///< as position-force, with a model of the surface at the leader
   kPassivity,             ///< velocity to the follower, force to the leader, with passivity control (PassivityLeader)
   kSetPosition,           ///< springs to delayed positions, stretched only as far as the account pays
   kRate,                  ///< the position of the leader sets the velocity of the follower
@@ -42,7 +40,7 @@ inline constexpr std::array kCouplingMethods = {
     CouplingMethod::kPositionPosition, CouplingMethod::kPositionForce, CouplingMethod::kWaves, CouplingMethod::kSurface,
     CouplingMethod::kPassivity,        CouplingMethod::kSetPosition,   CouplingMethod::kRate};
 
-/// Returns the name in scenes and error messages: "position-position".
+/// Returns the name in scenes and error messages, such as "position-position".
 std::string_view to_string(CouplingMethod method) noexcept;
 
 /// The parameters of the method rate, in the scale of the leader. A spring pulls the handle of the leader to its
@@ -62,8 +60,7 @@ struct PortSurface {
   double stiffness = 0;         ///< N/m, ≥ 0; 0: no surface
 };
 
-/// Returns true if positions of leader and follower correspond (Coupling::Absolute). The other methods use
-/// velocities.
+/// Returns true if positions of leader and follower correspond (Coupling::Absolute). The other methods use velocities.
 constexpr bool has_places(CouplingMethod method) noexcept {
   return method == CouplingMethod::kPositionPosition || method == CouplingMethod::kPositionForce ||
          method == CouplingMethod::kSurface || method == CouplingMethod::kSetPosition;
@@ -88,15 +85,15 @@ constexpr bool needs_tank(CouplingMethod method) noexcept {
 /// The rotation of a handle since its offset was set.
 struct PortTurn {
   Quat turn{};                           ///< in the axes of the sender's base frame; norm 1 ± 0.001
-  Vec3 angular_velocity = Vec3::Zero();  ///< rad/s, zero while `turn` is constant
+  Vec3 angular_velocity = Vec3::Zero();  ///< rad/s; zero if `turn` is constant
   Vec3 torque = Vec3::Zero();            ///< N·m, applied by the device to the hand
 };
 
-/// A gripper, measured at its fingers. It is a separate port with its own account.
+/// A gripper at its fingers. It is a separate port with its own account.
 struct PortGrip {
   double opening = 0;   ///< m; for a leader, the requested opening (GripCoupling)
   double velocity = 0;  ///< m/s
-  double force = 0;     ///< N, applied to the fingers, > 0 opens them
+  double force = 0;     ///< N, applied by the device; opens the fingers if positive
   double account = 0;   ///< J; this and the following values are as in PortState
   double need = 0;
   double given = 0;
@@ -109,17 +106,17 @@ struct PortGrip {
 struct PortState {
   static constexpr Duration kMostRoundTrip = std::chrono::seconds(10);
 
-  std::uint64_t epoch = 0;          ///< of the sender, > 0; increases with each restart (EnergyTank)
+  std::uint64_t epoch = 0;          ///< epoch of the sender, > 0; increases at each restart (EnergyTank)
   std::uint64_t sequence = 0;       ///< period of the sender in this epoch: 1, 2, …
   std::uint64_t answers_epoch = 0;  ///< epoch of the receiver for `answers`, `given` and `taken`; 0: none
   std::uint64_t answers = 0;        ///< sequence of the receiver's newest state in use; 0: none
-  Duration time{};                  ///< in the sender's clock; only differences are used; ± 2⁶⁰ ns
+  Duration time{};                  ///< time of the sender; only differences are used; ± 2⁶⁰ ns
   Duration round_trip{};            ///< as measured by the sender, or 0; ≤ kMostRoundTrip
   PortPhase phase = PortPhase::kAlone;
   std::uint64_t engagement = 0;          ///< number of the leader's act that the phase belongs to: 1, 2, …; 0: none
   std::uint32_t buttons = 0;             ///< bit i: button i is pressed
   Vec3 position = Vec3::Zero();          ///< m, u: relative to the offset of the sender
-  Vec3 velocity = Vec3::Zero();          ///< m/s, of u; zero while u is constant
+  Vec3 velocity = Vec3::Zero();          ///< m/s, of u; zero if u is constant
   Vec3 force = Vec3::Zero();             ///< N, applied by the device to the hand
   std::optional<Vec3> contact_force{};   ///< N, measured on the tool; empty: not measured
   double account = 0;                    ///< J, EnergyTankMessage::account
@@ -131,10 +128,9 @@ struct PortState {
   double wave_energy = 0;                ///< J, WaveMessage::energy; 0 … kMostTotal of EnergyTankMessage
   std::optional<PortTurn> turn{};        ///< empty: orientations are not coupled
   std::optional<PortGrip> grip{};        ///< empty: grippers are not coupled
-  double energy_in = 0;           ///< J, for passivity: total energy received by the port in this epoch; bounds of
-                                  ///< wave_energy
-  std::optional<double> share{};  ///< 0 … 1, from a follower: share of this leader; empty: single leader
-  double position_scale = 0;      ///< of a leader, for this state and later ones: 0.01 … 100; 0: that of the scene
+  double energy_in = 0;                  ///< J, for passivity: total received in this epoch; bounds of wave_energy
+  std::optional<double> share{};         ///< 0 … 1, from a follower: share of this leader; empty: single leader
+  double position_scale = 0;  ///< 0.01 … 100, from a leader, for this and later states; 0 if it is that of the scene
   double force_scale = 0;
 };
 

@@ -10,7 +10,6 @@ inline bool within(double value, double low, double high) noexcept { return valu
 /// Returns true if the magnitude of each component is at most 10¹² in SI units.
 inline bool within(const Vec3& vector) noexcept { return (vector.array().abs() <= 1e12).all(); }
 
-/// Returns the force with its norm limited to `most`.
 inline Vec3 at_most(const Vec3& force, double most) noexcept {
   const double size = force.stableNorm();
   return size > most ? Vec3(force * (most / size)) : force;

@@ -13,51 +13,43 @@
 
 namespace tendon {
 
-/// Couples the grippers of two handles. A Coupling owns one object for each end and provides phases, ramp and fade. A
-/// gripper is a separate port (PortGrip) with its own account and tank. All methods couple grippers by springs at
-/// both ends, because both openings are measured.
+/// Couples the grippers of two handles. The phases, ramp and fade are those of the Coupling that owns this object. A
+/// gripper is a separate port (PortGrip) with its own account and tank. There are springs at both ends for all methods,
+/// because both openings are measured.
 ///
-/// **Openings.** g = arm · opening, m at the fingers, > 0 open. Both ends use the same openings without a scale or an
-/// offset. The coupled quantity is w, the opening that the leader requests and sends instead of g:
-///
+/// **Openings.** g = arm · opening, m at the fingers, > 0 open. Openings have no scale and no offset. The coupled
+/// quantity is w, the opening that the leader requests and sends instead of g:
 ///     not engaged                  w = g_l
 ///     start of an act              w = g_f + F_f/K_f: the current target of the follower's gripper
 ///     live                         w → g_l with at most `speed`; once they are equal, w = g_l
 ///     clutched or not answered     w is constant, so the follower's grip is held
-///
 /// Neither gripper jumps when it is coupled. The follower computes z from w in the same way: z starts at the last
 /// target of its gripper (for a hand: g_f) and changes to w with at most `speed` until they are equal.
 ///
-/// **Law** at each end, in N on the fingers, > 0 opens them:
-///
+/// **Law** at each end, in N on the fingers, positive to open them:
 ///     F_l = K (g_f − w) − B v_l        F_f = K (z − g_f) − B v_f        |F| ≤ max_force
 ///     K = min(stiffness, 2 B/T_loop)   with `adapts` (QuietStiffness), K_l = s_f K_f, B_l = s_f B_f
-///
-/// At rest, the leader feels the force on the grasped object, F_l = −s_f F_f. The opening of the peer is extrapolated
-/// by v e if its newest state is late by e. K follows T_loop only in periods with a new state: a spring to a constant
-/// position is not in a loop, so the grip keeps its force while the link is interrupted. `stiffness` and `damping`
-/// are those of the leader.
+/// At rest, the leader feels the grasped object, F_l = −s_f F_f. The opening of the peer is extrapolated by v e if its
+/// newest state is late by e. K follows T_loop only in periods with a new state: a spring to a constant position is not
+/// in a loop, so the grip keeps its force while the link is interrupted. K and B are set at the leader.
 ///
 /// **Account.** One joule of the follower's gripper is s_f joules of the leader's, since openings are not scaled. The
-/// grippers exchange energy by their own tank, in the same messages (PortGrip) and with the same limits; the theorem
-/// of EnergyTank holds for the pair of grippers. The motion of the follower's fingers is paid by the motion of the
-/// leader's fingers.
+/// grippers have a separate tank, with the same messages (PortGrip) and limits, so the theorem of EnergyTank is also
+/// true for the pair of grippers. The motion of the leader's fingers pays for that of the follower's.
 ///
-/// **Robots.** A follower with `holds_place` that is not live holds the opening z_h with the full K_f, where z_h =
-/// g_f + F/K_f is chosen once such that the force does not change. An object is neither dropped nor squeezed more,
-/// also when the leader acts again, because w then starts at this opening. A fault ends the force. The grip of a hand
-/// fades.
+/// **Robots.** A follower with `holds_place` that is not live holds the opening z_h with the full K_f, where z_h = g_f
+/// + F/K_f is chosen once such that the force does not change. An object is neither dropped nor squeezed more, even
+/// when the leader acts again, because w then starts at this opening. A fault ends the force. The grip of a hand fades.
 ///
 /// **Bad input.** A state that the tank would refuse is refused entirely (`accepts`). Openings must be finite.
-///
 /// Thread-safe: no. Realtime-safe: yes, except the constructor.
 class GripCoupling {
  public:
   struct Config {
-    double stiffness = 0;  ///< maximum of K, N/m at the fingers, of the leader; > 0
-    double damping = 0;    ///< B, N·s/m, of the leader; ≥ 0, and > 0 with `adapts`
+    double stiffness = 0;  ///< N/m at the fingers, > 0; the maximum of K at the leader
+    double damping = 0;    ///< N·s/m, ≥ 0; B at the leader, which must not be 0 if `adapts`
     double speed = 0.05;   ///< m/s, > 0
-    double arm = 0;        ///< m/rad, of the gripper of this end; > 0
+    double arm = 0;        ///< m/rad, > 0; the gripper at this end
     double max_force = std::numeric_limits<double>::infinity();  ///< N, of this end; > 0
   };
   struct End {
@@ -75,17 +67,16 @@ class GripCoupling {
   bool accepts(const PortState& peer) const noexcept;
   void receive(const PortState& peer) noexcept;
 
-  /// The peer has been replaced (Coupling::renew).
+  /// Must be called if the peer has been replaced (Coupling::renew).
   void renew(std::uint64_t epoch) noexcept;
 
   void begin_act() noexcept;
 
-  /// Returns the requested force on the fingers for this period, N.
-  double command(const Grip& hand, const CouplingPeriod& period) noexcept;
-  /// Must be called if there is no opening. The force is 0.
+  double command(const Grip& hand, const CouplingPeriod& period) noexcept;  ///< requested force on the fingers, N
+  /// Must be called instead of `command` if there is no opening. The force is 0.
   void skip(const CouplingPeriod& period) noexcept;
 
-  /// See Coupling::settle; for the account of the gripper.
+  /// See Coupling::settle.
   EnergyTank::Settlement settle(const EnergyTank::Period& period) noexcept;
 
   /// Must be called once per period. `force` is the applied force, N.
@@ -104,7 +95,7 @@ class GripCoupling {
 
   Config config_;
   End end_;
-  double whole_;  ///< K of this end without a delay, N/m
+  double whole_;  ///< N/m; K at this end if there is no delay
   double peers_;  ///< K of the peer without a delay, N/m
   double damping_;
   QuietStiffness stiffness_;

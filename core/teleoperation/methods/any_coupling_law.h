@@ -11,10 +11,10 @@
 
 namespace tendon {
 
-/// The law of one end of a coupling. The variant does not allocate memory. See CouplingLaw for the functions.
+/// A law with the functions of CouplingLaw. The variant does not allocate memory.
 using AnyCouplingLaw = std::variant<SpringLaw, ContactLaw, WaveLaw, SurfaceLaw, PassivityLaw, SetPositionLaw, RateLaw>;
 
-/// Returns the law of the method. Throws std::invalid_argument if the configuration is not valid.
+/// Throws std::invalid_argument if the configuration is not valid.
 inline AnyCouplingLaw coupling_law_of(const CouplingConfig& config, const MappedEnd& frame) {
   switch (config.method) {
     case CouplingMethod::kPositionForce:

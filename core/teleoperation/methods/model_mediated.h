@@ -8,45 +8,38 @@
 namespace tendon {
 
 /// A flat elastic surface, which the follower sends instead of forces.
-///
 ///     F(x) = K (d − n·x)₊ n       N, on a hand at x
 template <int N>
 struct SurfaceModel {
-  std::uint64_t sequence = 0;       ///< 1, 2, …; messages that are not newer are dropped
-  Vec<N> normal = Vec<N>::Unit(0);  ///< n, unit vector, out of the surface
+  std::uint64_t sequence = 0;       ///< 1, 2, …; older messages and duplicates are ignored
+  Vec<N> normal = Vec<N>::Unit(0);  ///< n, the unit normal vector of the surface
   double offset = 0;                ///< d, m; the surface is at n·x = d
   double stiffness = 0;             ///< K, N/m; 0: no surface
 
-  /// Depth of `x` inside of the surface, m; 0 outside.
-  double depth(const Vec<N>& x) const noexcept;
-  /// ½ K depth², J.
-  double energy(const Vec<N>& x) const noexcept;
+  double depth(const Vec<N>& x) const noexcept;   ///< m, inside of the surface; 0 outside
+  double energy(const Vec<N>& x) const noexcept;  ///< ½ K depth², J
 };
 
-/// The follower's end of model-mediated teleoperation: estimates the surface that a tool touches from its position
-/// and its contact force.
-///
+/// The follower's end of model-mediated teleoperation: estimates a surface from the position and force of the tool.
 ///     n:       the mean force and the previous normal, without the directions in which x + f/K spreads
 ///     K and d: least squares of n·f = K d − K (n·x) over the contact, with fading weights
-///
 /// f is the force on the tool (N) at the position x (m). There is contact if ‖f‖ ≥ contact_force. Each contact starts
 /// new moments about its first point, so the position of the origin does not matter. On an elastic surface with
 /// friction, x + f/K is a point of the plane n·x = d, moved along it. Principal axes with a spread of at least
 /// `least_spread` are therefore in the surface, and the force along them is friction. Without such a spread (a push
 /// without sliding), the mean force is the normal, tilted by friction; n is limited to the tilt of a friction
-/// coefficient of 0.75. Until the tool has moved enough to determine a slope, K is `first_stiffness`, or the previous
-/// K if the contact starts at the last surface. After that it is limited to first_stiffness/10 … `max_stiffness`. d
-/// is chosen such that the force of the model at the newest sample is n·f.
+/// coefficient of 0.75. Until the tool has moved enough to determine a slope, K is `first_stiffness`, or the previous K
+/// if the contact starts at the last surface. After that it is limited to first_stiffness/10 … `max_stiffness`. d is
+/// chosen such that the force of the model at the newest sample is n·f.
 ///
 /// Without contact, the last surface is kept as a prediction of the next contact. If the tool is deeper in it than 2
 /// contact_force/K + position_noise without a force, K becomes 0 until the next contact. This removes energy from the
-/// model, so a SurfaceRenderer uses it immediately. (Moving d to the tool is not enough: the hand is ahead of the
-/// tool by a round trip and would only be released gradually.)
+/// model, so a SurfaceRenderer uses it immediately. (Moving d to the tool is not enough: the hand is ahead of the tool
+/// by a round trip and would only be released gradually.) Samples are ignored if they are not finite.
 ///
 /// Source: the idea of Mitra and Niemeyer, IJRR 27(2), 2008 (recalled, not re-read); the estimator is ours
 /// (core/PROOFS.md, "Surfaces").
-///
-/// Samples are ignored if they are not finite. Thread-safe: no. Realtime-safe: yes, except the constructor.
+/// Thread-safe: no. Realtime-safe: yes, except the constructor.
 template <int N>
 class SurfaceEstimator {
  public:
@@ -55,7 +48,7 @@ class SurfaceEstimator {
     double first_stiffness = 0;  ///< N/m; > 0
     double max_stiffness = 0;    ///< N/m; ≥ first_stiffness
     double least_travel = 0;     ///< m, standard deviation of n·x above which a slope is used; > 0
-    double memory = 0;           ///< number of samples after which a weight has decreased to 1/e; > 0
+    double memory = 0;           ///< > 0; the weight of a sample decreases to 1/e after this number of samples
     double least_spread = 1e-3;  ///< m, standard deviation above which a direction is in the surface; > 0
     double position_noise = 0;   ///< m, ≥ 0; a tool that is less deep inside a surface may be outside of it
   };
@@ -63,11 +56,9 @@ class SurfaceEstimator {
   /// Throws std::invalid_argument with the name of the field, its value and the expected value.
   explicit SurfaceEstimator(const Config& config);
 
-  /// Adds one sample. Returns the current surface.
-  SurfaceModel<N> observe(const Vec<N>& position, const Vec<N>& force) noexcept;
+  SurfaceModel<N> observe(const Vec<N>& position, const Vec<N>& force) noexcept;  ///< adds one sample
 
-  /// Ratio of the RMS forces along and across the surface: μ while the tool slides, plus noise. 0 before the first
-  /// contact.
+  /// Returns the ratio of the RMS forces along and across the surface (while sliding: μ plus noise), initially 0.
   double friction() const noexcept;
 
  private:
@@ -96,26 +87,20 @@ class SurfaceEstimator {
   Moments moments_;
 };
 
-/// The leader's end: renders a surface at the full rate. Energy can only enter when the model changes, and each
-/// change must be paid for.
-///
+/// The leader's end: renders a surface at the full rate. Any energy from a change of the model must be paid for.
 ///     F_wanted = K (d' − n·x)₊ n,     ½ K (d' − n·x)₊² ≤ ½ K_old (d'_old − n_old·x)₊² + budget
-///
 /// In each period, the newest received surface is used. It is placed deeper (d' ≤ d) if its energy at the hand would
 /// exceed the energy of the previous one plus the budget. It then rises to its position as the hand retracts or as
-/// budget becomes available. The energy from the model therefore never exceeds the energy from the hand and the
-/// budget. A suitable budget is the part of the port's account beyond the energy of the surface,
-///
+/// budget becomes available. The energy from the model therefore never exceeds the energy from the hand and the budget.
+/// A suitable budget is the part of the port's account beyond the energy of the surface,
 ///     budget = max(E − rendered energy, 0)
-///
 /// With this budget a limiter with K ≤ 2b/T_max does not reduce the force. A budget of 0 is passive for every E.
-///
-/// Source: as above; for the budget core/PROOFS.md, "Surfaces".
 ///
 /// A message is ignored if a number is not finite, the stiffness is negative, or the normal is not a unit vector
 /// (1e-6). If `position` is not finite, the demand is not finite. If the budget is not positive, it is treated as 0.
 ///
-/// Thread-safe: no. Realtime-safe: all of it.
+/// Source: as above; for the budget core/PROOFS.md, "Surfaces".
+/// Thread-safe: no. Realtime-safe: yes.
 template <int N>
 class SurfaceRenderer {
  public:

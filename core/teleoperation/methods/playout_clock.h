@@ -9,20 +9,16 @@
 namespace tendon {
 
 /// Computes the time of the sender to play out, late enough that the messages for that time have arrived:
-///
 ///     τ = t − min delay − D,      D = p99 of (delay + wait for a gap) − min delay,   0 ≤ D ≤ max_playout
-///
 /// t is the local time and τ the time of the sender. A delay is the local arrival time minus the sending time; the
 /// offset of the clocks cancels. Both statistics are over the last 256 to 512 messages, so a clock rate error of 200
-/// ppm shifts τ by less than 0.1 ms at 1000 messages per second. τ changes without jumps: its rate is 1 + (lag / 250
-/// ms), at most 2 and at least 0.
+/// ppm shifts τ by less than 0.1 ms at 1000 messages/s. τ does not jump. Its rate is 1 + (lag / 250 ms), in [0, 2].
 ///
 /// τ does not pass the newest message. If messages arrive in a burst that is longer than D, τ stops until the burst
-/// arrives, and continues at the same place. Nothing is skipped, so that an integral and its energy stay together. If τ
-/// is max_playout behind (t − min delay), it continues without messages.
+/// arrives, and continues at the same place. Nothing is skipped, so that an integral and its energy remain consistent.
+/// If τ is max_playout behind (t − min delay), it continues without messages.
 ///
 /// Source: playout buffers for voice over packet networks; the quantile, the gaps and the rate control are ours.
-///
 /// Thread-safe: no. Realtime-safe: yes.
 class PlayoutClock {
  public:
@@ -30,14 +26,13 @@ class PlayoutClock {
   explicit PlayoutClock(Duration max_playout) : max_playout_(max_playout) {}
 
   /// Records a message with the highest `time` so far, which arrived at the local time `now`. `waited` (≥ 0) is the
-  /// additional delay of the playout caused by previous messages that are missing (lost, reordered or not sent).
+  /// additional delay of the playout due to missing previous messages (lost, reordered or not sent).
   void heard(Duration now, Duration time, Duration waited) noexcept;
 
-  /// Returns τ. `now` must not decrease. τ is 0 before the first message.
+  /// Returns τ, or 0 before the first message. `now` must not decrease.
   Duration advance(Duration now) noexcept;
 
-  /// The current value of D.
-  Duration playout() const noexcept;
+  Duration playout() const noexcept;  ///< current D
 
  private:
   static constexpr double kSteering = 0.25;   ///< s

@@ -14,12 +14,12 @@ namespace tendon {
 /// The message between the ends of a position–position coupling, in the frame and scale of the receiver.
 template <int N>
 struct PortMotion {
-  std::uint64_t epoch = 1;           ///< of the sender, > 0; increases with each restart (EnergyTank)
-  std::uint64_t sequence = 0;        ///< period of the sender: 1, 2, …; messages that are not newer are dropped
+  std::uint64_t epoch = 1;           ///< epoch of the sender, > 0; increases at each restart (EnergyTank)
+  std::uint64_t sequence = 0;        ///< period of the sender: 1, 2, …; older messages and duplicates are ignored
   std::uint64_t answers_epoch = 0;   ///< epoch of the receiver for `answers`; 0: none
   std::uint64_t answers = 0;         ///< sequence of the receiver's message that the sender used; 0: none
-  Duration time{};                   ///< in the sender's clock; only differences are used; ± 2⁶⁰ ns
-  Duration round_trip{};             ///< measured by the sender; 0: not known
+  Duration time{};                   ///< time of the sender; only differences are used; ± 2⁶⁰ ns
+  Duration round_trip{};             ///< as measured by the sender; 0 if unknown
   Vec<N> position = Vec<N>::Zero();  ///< m
   Vec<N> velocity = Vec<N>::Zero();  ///< m/s
 };
@@ -33,64 +33,52 @@ Vec<N> paid_stretch(const Vec<N>& stretch, double stiffness, double energy) noex
   return distance > farthest ? Vec<N>(stretch * (farthest / distance)) : stretch;
 }
 
-/// Couples two handles by a spring and a damper. Both ends use this class.
-///
+/// A coupling of two handles by a spring and a damper. Both ends use this class.
 ///     F = K (y − x) + D (ẏ − v) − B v,   ‖F‖ ≤ max_force        N, on the hand at this end
 ///     K = min(stiffness, 2B/T_loop)                             with `adapt_to_delay`
-///
 /// x, v are the position and velocity of this end, and y, ẏ those of the other end: the newest received values,
 /// extrapolated to y + ẏ e if they are later than the fastest recent messages by e (e ≤ kMostAhead; beyond that y is
-/// constant and ẏ = 0). The law is isotropic.
+/// constant and ẏ = 0). If a message is 5 ms later than the previous one, y would otherwise be wrong by 1 mm at 0.2
+/// m/s, which causes 0.4 N of noise at 400 N/m. The law is isotropic.
 ///
-/// **Dependence of K on the delay** (core/PROOFS.md, "Coupling springs"). The delayed spring generates energy, which
-/// a damper of K·T_loop/2 at each end dissipates. The coupling is quiet for K ≤ 2B/T_loop, where B is the reliable
-/// damping at one end. Above that, the limiters and the tank keep the pair passive, but it oscillates: 0.04 … 0.08
-/// m/s in free motion for delays above 50 ms.
+/// **Dependence of K on the delay** (core/PROOFS.md, "Coupling springs"). A delayed spring generates energy. It is
+/// dissipated by a damper of K·T_loop/2 at each end. The coupling is quiet for K ≤ 2B/T_loop, where B is the reliable
+/// damping at one end. The pair is also passive above this because of the limiters and the tank, but there are
+/// oscillations of 0.04 … 0.08 m/s in free motion for delays above 50 ms.
 ///
-/// **T_loop** is measured without a common clock: a message contains the sequence that it answers, and the periods
-/// since then are counted. This includes delay, loss and waiting of the other end. Both ends use the maximum of the
-/// two measurements, because the forces would differ if the ends used different values of K. T_loop increases
-/// immediately. It decreases after `recovery`, since it is the maximum over one to two of these intervals, so that a
-/// held force is steady. K follows with the time constant kSettling, because both ends learn about a longer delay at
-/// different times. Without messages T_loop increases and K decreases; the caller must detect the loss of the peer. A
-/// change of K under stretch costs ½ ΔK δ², which the accounts pay.
-///
-/// **Extrapolation.** If a message is 5 ms later than the previous one, y is wrong by 1 mm at 0.2 m/s, which causes
-/// 0.4 N of noise at 400 N/m.
+/// **T_loop** is measured without a common clock, by counting the periods since the sequence that a message answers.
+/// This includes delay, loss and waiting of the other end. Both ends use the maximum of the two measurements, because
+/// the forces would differ if the ends used different values of K. T_loop increases immediately. It is the maximum over
+/// the last one to two intervals of `recovery`, so that a held force does not change. K has the time constant
+/// kSettling, because the ends do not measure a longer delay at the same time. Without messages T_loop increases and K
+/// decreases; the caller must detect this loss. A change of K under stretch costs ½ ΔK δ², which the accounts pay.
 ///
 /// **Felt damping** in free motion, for a sine with the peak speed v̂ and the friction b_f, f_c of the follower:
-///
 ///     b_felt = K·T_loop + B_l + B_f + b_f + 4 f_c/(π v̂)
-///
 /// The stiffness that a hand can feel is at most K_op of the two limiters, 1/K_op = T_l/(2 b_l) + T_f/(2 b_f). Both
-/// ends must use the same K, D and B up to the scales: K_l = s_f s_x K_f, and likewise for D and B.
+/// ends must use the same K, D and B up to the scales: K_l = s_f s_x K_f, and likewise for D and B. This law is not
+/// passive. There must be a limiter and an EnergyTank at both ends.
 ///
-/// This law is not passive. There must be a limiter and a EnergyTank at both ends.
-///
-/// Messages that are not finite or out of bounds are dropped and counted in `refused`. A higher epoch of the other
-/// end starts anew, and a lower one is ignored. If the position is not finite, the demand is not finite, and the
-/// limiter sets the force to 0. Before the first message, the force is −B v.
+/// Messages that are not finite or out of bounds are dropped and counted in `refused`. A higher epoch of the other end
+/// starts anew, and a lower one is ignored. If the position is not finite, the demand is not finite, and the limiter
+/// sets the force to 0. Before the first message, the force is −B v.
 ///
 /// Source: position–position coupling, Hannaford 1989 (recalled); the bound on K derived here and measured.
-///
 /// Thread-safe: no. Realtime-safe: yes, except the constructor.
 template <int N>
 class PositionPosition {
  public:
-  /// Maximum of e.
-  static constexpr Duration kMostAhead = std::chrono::milliseconds(20);
-  /// Time constant of K.
+  static constexpr Duration kMostAhead = std::chrono::milliseconds(20);  ///< maximum of e
   static constexpr Duration kSettling = QuietStiffness::kSettling;
 
   struct Config {
     double stiffness = 0;    ///< maximum of K, N/m; > 0
     double damping = 0;      ///< D, N·s/m; ≥ 0
-    double own_damping = 0;  ///< B, N·s/m; ≥ 0, and > 0 with adapt_to_delay
+    double own_damping = 0;  ///< B, N·s/m; ≥ 0, and not 0 if adapt_to_delay is true
     bool adapt_to_delay = true;
-    Duration period{};        ///< of this end, > 0
-    std::uint64_t epoch = 1;  ///< > 0, see EnergyTank
-    /// The time after which T_loop can decrease, > 0.
-    Duration recovery = std::chrono::seconds(5);
+    Duration period{};                                           ///< of this end, > 0
+    std::uint64_t epoch = 1;                                     ///< > 0, see EnergyTank
+    Duration recovery = std::chrono::seconds(5);                 ///< > 0; T_loop can decrease after this time
     double max_force = std::numeric_limits<double>::infinity();  ///< N, > 0
   };
 
@@ -99,11 +87,11 @@ class PositionPosition {
 
   void receive(const PortMotion<N>& message) noexcept;
 
-  /// Must be called after a loss of the peer. This starts a new measurement of T_loop without the silence.
+  /// Must be called after a loss of the peer. Starts a new measurement of T_loop without the silence.
   void forget_round_trip() noexcept;
 
-  /// Returns the requested force for this period and its stiffness. The caller maps positions (clutch, scale).
-  /// `energy` (J) limits the stretch of the spring (paid_stretch).
+  /// Returns the requested force for this period and its stiffness. The caller maps positions (clutch, scale). `energy`
+  /// (J) limits the stretch of the spring (paid_stretch).
   Demand<N> command(const Vec<N>& position, const Vec<N>& velocity,
                     double energy = std::numeric_limits<double>::infinity()) noexcept;
 
@@ -117,7 +105,7 @@ class PositionPosition {
   void become(double stiffness, double damping, double own_damping) noexcept;
 
   double stiffness() const noexcept { return stiffness_.value(); }  ///< K in use, N/m
-  /// Returns T_loop, or 0 if the other end has not answered.
+  /// T_loop, or 0 if the other end has not answered.
   Duration round_trip() const noexcept { return std::max({loop_, loop_before_, newest_.round_trip}); }
   double ahead() const noexcept { return ahead_; }  ///< e in the last command, s
   std::uint64_t refused() const noexcept { return refused_; }

@@ -9,12 +9,8 @@
 namespace tendon {
 
 /// The stiffness of a spring between two ends with a delay, in N/m or N·m/rad:
-///
 ///     K → min(most, 2 B/T_loop),    T_loop > 0 and known                 (see PositionPosition)
-///
-/// K changes with the time constant kSettling, but uses the first T_loop immediately.
-///
-/// Thread-safe: no. Realtime-safe: yes.
+/// K has the time constant kSettling, but uses the first T_loop at once. Thread-safe: no. Realtime-safe: yes.
 class QuietStiffness {
  public:
   static constexpr Duration kSettling = std::chrono::milliseconds(200);
@@ -37,13 +33,12 @@ class QuietStiffness {
     known_ = late > 0;
     return value_;
   }
-  /// Sets new parameters. K changes gradually.
+  /// K changes gradually.
   void become(double most, double damping) noexcept {
     config_.most = most;
     config_.damping = damping;
   }
-  /// Uses the next T_loop immediately.
-  void forget() noexcept { known_ = false; }
+  void forget() noexcept { known_ = false; }  ///< uses the next T_loop immediately
   double value() const noexcept { return value_; }
 
  private:

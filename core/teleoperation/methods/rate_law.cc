@@ -40,7 +40,6 @@ Demand<3> RateLaw::centred(const LawPeriod& period, const Vec3& speed) const noe
           centring_ * Mat3::Identity()};
 }
 
-/// Returns the velocity of the reference in m/s.
 Vec3 RateLaw::asked_velocity(const LawPeriod& period) const noexcept {
   if (!period.live || !period.fresh || period.peer.phase != PortPhase::kEngaged) return Vec3::Zero();
   const PoseMap& map = period.frame.map();

@@ -5,17 +5,15 @@
 
 namespace tendon {
 
-/// The method `rate`: the displacement of the leader sets the velocity of the follower. u_l is 0 at the start of each
-/// act. In the scale of the leader:
-///
+/// The method `rate`: the displacement of the leader sets the velocity of the follower. Each act starts with u_l = 0.
+/// In the scale of the leader:
 ///     F_l = −K_c u_l − B u̇_l + f,     f = s_f Rᵀ f_contact, ‖f‖ ≤ K_c · dead_zone
 ///     v = gain (‖u_l‖ − dead_zone)₊ û_l,  ‖v‖ ≤ max_speed;     the follower's reference moves by s_x R v T per period
-///
-/// The spring of the follower has the stiffness K_f and pulls the tool to the reference. The distance between them is
-/// at most max_force/K_f. f cannot move the handle out of the dead zone, so a contact does not move the follower. The
-/// reference does not move if the handle is in the dead zone, if the leader is not live, or if its state is not fresh
-/// (LossStages). The hand does no work while it holds the handle. A follower with a limiter therefore only moves as
-/// long as its account pays for the friction that exceeds the lower bounds of the limiter.
+/// The spring of the follower has the stiffness K_f and pulls the tool to the reference, which is at most max_force/K_f
+/// away. f cannot move the handle out of the dead zone, so a contact does not move the follower. The reference does not
+/// move if the handle is in the dead zone, if the leader is not live, or if its state is not fresh (LossStages). The
+/// hand does no work while it holds the handle, so a follower with a limiter only moves as long as its account pays for
+/// the friction that exceeds the lower bounds of the limiter.
 class RateLaw : public CouplingLaw {
  public:
   static constexpr bool kLeaderCentred = true;

@@ -5,8 +5,7 @@
 
 namespace tendon {
 
-/// The spring of a follower between its tool and a reference position. The method moves the reference.
-///
+/// The spring of a follower between its tool and a reference position, which the method moves.
 ///     F = K_f (r − u) + D_f (ṙ − u̇) − B_f u̇                       in N, m, and m/s
 struct ReferenceSpring {
   explicit ReferenceSpring(const CouplingConfig& config) noexcept
@@ -25,8 +24,8 @@ struct ReferenceSpring {
     return {stiffness * (place - tool) + mutual * (velocity - speed) - own * speed, stiffness * Mat3::Identity()};
   }
 
-  double damping;      ///< The damping D of the leader in N·s/m.
-  double own_damping;  ///< The damping B of the leader in N·s/m.
+  double damping;      ///< D of the leader, N·s/m
+  double own_damping;  ///< B of the leader, N·s/m
   Vec3 place = Vec3::Zero();
   Vec3 velocity = Vec3::Zero();
 };

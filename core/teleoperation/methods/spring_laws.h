@@ -11,11 +11,11 @@ struct SpringLaw : CouplingLaw {
   SpringLaw(const CouplingConfig& /*config*/, const MappedEnd& /*frame*/) noexcept {}
 };
 
-/// The method `set-position`: F = K(ȳ − u) − B u̇ at both ends. ȳ is the nearest position to the mapped displacement
-/// of the peer with ½ K ‖ȳ − u‖² ≤ payable (paid_stretch). K depends on the delay in the same way as for
-/// position-position. The law does not use D or the velocity of the peer, so the states can be rare and irregular. If
-/// the follower only follows, as in ContactLaw, its stiff spring uses the energy that the leader needs. In a test
-/// with 50 ms, the force at the leader was then 0.17 N instead of 4.1 N.
+/// The method `set-position`: F = K(ȳ − u) − B u̇ at both ends. ȳ is the nearest position to the mapped displacement of
+/// the peer with ½ K ‖ȳ − u‖² ≤ payable (paid_stretch). K depends on the delay as for position-position. D and the
+/// velocity of the peer are not used, so the states can be rare and irregular. If the follower only followed, as in
+/// ContactLaw, its stiff spring would use the energy that the leader needs: in a test with 50 ms, the force at the
+/// leader was then 0.17 N instead of 4.1 N.
 struct SetPositionLaw : CouplingLaw {
   static constexpr bool kUsesVelocity = false;
   static constexpr bool kSpringPays = true;
@@ -23,8 +23,7 @@ struct SetPositionLaw : CouplingLaw {
 };
 
 /// The method `position-force`: the follower uses the law of SpringLaw with a constant K, because the leader has no
-/// spring. The force of the leader is s_f Rᵀ f_contact − B v. If the peer does not measure the contact force, it is
-/// −B v.
+/// spring. The force of the leader is s_f Rᵀ f_contact − B v, or −B v if the peer does not measure the contact force.
 class ContactLaw : public CouplingLaw {
  public:
   ContactLaw(const CouplingConfig& config, const MappedEnd& /*frame*/) noexcept : damping_(config.spring.own_damping) {}
@@ -35,7 +34,7 @@ class ContactLaw : public CouplingLaw {
   }
 
  private:
-  double damping_;  ///< The damping B in N·s/m.
+  double damping_;  ///< B, N·s/m
 };
 
 }  // namespace tendon

@@ -8,8 +8,7 @@ namespace tendon {
 
 namespace {
 
-/// Converts a surface of the follower to the frame and the scale of the leader. m is the component of Rᵀ n_f along the
-/// coupled axes:
+/// Converts a surface of the follower to the frame and the scale of the leader. m is the coupled part of Rᵀ n_f:
 ///     F_l = s_f s_x K_f (d/s_x − m·u_l)₊ m
 SurfaceModel<3> at_leader(const PortSurface& from, const PoseMap& map, std::uint64_t sequence) {
   const double stiffer = 1 / map.stiffness_at_follower(1);  // s_f s_x

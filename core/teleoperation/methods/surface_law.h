@@ -5,7 +5,7 @@
 
 namespace tendon {
 
-/// The method `surface`: the follower uses the law of ContactLaw. It also estimates the surface at its tool from the
+/// The method `surface`: the follower uses the law of ContactLaw, and estimates the surface at its tool from the
 /// contact force (SurfaceEstimator). The leader renders this surface at its own rate (SurfaceRenderer) and adds the
 /// force −B v. The account pays for each change of the surface. Each act starts without a surface.
 class SurfaceLaw : public CouplingLaw {
@@ -22,10 +22,10 @@ class SurfaceLaw : public CouplingLaw {
 
  private:
   SurfaceEstimator<3>::Config config_;
-  double damping_;                                ///< The damping B in N·s/m.
-  std::optional<SurfaceEstimator<3>> estimator_;  ///< Only at the follower.
-  std::optional<SurfaceRenderer<3>> renderer_;    ///< Only at the leader.
-  std::optional<PortSurface> found_;              ///< The surface in this act, only at the follower.
+  double damping_;                                ///< B, N·s/m
+  std::optional<SurfaceEstimator<3>> estimator_;  ///< only at the follower
+  std::optional<SurfaceRenderer<3>> renderer_;    ///< only at the leader
+  std::optional<PortSurface> found_;              ///< in this act, only at the follower
 };
 
 }  // namespace tendon

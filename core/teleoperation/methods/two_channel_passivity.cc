@@ -25,7 +25,6 @@ Demand<N> PassivityLeader<N>::command(const Vec<N>& velocity) noexcept {
   const double excess = newest_.force.dot(velocity) - energy() / seconds(config_.period);  // W
   if (excess <= 0) return {newest_.force};
   const double squared = velocity.squaredNorm();
-  // Avoids a division if the velocity is 0.
   const double damping = excess < config_.max_damping * squared ? excess / squared : config_.max_damping;
   return {newest_.force - damping * velocity};
 }

@@ -26,21 +26,16 @@ struct FollowerMessage {
 
 /// The leader's end of two-channel time-domain passivity control. The velocity is sent to the follower, and the force
 /// is received. No end outputs energy that the other one has not received before, independent of the network.
-///
 ///     E_in  = Σ (−F·Δx)₊      E_out = Σ (F·Δx)₊         with the force F applied to the hand
 ///     F_wanted = F_received − α v,   smallest α ≥ 0 with   T F_wanted·v ≤ E_in,follower(received) − E_out
-///
 /// α (N·s/m) is a series damper with the limit `max_damping`, which also avoids the division by a small v. Since E_in
 /// does not decrease, an old value is a lower bound, so delay, loss and reordering are safe. The condition uses the
-/// current velocity for the next period. If the motion differs, E_out contains the actual value and the next period
-/// compensates for it; the error is that of one period, and 0 if the motion is known. The f of the papers is −F at
-/// the leader and F at the follower.
+/// current velocity for the next period. If the motion is different, E_out contains it, and the next period compensates
+/// for it. The error is that of one period, and 0 if the motion is known. The f of the papers is −F at the leader and F
+/// at the follower. Non-finite messages and intervals are ignored. A non-finite velocity gives a non-finite demand.
 ///
 /// Source: Ryu, Artigas and Preusche, Mechatronics 20(7), 2010 (recalled, not re-read); core/PROOFS.md, "Two-channel
 /// passivity control". The prediction by one period and the use of the applied force are ours.
-///
-/// Messages and intervals are ignored if they are not finite. If `velocity` is not finite, the demand is not finite.
-///
 /// Thread-safe: no. Realtime-safe: yes, except the constructor.
 template <int N>
 class PassivityLeader {
@@ -58,7 +53,6 @@ class PassivityLeader {
   /// Returns the requested force for this period. The last received force is used until a newer one arrives.
   Demand<N> command(const Vec<N>& velocity) noexcept;
 
-  /// Uses the previous interval. Returns the message to send.
   LeaderMessage<N> observe(const Interval<N>& interval) noexcept;
 
   /// J, energy that may still be output: E_in,follower(received) − E_out. It may be negative, see above.
@@ -72,21 +66,17 @@ class PassivityLeader {
 };
 
 /// The follower's end: computes the velocity of the tool from the force that the tool requires.
-///
 ///     v = v_received + λ (x_received − ∫ v dt) − β f,   smallest β ≥ 0 with
 ///     T f·v + ½ K T² v² ≤ E = E_in,leader(received) − E_out
-///
-/// f is the applied force on the tool (N) in the same period, and β a parallel admittance (m/(N·s)). K is the
-/// stiffness of the controller's spring, whose end moves by T v, so that its force increases by K T v and it stores ½
-/// K T² v² (J). If K > 0, a velocity that violates the condition is replaced by the closest one that satisfies it.
-/// All values are known when they are used, so this end is exact. The second term restores the displacement that β or
-/// lost messages have removed (without it, about 40 mm in a few seconds). It is subject to the same condition, so the
-/// drift is only corrected with available energy. In a period without a new message, v_received = 0.
+/// f is the applied force on the tool (N) in the same period, and β a parallel admittance (m/(N·s)). K is the stiffness
+/// of the controller's spring, whose end moves by T v, so that its force increases by K T v and it stores ½ K T² v²
+/// (J). If K > 0, a velocity that violates the condition is replaced by the closest one that satisfies it. All values
+/// are known when they are used, so this end is exact. The second term restores the displacement that β or lost
+/// messages have removed (without it, about 40 mm in a few seconds). It is subject to the same condition, so the drift
+/// is only corrected with available energy. In a period without a new message, v_received = 0. Messages are ignored if
+/// they are not finite. If the force is not finite, the tool must not move.
 ///
 /// Source: as above; drift compensators: Artigas, Ryu and Preusche, IROS 2010 (recalled, not re-read).
-///
-/// Messages are ignored if they are not finite. If the force is not finite, the tool must not move.
-///
 /// Thread-safe: no. Realtime-safe: yes, except the constructor.
 template <int N>
 class PassivityFollower {
@@ -110,7 +100,7 @@ class PassivityFollower {
   /// Starts at `displacement` (m), which is also that of the leader. The energies are kept.
   void begin(const Vec<N>& displacement) noexcept;
 
-  /// Computes one step. `force` is the force of the controller on the tool in this period.
+  /// `force` is the force of the controller on the tool in this period.
   Command step(const Vec<N>& force) noexcept;
 
   /// m, ∫ v dt: target of the tool's controller.

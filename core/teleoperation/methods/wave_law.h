@@ -5,14 +5,14 @@
 
 namespace tendon {
 
-/// The method `waves` uses a WavePort at both ends. The impedance is B at the leader and B/(s_f s_x) at the follower.
-/// K and D are only used for the position of a robot.
+/// The method `waves` uses a WavePort at both ends. The impedance is B at the leader and B/(s_f s_x) at the follower. K
+/// and D are only used for the position of a robot.
 ///
-/// The account of the limiter pays for the energy that the line sends, and receives the energy of the peer. The pair
-/// is therefore passive even if a limiter reduces the force. The line uses the force that remains after the limiter
-/// and the motors, and sends the difference later (WavePort::SharedAccount). The ramp does not count as such a
-/// difference, so the two positions do not drift. If the leader is clutched, its end of the line does not move, and
-/// the follower stays at its position. An end that is not engaged receives waves and does not send any.
+/// The account of the limiter pays for the energy that the line sends, and receives the energy of the peer. The pair is
+/// therefore passive even if a limiter reduces the force. The line uses the force that remains after the limiter and
+/// the motors, and sends the difference later (WavePort::SharedAccount). The ramp does not count as such a difference,
+/// so the two positions do not drift. If the leader is clutched, its end of the line does not move, and the follower
+/// stays at its position. Waves are only sent by an engaged end, but are always received.
 class WaveLaw : public CouplingLaw {
  public:
   /// The delay of the line without the network and the playout: W and a period.
@@ -32,13 +32,13 @@ class WaveLaw : public CouplingLaw {
   double stiffness(const LawPeriod& period, double share, Duration round_trip) const noexcept;
 
  private:
-  double damping_;  ///< The damping B of the leader in N·s/m.
+  double damping_;  ///< B of the leader, N·s/m
   double max_force_;
   WavePort<3> port_;
   WaveMessage<3> sent_;
-  Vec3 force_ = Vec3::Zero();  ///< The force of the line in this period in N.
-  bool moves_ = false;         ///< The line moves with the handle.
-  bool joined_ = false;        ///< The port has joined the epoch of the peer.
+  Vec3 force_ = Vec3::Zero();  ///< N, of the line in this period
+  bool moves_ = false;         ///< the line moves with the handle
+  bool joined_ = false;        ///< the port has joined the epoch of the peer
 };
 
 }  // namespace tendon

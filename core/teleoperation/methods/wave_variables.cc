@@ -107,7 +107,6 @@ Demand<N> WavePort<N>::command(const Vec<N>& velocity) noexcept {
   return {root_ * wave_ - config_.impedance * velocity_};
 }
 
-/// Computes v' from v.
 template <int N>
 void WavePort<N>::follow(const Vec<N>& velocity) noexcept {
   const Vec<N> most = seconds(config_.period) * velocity;

@@ -11,33 +11,28 @@
 
 namespace tendon {
 
-/// The message that a wave port sends in each period. It contains sums since the start, so that no loss is permanent.
+/// The message that a wave port sends in each period. The sums since the start make up for lost messages.
 template <int N>
 struct WaveMessage {
-  std::uint64_t sequence = 0;        ///< 1, 2, …: period of the sender; duplicates are dropped
+  std::uint64_t sequence = 0;        ///< period of the sender: 1, 2, …; duplicates are ignored
   Duration time{};                   ///< time of the sender since its start; increases with `sequence`
   Vec<N> integral = Vec<N>::Zero();  ///< √W·s, ∫ wave dt; half of the square of a wave is a power
   double energy = 0;  ///< J, ∫ ‖wave‖²/2 dt, does not decrease; upper bound of the energy of the waves
 };
 
-/// One end of a bilateral connection that is passive for any delay. It exchanges wave variables, which contain their
-/// own energy, instead of velocity and force.
-///
+/// Implements one end of a bilateral connection, which is passive for any delay. It exchanges wave variables, which
+/// contain their own energy, instead of velocity and force.
 ///     F_wanted = √(2B) r̂ − B v'           r̂: received wave
 ///     s        = mean of (B v̄ − F) / √(2B) over the last W        s: wave to send;  −F·v̄ = (s² − r²)/2 if W = T
-///
 /// B (N·s/m, > 0) is the wave impedance, v̄ = Δx/T the mean velocity in the previous interval, and F the **applied**
 /// force in it, after the limiter. F acts on the moving side: on the hand at the leader, on the tool at the follower.
 /// With this sign, both ends have the same equations and use the same class. F of Niemeyer and Slotine is −F at the
-/// leader and F at the follower; u is the wave from the leader and w the wave from the follower.
-///
-/// The mean saves energy, because the displacement comes in encoder counts. A hand at 5 mm/s that moves one count of 30
-/// µm in one of six periods of 1 ms would send six times the energy of a smooth motion.
+/// leader and F at the follower; u is the wave from the leader and w the wave from the follower. The mean saves energy,
+/// because the displacement comes in encoder counts: a hand at 5 mm/s that moves one count of 30 µm in one of six
+/// periods of 1 ms would send six times the energy of a smooth motion.
 ///
 /// v' is the estimated velocity v, corrected so that its integral follows the measured displacement x:
-///
 ///     v' = v + (x − ∫ v' dt − λ T v) / τ_x,      τ_x = max(B / (150 N/m), W)
-///
 /// λ (0 … 1) minimizes the correction, so that an estimate that lags by up to one period is not corrected. Without the
 /// correction, the error of the estimator at encoder counts accumulates in the integral of s, and the two ends drift
 /// apart. v is 0 while the handle stays within 1.5 counts for 16 ms, because a handle on the edge of a count is not
@@ -45,9 +40,7 @@ struct WaveMessage {
 ///
 /// **Playout.** The messages contain I = ∫ wave dt and E = ∫ wave²/2 dt. The receiver interpolates both linearly
 /// between messages at the time τ of PlayoutClock, and computes the mean Ī of I over the last W:
-///
 ///     r̂ = ΔĪ / T + (Ī − ∫ r̂ dt) / 200 ms,      T r̂²/2 ≤ E(τ) − U + max(A − 1.5 reserve, 0)
-///
 /// U is the energy used so far and A the account below. A wave with the same integral and less variation has less
 /// energy (Cauchy–Schwarz), so the bound is only active while τ catches up. The second term is 0 except after such a
 /// limitation or a period of another length. Energy is available at the time τ and not on arrival: otherwise, the
@@ -55,27 +48,22 @@ struct WaveMessage {
 /// Jitter, loss, reordering and bursts do not change the integral, so the positions of both ends return to their
 /// initial values up to (friction)/K, with K as below. If no more messages arrive, r̂ is 0 after W.
 ///
-/// **Passivity in sampled time** (core/PROOFS.md, "Wave variables"). The account A of the port (J) contains the
-/// actual energy
-///
+/// **Passivity in sampled time** (core/PROOFS.md, "Wave variables"). The account A of the port (J) contains the energy
 ///     A += min(T r̂²/2, E(τ) − U) − T s²/2 − F·Δx
-///
-/// s is reduced if A would become negative, and the missing part of its sum is sent within 200 ms when A allows it.
-/// So A + A' + (energy in transit in both directions) is exactly the energy received at both ends. No part is
-/// negative, except that A can become negative if the motion in a period differs from v; then nothing is sent until A
-/// is positive. (In all cases the limiter at the device bounds the leader's port.)
+/// s is reduced if A would become negative, and the missing part of its sum is sent within 200 ms when A allows it. So
+/// A + A' + (energy in transit in both directions) is exactly the energy received at both ends. No part is negative,
+/// but A can become negative if the motion in a period is not v. Nothing is then sent until A is positive. (In all
+/// cases the limiter at the device bounds the leader's port.)
 ///
 /// **Felt dynamics.** A spring K = B/d with the inertia B d, and a damper B for fast motion. d is the minimum delay
-/// from `observe` to the `command` that uses it, plus the playout D, averaged over both directions, plus W. A hand k_h that pushes by Δx on an object k_w feels
-///
+/// from `observe` to the `command` that uses it, plus the playout D, averaged over both directions, plus W. A hand k_h
+/// that pushes by Δx on an object k_w feels
 ///     F = Δx / (1/k_h + d/B + 1/k_w)
-///
-/// Source: Niemeyer and Slotine, IEEE J. Oceanic Eng. 16(1), 1991, and IJRR 23(9), 2004 (both recalled, not re-read).
-/// The playout of the sum, the energy counter, and the account for sampled ports are ours.
-///
 /// Messages and intervals that are not finite are ignored, as are messages whose time is not between those of their
 /// neighbors. If `velocity` is not finite, the demand is not finite, and the limiter sets the force to 0.
 ///
+/// Source: Niemeyer and Slotine, IEEE J. Oceanic Eng. 16(1), 1991, and IJRR 23(9), 2004 (both recalled, not re-read).
+/// The playout of the sum, the energy counter, and the account for sampled ports are ours.
 /// Thread-safe: no. Realtime-safe: yes, except the constructor.
 template <int N>
 class WavePort {
@@ -95,23 +83,20 @@ class WavePort {
   /// Throws std::invalid_argument with the name of the field, its value and the expected value.
   explicit WavePort(const Config& config);
 
-  /// Must be called with the first message of another end that was started before this one, or has restarted. Only
-  /// its later waves are used.
+  /// Must be called with the first message of an end that was started earlier or has restarted. Only later waves count.
   void join(const WaveMessage<N>& first) noexcept;
 
-  /// Messages may arrive in any order.
-  void receive(const WaveMessage<N>& message) noexcept;
+  void receive(const WaveMessage<N>& message) noexcept;  ///< in any order
 
   /// Returns the requested force for this period. Must be called once per period.
   Demand<N> command(const Vec<N>& velocity) noexcept;
 
-  /// Uses the previous interval. Returns the message to send.
   WaveMessage<N> observe(const Interval<N>& interval) noexcept;
 
   /// Values of the limiter of a port, whose account the line uses (SharesAccount).
   struct SharedAccount {
     double payable = 0;              ///< J, after `observe` of the limiter; replaces A
-    double reserve = 0;              ///< J, ℓ of the requested force, which the limiter needs
+    double reserve = 0;              ///< J, the reserve of the limiter for the requested force, ℓ
     Vec<N> wanted = Vec<N>::Zero();  ///< N, force that the line requested in the interval
   };
   /// For a port with a limiter, which may reduce the force. Below the reserve, a fifth of the energy of each wave is
@@ -119,8 +104,7 @@ class WavePort {
   /// credit `taken` to the limiter and withdraw `given`.
   WaveMessage<N> observe(const Interval<N>& interval, const SharedAccount& account) noexcept;
 
-  /// Discards the missing part of the sum.
-  void forgive() noexcept { unsent_.setZero(); }
+  void forgive() noexcept { unsent_.setZero(); }  ///< discards the missing part of the sum
   /// Discards x − ∫ v' dt, because the line does not move with the handle.
   void rest() noexcept {
     ahead_.setZero();
@@ -128,18 +112,16 @@ class WavePort {
     wandered_.setZero();
   }
 
-  /// A, J.
-  double energy() const noexcept { return account_; }
+  double energy() const noexcept { return account_; }  ///< A, J
   /// J, ≥ 0, of the waves received and sent in the last observed interval.
   double taken() const noexcept { return taken_; }
   double given() const noexcept { return given_; }
 
-  /// D; the clock may still be adjusting to it.
-  Duration playout() const noexcept { return clock_.playout(); }
+  Duration playout() const noexcept { return clock_.playout(); }  ///< D; the clock may still be adjusting to it
 
  private:
   static constexpr std::size_t kMost = 256;
-  static constexpr Duration kLate = std::chrono::milliseconds(200);  ///< time in which a missing part is made up
+  static constexpr Duration kLate = std::chrono::milliseconds(200);  ///< the missing part is sent within this time
   static constexpr double kPoorShare = 0.8;
   static constexpr double kReserves = 1.5;    ///< a missing part is made up with the energy beyond these reserves
   static constexpr double kTracking = 150.0;  ///< N/m, B/τ_x
@@ -147,7 +129,6 @@ class WavePort {
   static constexpr Duration kStillFor = std::chrono::milliseconds(16);
 
   WaveMessage<N>& heard(std::size_t k) noexcept { return heard_[(begin_ + k) % kMost]; }
-  /// The integral and the energy of the peer at a time of its clock.
   struct Sums {
     Vec<N> integral;
     double energy;
@@ -181,7 +162,7 @@ class WavePort {
   double used_energy_ = 0;
   double played_energy_ = 0;  ///< E(τ)
   double account_ = 0;
-  double spare_ = 0;  ///< J, the part of A that r̂ may use
+  double spare_ = 0;  ///< J, the part of A available for r̂
   double taken_ = 0;
   double given_ = 0;
   WaveMessage<N> sent_;

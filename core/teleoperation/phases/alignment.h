@@ -9,11 +9,9 @@
 
 namespace tendon {
 
-/// Moves the handle of a leader with an absolute map to the position of the follower. The force is a spring. The end
-/// of the spring moves to the position of the follower with the speed kSpeed, and the force is at most kForce. The
-/// alignment is done if the distance was small for the time kHeld, and fails after the time kMost.
-///
-/// Thread-safe: no. Realtime-safe: yes.
+/// Moves the handle of a leader with an absolute map to the position of the follower with a spring. The end of the
+/// spring moves to that position with the speed kSpeed, and the force is at most kForce. The alignment is done if the
+/// distance was small for the time kHeld, and fails after the time kMost. Thread-safe: no. Realtime-safe: yes.
 class Alignment {
  public:
   static constexpr Duration kHeld = std::chrono::milliseconds(200);
@@ -26,8 +24,7 @@ class Alignment {
     guide_.reset();
   }
 
-  /// Updates the alignment with the distance in m. This function must be called once per period. The distance is small
-  /// if it is at most `within`. If the distance is NaN, it is not small.
+  /// Must be called once per period with the distance in m, which is small if it is at most `within`. NaN is not small.
   void observe(double apart, double within, LocalTime now) noexcept {
     if (!(apart <= within)) apart_at_ = now;
   }
@@ -39,8 +36,7 @@ class Alignment {
     double damping = 0;    ///< N·s/m
     double max_force = 0;  ///< N
   };
-  /// Returns the force on the handle in N. `there` is the position of the follower in m, and `elapsed` is the time
-  /// since the previous period.
+  /// Returns the force on the handle in N. `there` is the position of the follower in m.
   Vec3 force(const Vec3& there, const Vec3& position, const Vec3& velocity, const Spring& spring,
              Duration elapsed) noexcept {
     if (!guide_) guide_ = position;
@@ -55,8 +51,8 @@ class Alignment {
 
  private:
   LocalTime since_{};
-  LocalTime apart_at_{};       ///< The last time at which the distance was not small.
-  std::optional<Vec3> guide_;  ///< The end of the spring in m.
+  LocalTime apart_at_{};       ///< last time at which the distance was not small
+  std::optional<Vec3> guide_;  ///< m, end of the spring
 };
 
 }  // namespace tendon

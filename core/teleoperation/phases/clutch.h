@@ -5,7 +5,7 @@
 
 namespace tendon {
 
-/// Returns true if the button is held. `bit` is a number from 0 to 31.
+/// Returns true if the button is held. `bit` is at most 31, also for is_pressed.
 constexpr bool is_held(std::uint32_t buttons, std::uint32_t bit) noexcept { return (buttons >> bit & 1U) != 0; }
 
 /// Returns true if the button is held and was not held in the previous period.
@@ -14,17 +14,16 @@ constexpr bool is_pressed(std::uint32_t buttons, std::uint32_t before, std::uint
 }
 
 struct CouplingButton {
-  std::uint32_t bit = 0;  ///< At most 31.
-  bool toggles = false;   ///< If false, the button must be held.
+  std::uint32_t bit = 0;  ///< at most 31
+  bool toggles = false;   ///< false: the button must be held
 };
 
-/// The clutch of the leader. This class is not thread-safe, and is safe for the realtime thread.
+/// The clutch of the leader. Thread-safe: no. Realtime-safe: yes.
 class Clutch {
  public:
-  /// Releases the clutch.
   void reset() noexcept { toggled_ = false; }
 
-  /// Returns true if the clutch is on in this period. This function must be called once per period.
+  /// Returns true if the clutch is on in this period. Must be called once per period.
   bool asks(const CouplingButton& button, std::uint32_t buttons, std::uint32_t before) noexcept {
     if (is_pressed(buttons, before, button.bit)) toggled_ = !toggled_;
     return button.toggles ? toggled_ : is_held(buttons, button.bit);

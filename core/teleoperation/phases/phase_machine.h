@@ -8,8 +8,7 @@
 
 namespace tendon {
 
-/// The inputs of the phase machine. In each period the caller checks the conditions in this order and calls `next` for
-/// each condition that is true.
+/// Inputs of the phase machine. In each period the caller checks them in this order and calls `next` if one is true.
 enum class PhaseInput : std::uint8_t {
   kNotReady,  ///< The device is missing, disarmed, or has a fault.
   kReady,     ///< The device is ready.
@@ -24,9 +23,7 @@ enum class PhaseInput : std::uint8_t {
 };
 inline constexpr std::size_t kPhaseInputs = 10;
 
-/// Returns the next phase of one end of a coupling. The function uses this table, in which `–` means that the phase
-/// does not change:
-///
+/// Returns the next phase of one end of a coupling, by this table (`–`: no change):
 ///                  alone     coupled   aligning  engaged   clutched  lost      fault
 ///     kNotReady    fault     fault     fault     fault     fault     fault     fault
 ///     kReady       –         –         –         –         –         –         alone
@@ -38,13 +35,9 @@ inline constexpr std::size_t kPhaseInputs = 10;
 ///     kRelease     –         –         –         –         engaged   –         –
 ///     kEnd         –         –         coupled   coupled   coupled   –         –
 ///     kRenew       alone     alone     alone     alone     alone     alone     –
-///
-/// A port in the phase `lost` can only engage again after a new act.
-///
-/// Thread-safe: yes. Realtime-safe: yes.
+/// A port in the phase `lost` can only engage again after a new act. Thread-safe: yes. Realtime-safe: yes.
 PortPhase next(PortPhase phase, PhaseInput input) noexcept;
 
-/// Returns true if the phase is `engaged` or `clutched`.
 constexpr bool is_in_act(PortPhase phase) noexcept {
   return phase == PortPhase::kEngaged || phase == PortPhase::kClutched;
 }
