@@ -18,7 +18,6 @@
 
 namespace tendon::bridge {
 
-/// Command-line options shared by all bridges.
 struct BridgeConfig {
   ServerName server = "127.0.0.1:47100";
   ForceClient::Config client{};        ///< `device` and `seed` are set for each BridgedDevice
@@ -45,11 +44,9 @@ struct BridgeConfig {
 /// Thread-safe: no. Realtime-safe: no.
 class BridgeHost {
  public:
-  /// Name and value of a counter of the bridge for the JSON lines.
-  using Count = std::pair<std::string_view, std::uint64_t>;
+  using Count = std::pair<std::string_view, std::uint64_t>;  ///< name and value, for the JSON lines
 
-  /// Throws std::runtime_error as UdpTransport does if the server's name cannot be resolved.
-  BridgeHost(BridgeConfig config, LocalTime now);
+  BridgeHost(BridgeConfig config, LocalTime now);  ///< throws as UdpTransport does
 
   std::size_t size() const noexcept { return served_.size(); }
   BridgedDevice& device(std::size_t i) { return served_[i].bridged; }
@@ -58,14 +55,12 @@ class BridgeHost {
   /// Turns every BridgedDevice and returns the time of the next turn. `counts` are added to the JSON lines.
   LocalTime turn(LocalTime now, std::span<const Count> counts = {});
 
-  /// Prints a message to stderr, "tendon-bridge: …".
-  void say(const std::string& sentence) const;
+  void say(const std::string& sentence) const;  ///< prints a message to stderr, "tendon-bridge: …"
 
   /// Sleeps until a server socket or one of `others` is ready or until `until`, at most 100 ms so that signals are
   /// noticed. Sets `revents` of `others`.
   void wait(std::span<pollfd> others, LocalTime now, LocalTime until);
-  /// Sockets connected to the server, for bridges with their own event loop. The list must be read again after each
-  /// name lookup.
+  /// Sockets of the server, for bridges with their own event loop. Read the list again after each name lookup.
   std::vector<int> descriptors() const;
 
   /// Sends a Bye for each device. Returns the exit code, which is 1 (with a message) if a device never sent a state.

@@ -12,9 +12,8 @@
 
 namespace tendon::bridge {
 
-/// One device of a Tendon server, for programs that do not know Tendon. A bridge has one BridgedDevice for each device.
-/// It reads the newest state from it and passes it the forces of its programs. A BridgedDevice has no socket, clock or
-/// thread.
+/// One device of a Tendon server, for programs that do not know Tendon. The bridge reads the newest state from it and
+/// passes it the forces of its programs. It has no socket, clock or thread.
 ///
 ///     BridgedDevice bridged({link, server}, {another, server}, config, now);
 ///     for (;;) wait for a datagram, at most until bridged.turn(now);
@@ -22,19 +21,16 @@ namespace tendon::bridge {
 /// * **Observer first.** It starts as an observer, so that a program that only reads does not exclude an engine. The
 ///   first requested force makes it a controller of the channel, which takes two round trips. After Config::idle
 ///   without a force it becomes an observer again.
-/// * **One owner.** The first program that requests a force owns the device. Forces of other programs are dropped,
-///   and they are informed. The device is released if the owner leaves or if there is no request for the time
-///   Config::idle.
-/// * **Freshness.** A single force is sent once; a field answers states until it expires. After that nothing is sent,
-///   and the server holds, fades and stops the last force as for any silent engine (protocol/SESSION.md). An old
-///   force is never sent as a new one.
+/// * **One owner.** The first program that requests a force owns the device, until it leaves or requests nothing for
+///   Config::idle. Forces of other programs are dropped, and they are informed.
+/// * **Freshness.** A single force is sent once; a field answers states until it expires. Then nothing is sent, and the
+///   server holds, fades and stops the last force (protocol/SESSION.md). An old force is never sent as a new one.
 /// * **Latency.** A requested force is sent in the next turn as an answer to the newest state.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class BridgedDevice {
  public:
-  /// Number of a program, assigned by the bridge. 0: none.
-  using Program = std::uint32_t;
+  using Program = std::uint32_t;  ///< number of a program, assigned by the bridge; 0: none
 
   struct Config {
     ForceClient::Config client{};  ///< `seed` is replaced by `new_seed`
@@ -43,8 +39,7 @@ class BridgedDevice {
     Duration idle = std::chrono::seconds(1);  ///< the owner and the channel are released after this time
   };
 
-  /// Connection of one of the two sessions. Each has its own socket.
-  struct Route {
+  struct Route {  // of one of the two sessions; each has its own socket
     Link& link;
     Address server;
   };
@@ -58,19 +53,16 @@ class BridgedDevice {
   /// The links must outlive this object. The first Hello is sent in the first turn.
   BridgedDevice(const Route& watcher, const Route& controller, Config config, LocalTime now);
 
-  /// Performs all work due at `now` and returns the time of the next call. Call it earlier if a datagram arrives or a
-  /// force has been requested.
+  /// Performs the work due at `now`. Returns the time of the next call; call earlier after a datagram or a request.
   LocalTime turn(LocalTime now);
 
-  /// The newest state, including buttons pressed since the last turn. Empty before the first state and without a
-  /// session.
+  /// The newest state, with buttons pressed since the last turn. Empty before the first state and without a session.
   const std::optional<DeviceState>& state() const noexcept { return state_; }
   LocalTime arrived() const noexcept { return arrived_; }
   /// Sampling time of the state in the local clock, computed with the estimate of the server's clock, at most
   /// arrived(). Equals arrived() before the first round trip of a session.
   LocalTime sampled() const noexcept { return sampled_; }
-  /// Number of received states. If it has increased, state() is new.
-  std::uint64_t states() const noexcept { return states_; }
+  std::uint64_t states() const noexcept { return states_; }  ///< received; if it has increased, state() is new
   /// Descriptions received from the server; empty before they arrive.
   const std::optional<Welcome>& welcome() const noexcept { return welcome_; }
   const std::optional<DeviceDescription>& description() const noexcept { return description_; }
@@ -79,16 +71,13 @@ class BridgedDevice {
   /// Requests one force on the hand, in the device base frame. It answers the newest state and is sent once. If the
   /// channel is not available yet, it waits for it until `until`.
   Answer push(Program program, LocalTime now, LocalTime until, const Touch& touch);
-  /// Requests a force field, which answers the newest state and each new state until `until`. push() and ask()
-  /// replace the previous request of the same program.
+  /// Requests a force field that answers each state until `until`. push() and ask() replace the program's last request.
   Answer ask(Program program, LocalTime now, LocalTime until, Physics physics);
-  /// Ends the requests of `program`. Does nothing if it is not the owner.
-  void release(Program program);
+  void release(Program program);  ///< ends its requests; nothing happens if it is not the owner
   Program owner() const noexcept { return owner_; }
 
-  /// Whether the server accepts forces from this object.
-  bool pushes() const noexcept { return controller_ && controller_->holds(); }
-  std::uint64_t forces() const noexcept;                              ///< in all sessions
+  bool pushes() const noexcept { return controller_ && controller_->holds(); }  ///< the server accepts forces from here
+  std::uint64_t forces() const noexcept;                                        ///< in all sessions
   std::uint64_t forces_dropped() const noexcept { return dropped_; }  ///< requested by programs other than the owner
   std::uint64_t forces_unusable() const noexcept;
   LinkStats link() const;  ///< of the session that receives the states
@@ -101,15 +90,12 @@ class BridgedDevice {
   /// gained or lost, force not sent. Empty: none. Only the newest 16 messages are kept.
   std::optional<std::string> next_sentence();
 
-  /// Phase of the session that receives the states; kStopped after stop().
-  ForceClient::Phase phase() const noexcept;
-  /// Whether no session is open.
-  bool lost() const noexcept { return phase() != ForceClient::Phase::kOpen; }
+  ForceClient::Phase phase() const noexcept;  ///< of the session that receives the states; kStopped after stop()
+  bool lost() const noexcept { return phase() != ForceClient::Phase::kOpen; }  ///< whether no session is open
   /// Sets the server addresses for the next attempts. Must be called while lost().
   void move_to(const Address& watcher, const Address& controller);
 
-  /// Sends a Bye. Further turns do nothing.
-  void stop(LocalTime now);
+  void stop(LocalTime now);  ///< sends a Bye; further turns do nothing
 
  private:
   std::unique_ptr<ForceClient> new_client(LocalTime now, bool controls);
@@ -147,8 +133,7 @@ class BridgedDevice {
   std::uint64_t dropped_ = 0;
   std::uint64_t forces_before_ = 0;  ///< sent by previous controllers
   std::uint64_t unusable_before_ = 0;
-  /// The state that the messages describe. While it is unchanged, there are no new messages.
-  struct Shown {
+  struct Shown {  // what the messages describe: no new ones while it is unchanged
     ForceClient::Phase watcher = ForceClient::Phase::kStopped;
     ForceClient::Phase controller = ForceClient::Phase::kStopped;
     bool pushes = false;
@@ -163,7 +148,6 @@ class BridgedDevice {
   bool stopped_ = false;
 };
 
-/// Returns true if the client is waiting between two attempts.
 constexpr bool is_between_attempts(ForceClient::Phase phase) {
   return phase == ForceClient::Phase::kUnanswered || phase == ForceClient::Phase::kRefused ||
          phase == ForceClient::Phase::kLost;

@@ -11,8 +11,7 @@ class App;
 
 namespace tendon::bridge {
 
-/// Runs the chosen subcommand after the command line is parsed; returns the exit code. Exceptions are printed to
-/// stderr and result in exit code 1.
+/// Runs the subcommand after parsing; returns its exit code. An exception is printed to stderr and gives exit code 1.
 using Chosen = std::function<int()>;
 
 /// Adds the options of all bridges: --server, --key, --device, --channel, --take-lease, --observe, --json. The client

@@ -35,35 +35,29 @@ struct Reply {
   Touch touch{};
 };
 
-/// The physics engine as a function from device state to force. The callback may block: newer states replace older
-/// ones in the meantime, and the next state reports every button that was pressed in one of the skipped states.
-/// Exceptions propagate through ForceClient::turn.
+/// The physics engine, from device state to force. It may block: newer states replace older ones meanwhile, and the
+/// next state reports every button pressed in a skipped one. Exceptions propagate through ForceClient::turn.
 using Physics = std::function<Touch(const DeviceState& hand)>;
 
-/// Callback of an observer.
-using Watch = std::function<void(const DeviceState& hand, const LinkStats& link)>;
+using Watch = std::function<void(const DeviceState& hand, const LinkStats& link)>;  ///< callback of an observer
 
-/// A client of a Tendon server. It opens a session and keeps it alive, passes the newest device state to one
-/// callback, sends the returned force, and reconnects after the session ends. This class does not use sockets, clocks
-/// or threads.
+/// A client of a Tendon server. It opens a session and keeps it alive, passes the newest device state to one callback,
+/// sends the returned force, and reconnects after the session ends. This class does not use sockets, clocks or threads.
 ///
 ///     ForceClient client(link, server, config, physics, now);
 ///     for (;;) wait for a datagram, at most until client.turn(now);
 ///
-/// * **Newest wins.** Each turn drains the link. The callback receives only the newest state; the others are counted
-///   as skipped.
-/// * **Rate.** If rate_hz = r > 0, the callback runs at multiples of 1/r, or as soon as an unseen state is available
-///   after that. After a delay of a full period, the schedule restarts; missed calls are not made up. If rate_hz = 0,
-///   the callback runs once for each new state.
-/// * **Force.** Each force carries the tick of the state that it answers, a sequence number (1, 2, 3 … per session)
-///   and its validity (see Config::valid_for). It is sent after the callback returns, with a time stamp that is read
-///   then, so the time stamp does not include the time of the computation. Forces that are not finite or out of the
-///   bounds in WIRE.md are counted and not sent; the server then treats this client as late.
+/// * **Newest wins.** Each turn drains the link. The callback gets the newest state; the others count as skipped.
+/// * **Rate.** With rate_hz = r > 0, the callback runs at multiples of 1/r, or with the next new state after that. A
+///   full period's delay restarts the schedule; missed calls are not made up. With rate_hz = 0, for each new state.
+/// * **Force.** Each force carries the tick of the state that it answers, a sequence number (1, 2, 3 … per session),
+///   its validity (Config::valid_for) and the time at which the callback returned. Forces that are not finite or out of
+///   the bounds in WIRE.md are counted and not sent; the server then treats this client as late.
 /// * **Replacement.** If another program with the same key replaces this client, the client stops and does not
 ///   reconnect. Otherwise the two programs would keep replacing each other.
 /// * **Reconnection.** After an attempt or a session ends (no answer, refusal, Bye, silence), the client waits for
-///   retry_min before the next attempt. The wait is doubled with each attempt up to retry_max. It is reset by the
-///   first state of a new session. Each attempt uses new random numbers.
+///   retry_min. Each attempt doubles it up to retry_max and uses new random numbers; the first state of a session
+///   resets it.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class ForceClient {
@@ -73,61 +67,48 @@ class ForceClient {
     /// Names of the device and its channel. Empty: the first one of the server.
     std::string device{};
     std::string channel{};
-    /// If another controller holds the lease of the channel, keep asking for it. The request is repeated when the
-    /// server reports that the lease may have ended.
+    /// If another controller holds the channel, ask again whenever the server reports that its lease may have ended.
     bool take_lease = false;
-    double rate_hz = 0;  ///< calls per second, kMinRateHz … kMaxRateHz; 0: one call for each new state
-    /// States per second to request from the server, 0 … limits::kMaxLoopHz; 0: the default of the server.
-    std::uint32_t state_hz = 0;
-    /// How long after its arrival the server may use a force; at most limits::kMaxValidFor. 0: derived from the
-    /// period T between forces, which is the requested period or, if the engine is slower, the time between the
-    /// states that the last two forces answer:
+    double rate_hz = 0;          ///< calls per second, kMinRateHz … kMaxRateHz; 0: one call for each new state
+    std::uint32_t state_hz = 0;  ///< states per second to request, 0 … limits::kMaxLoopHz; 0: the default of the server
+    /// How long after its arrival the server may use a force; at most limits::kMaxValidFor. 0: derived from the period
+    /// T between forces, as requested or, for a slower engine, between the states that the last two forces answer:
     ///
     ///     T         = max(1 / rate_hz, min(Δtick / loop_hz, 100 ms))      if rate_hz = 0: the second term
     ///     valid_for = max(3 T, 20 ms)                          with a deadband: T ≥ its longest silence
     ///
-    /// 3 T tolerates the loss of two consecutive forces. 20 ms tolerates network jitter, which would otherwise make
-    /// an engine at 1 kHz late after 3 ms. The limit of 100 ms prevents a pause from being taken for a period; an
-    /// engine below 10 Hz must set rate_hz.
+    /// 3 T tolerates the loss of two consecutive forces. 20 ms tolerates jitter, which would make an engine at 1 kHz
+    /// late after 3 ms. 100 ms prevents a pause from being taken for a period: an engine below 10 Hz must set rate_hz.
     Duration valid_for{};
-    /// For links with limited bandwidth: omits forces that a human cannot distinguish from the last one sent (Weber's
-    /// law), about 90 % of the datagrams at 1 kHz. Only forces, torques and grip forces are compared
-    /// (HandleDeadband). A changed stiffness is sent with the next force, at the latest after the longest silence; a
-    /// changed topology is sent immediately. Empty: every force is sent.
+    /// For slow links: omits forces that a human cannot distinguish from the last one sent (Weber's law), about 90 % of
+    /// the datagrams at 1 kHz. Compares forces, torques and grip forces only (HandleDeadband). A changed stiffness
+    /// waits for the next force, at most the longest silence; a changed topology is sent immediately. Empty: send all.
     std::optional<Deadband::Config> deadband{};
-    /// For links with limited bandwidth: the server omits states that the client can predict. If rate_hz = r > 0, the
-    /// callback runs at multiples of 1/r with the state predicted for that time, including tick and sampling time.
-    /// Ticks always increase. States are predicted for at most max_silence; after that, the callback waits for the
-    /// next state. If rate_hz = 0, the callback runs for each received state. Empty: all states are requested.
-    /// Servers that do not support this feature send every state.
+    /// For slow links: the server omits states that the client can predict. With rate_hz = r > 0, the callback runs at
+    /// multiples of 1/r with the state predicted for that time, with its tick (always increasing) and sampling time,
+    /// for at most max_silence, and then waits for the next state. With rate_hz = 0, it runs for each received state.
+    /// Empty: all states are requested. Servers without this feature send every state.
     std::optional<SetStateDeadband> state_deadband{};
     /// For observers: requests the forces of the engines before limiting (DeviceState::force_wanted), and reports on
     /// the loop of the device and its engines once per second. Servers that do not support this feature omit them.
     bool diagnostics = false;
-    /// Requests the joints of the device (DeviceState::joints, HandleDescription::joints): 16 bytes per joint and
-    /// state.
+    /// Requests the joints (DeviceState::joints, HandleDescription::joints): 16 bytes per joint and state.
     bool joints = false;
-    /// Requests access to the outputs of the device (HandleDescription::outputs). Required for `set_output`.
-    bool outputs = false;
-    /// Names of the methods with which this engine computes forces. Touch::way is an index into this list, starting
-    /// at 1. Observers and recordings receive the names. At most limits::kMaxWays unique names, each of 1 to
-    /// limits::kMaxLabel bytes.
+    bool outputs = false;  ///< requests access to the outputs (HandleDescription::outputs), for set_output()
+    /// Names of the methods with which this engine computes forces, for observers and recordings. Touch::way is an
+    /// index into them, starting at 1. At most limits::kMaxWays unique names of 1 to limits::kMaxLabel bytes.
     std::vector<std::string> ways{};
-    /// Only with a Watch callback: register as a controller that sends no forces. It may rearm, disarm and hold a
-    /// channel.
+    /// Only with a Watch: register as a controller that sends no forces but may rearm, disarm and hold a channel.
     bool operates = false;
     /// Shared with the server. With a key, all traffic is encrypted and unencrypted datagrams are ignored. Without a
     /// key, the server must run on this machine.
     std::optional<Key> key{};
-    /// Cipher suites offered for an encrypted session. The server selects one.
-    Suites suites = suites_of_this_machine();
+    Suites suites = suites_of_this_machine();  ///< offered for an encrypted session; the server selects one
     Seed seed{};  ///< for the handshakes; must be 32 new bytes from the operating system for each object
-    /// The time for which an attempt waits for an answer. 2 s is 20 Hellos at the handshake interval of 100 ms,
-    /// enough for a round trip of 1 s at 50 % loss.
+    /// How long an attempt waits: 20 Hellos at intervals of 100 ms, enough for a round trip of 1 s at 50 % loss.
     Duration patience = std::chrono::seconds(2);
     Duration retry_min = std::chrono::milliseconds(100);  ///< wait before the first retry; > 0
-    /// Upper limit of the wait between attempts. It bounds both the time to find a restarted server and the load on a
-    /// server that refuses the client.
+    /// Longest wait between attempts. Bounds the time to find a restarted server, and the load on one that refuses.
     Duration retry_max = std::chrono::seconds(2);
     /// The maximum number of datagrams read in one turn, so that a flood cannot prevent sending. A server at 1 kHz
     /// sends 256 datagrams in a quarter of a second, the longest silence before it stops the device.
@@ -168,30 +149,25 @@ class ForceClient {
   /// Creates a controller, which receives states and sends forces. `link` must outlive this object. The first Hello
   /// is sent by the first turn. Throws std::invalid_argument "FIELD = VALUE: expected …" if `config` is invalid.
   ForceClient(Link& link, const Address& server, const Config& config, Physics physics, LocalTime now);
-  /// Creates an observer, which receives states and, if requested, reports; or an operator (Config::operates). Never
-  /// sends a force.
+  /// Creates an observer of states and, if requested, reports; or an operator (Config::operates). Never sends a force.
   ForceClient(Link& link, const Address& server, const Config& config, Watch watch, LocalTime now);
 
-  /// Performs all work due at `now` and returns the time of the next call. Call it earlier if a datagram arrives. The
-  /// callback may take long, so read the clock again before sleeping. An exception of the callback propagates after a
-  /// Bye is sent to the server.
+  /// Performs the work due at `now` and returns the time of the next call; call it earlier if a datagram arrives. The
+  /// callback may take long: read the clock again before sleeping. Its exceptions propagate after a Bye.
   LocalTime turn(LocalTime now);
 
   /// Passes the newest state to the callback again in the next turn. Use it if the answer of the engine has changed
   /// and waiting for the next state would take too long. Does nothing if no state has arrived.
   void answer_again() { unseen_ = newest_.has_value(); }
 
-  /// Sends a force that was computed asynchronously, after the callback returned an unknown force (Touch::unknown).
-  /// The force is sent in the next turn, which is due immediately. Returns false and does not send the force if the
-  /// session has ended, if another client has the channel, or if there was an answer to a newer state.
+  /// Sends a force computed after the callback returned Touch::unknown, in the next turn, which is due immediately.
+  /// Returns false, unsent, if the session has ended, another client has the channel, or a newer state was answered.
   bool answer(LocalTime now, const Reply& reply);
 
-  /// Asks the server to clear a latched fault of the device and to undo a disarm. With a safety layer, this is the
-  /// request to arm. Only for controllers; the server refuses observers. Returns false if there is no session or if
-  /// too many requests are pending.
+  /// Asks the server to clear a latched fault and undo a disarm; with a safety layer, to arm. Only for controllers; the
+  /// server refuses observers. Returns false without a session or if too many requests are pending.
   bool rearm();
-  /// Asks the server to disable all forces from the next step of the device until a client rearms. Returns false as
-  /// rearm() does.
+  /// Asks the server to disable all forces from the device's next step until a client rearms. Returns as rearm() does.
   bool disarm();
   /// Engages or disengages a coupling of two devices ([teleoperation] in the scene). engage() must be sent to the
   /// server of the leader, disengage() to either server. Returns false as rearm() does.
@@ -203,18 +179,15 @@ class ForceClient {
   /// Sets the weight, 0 … 1, of the leader on that channel if several leaders share one follower. Must be sent to the
   /// server of the follower. Returns false as rearm() does, and if the weight is out of bounds.
   bool set_share(std::uint32_t channel, double share);
-  /// Sets an indicator lamp or starts a vibration pulse (`handle()->outputs`). Requires the channel (`holds()`).
-  /// Returns false as rearm() does, and also without Config::outputs, if the server does not support kFeatureOutputs,
-  /// or if `setting` is out of bounds.
+  /// Sets an indicator lamp or starts a vibration pulse (`handle()->outputs`). Requires `holds()`. Returns false as
+  /// rearm() does, without Config::outputs or the server's kFeatureOutputs, or for a `setting` out of bounds.
   bool set_output(std::uint32_t output, const OutputSetting& setting);
 
   /// The server's answer to the most recent of these requests in this session; empty if there is none.
   const std::optional<Session::RequestAnswered>& order_answer() const noexcept { return order_answer_; }
 
-  /// Whether this client holds the channel. Otherwise the callback is not called.
-  bool holds() const noexcept { return lease_.holds(); }
-  /// Requests or releases the lease of the channel. The request is repeated if the lease is lost before the answer
-  /// arrives. Return false as rearm() does.
+  bool holds() const noexcept { return lease_.holds(); }  ///< holds the channel; otherwise the callback is not called
+  /// Requests or releases the lease of the channel; repeated if lost before the answer arrives. Return as rearm() does.
   bool take_lease();
   bool give_lease();
 
@@ -245,9 +218,8 @@ class ForceClient {
   /// while forces arrive. Empty before the first report of this session.
   const std::optional<LinkReport>& report() const noexcept { return report_; }
 
-  /// Newest reports on the loop of the device and on the engine of each channel, in the order of their first reports.
-  /// Requires Config::diagnostics. Empty before the first report of this session. The last report is kept when the
-  /// engine leaves.
+  /// Newest reports on the loop of the device and on each channel's engine, in the order of their first reports; kept
+  /// when the engine leaves. Empty before the first report of this session. Requires Config::diagnostics.
   const std::optional<DeviceReport>& device_report() const noexcept { return device_report_; }
   const std::vector<PeerReport>& peer_reports() const noexcept { return peer_reports_; }
 

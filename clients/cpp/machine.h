@@ -6,11 +6,9 @@
 
 namespace tendon {
 
-/// Reads CLOCK_MONOTONIC. Thread-safe.
-LocalTime read_clock();
+LocalTime read_clock();  ///< reads CLOCK_MONOTONIC; thread-safe
 
-/// Returns whether the affinity mask of this process contains only one processor.
-bool has_one_processor();
+bool has_one_processor();  ///< whether the affinity mask of this process contains only one processor
 
 /// Reduces the timer slack of the calling thread to its minimum during its lifetime. By default, Linux may wake the
 /// thread up to 50 µs late. Must be constructed and destroyed on the same thread.
@@ -25,8 +23,7 @@ class Punctual {
   int slack_ns_;  ///< previous timer slack
 };
 
-/// Returns 32 random bytes from the operating system, for the keys of one handshake. Throws std::runtime_error if
-/// they are not available. Thread-safe.
+/// Returns 32 random bytes of the operating system for one handshake, or throws std::runtime_error. Thread-safe.
 Seed seed_from_system();
 
 }  // namespace tendon

@@ -10,8 +10,7 @@
 
 namespace tendon {
 
-/// The command line shared by all clients (--server, --rate-hz, --duration-s, --json, --help …), extended by the
-/// options of the program.
+/// The command line of all clients (--server, --rate-hz, --duration-s, --json, --help …) and the program's options.
 class CommandLine {
  public:
   /// `purpose` is the first line of --help. `options` contains the defaults and receives the values. All references
@@ -30,8 +29,7 @@ class CommandLine {
   void add(const std::string& name, double& value, const std::string& meaning, double least = 0);
   /// Adds a text: "--launch COMMAND", where `type` is "COMMAND".
   void add(const std::string& name, std::string& value, const std::string& type, const std::string& meaning);
-  /// Adds a flag: "--local-model".
-  void add(const std::string& name, bool& value, const std::string& meaning);
+  void add(const std::string& name, bool& value, const std::string& meaning);  ///< adds a flag: "--local-model"
 
   /// Returns nullopt if the program should continue, otherwise its exit code: 0 after --help, 2 after a usage error
   /// (printed to stderr), and the result of list_servers() after `--server dns-sd:`.

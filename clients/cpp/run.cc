@@ -49,15 +49,13 @@ class RunningClient {
   RunningClient(const RunningClient&) = delete;
   RunningClient& operator=(const RunningClient&) = delete;
 
-  /// Performs the work due at `now` and prints changes. Returns the time of the next turn, or empty if the client has
-  /// stopped permanently.
+  /// Performs the work due at `now` and prints changes. Returns the time of the next turn; empty: stopped permanently.
   std::optional<LocalTime> turn(LocalTime now);
   void answer(LocalTime now, const Reply& reply) { client_.answer(now, reply); }
   std::uint64_t sessions() const { return client_.stats().sessions; }
   bool open() const { return client_.phase() == ForceClient::Phase::kOpen; }
   void leave(LocalTime now) { client_.stop(now); }
-  /// Sends a Bye and prints the summary. Returns whether there was a session.
-  bool end(LocalTime now, Duration duration);
+  bool end(LocalTime now, Duration duration);  ///< sends a Bye and prints the summary; false without a session
 
   UdpTransport& transport() { return transport_; }
   bool look(LocalTime& now) { return busy_.look(now); }

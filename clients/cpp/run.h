@@ -18,8 +18,7 @@ struct Options {
   ServerName server = "127.0.0.1:47100";  ///< resolved at the start and again before each further attempt
   ForceClient::Config client;             ///< `seed` is replaced by random bytes from the operating system
   Duration duration{};                    ///< 0: run until SIGINT or SIGTERM
-  /// Polls without sleeping: answers are 10 to 50 µs faster, but a processor is always fully loaded. run() prints a
-  /// warning if there is only one processor.
+  /// Polls without sleeping: answers are 10 to 50 µs faster, for a fully loaded processor. Warns if there is only one.
   bool busy = false;
   bool json = false;  ///< print the final summary to stdout as one JSON object instead of to stderr as text
   /// Called with the time of read_clock() (machine.h) when no state has arrived for `silence` (at least 1 ms), also
@@ -38,9 +37,8 @@ struct Options {
 /// If another controller holds the device (Code::kBusy) or the server shuts down, run() keeps trying. It prints one
 /// sentence to stderr for each change of the connection. stdout contains only the output of the callback and, with
 /// `json`, the server's reports on the received forces once per second, {"report":{"number":1, …}}, and the summary,
-/// {"summary":{"duration_s":…, …}}. Without `json`, stderr contains a warning if forces were late.
-///
-/// Only one run() at a time per process, because it installs signal handlers.
+/// {"summary":{"duration_s":…, …}}. Without `json`, stderr contains a warning if forces were late. Only one run() at a
+/// time per process, because it installs signal handlers.
 int run(const Options& options, Physics physics);  ///< a controller
 int run(const Options& options, Watch watch);      ///< an observer
 
@@ -61,9 +59,8 @@ struct HandAt {
 using Together = std::function<std::vector<Touch>(std::span<const std::optional<DeviceState>> hands)>;
 
 /// Runs an engine that solves for all hands at once. The devices may belong to several servers that share
-/// `options.client.key`. The engine is called when any hand has a new state. Each hand then receives a force that is
-/// tagged with the state of that hand. `hands` must not be empty. If the engine throws, run() sends a Bye to each
-/// server and ends.
+/// `options.client.key`. The engine is called when any hand has a new state. Each hand then receives a force tagged
+/// with its state. `hands` must not be empty. If the engine throws, run() sends a Bye to each server and ends.
 int run(const Options& options, const std::vector<HandAt>& hands, const Together& engine);
 
 /// An engine that computes asynchronously, in another process or on a cluster. run() never blocks on it.
@@ -71,14 +68,11 @@ class Elsewhere {
  public:
   virtual ~Elsewhere() = default;
 
-  /// Passes the newest state. Must return immediately.
-  virtual void see(LocalTime now, const Seen& seen) = 0;
+  virtual void see(LocalTime now, const Seen& seen) = 0;  ///< takes the newest state; must return immediately
   /// Performs the work due at `now`. Returns the next answer, if any. run() calls it until it returns empty.
   virtual std::optional<Reply> turn(LocalTime now) = 0;
-  /// Time of the next turn. The turn is due earlier if the descriptor becomes readable.
-  virtual LocalTime next_turn() const = 0;
-  /// File descriptor for poll(). It is readable when turn() has work to do.
-  virtual int descriptor() const = 0;
+  virtual LocalTime next_turn() const = 0;  ///< the turn is due earlier if descriptor() becomes readable
+  virtual int descriptor() const = 0;       ///< for poll(); readable when turn() has work to do
 };
 
 /// Runs a controller for one device with the forces of `engine`. Late forces are dropped; see ForceClient::answer.

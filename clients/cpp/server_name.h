@@ -27,23 +27,20 @@ class ServerName {
 
   const std::string& text() const noexcept { return text_; }
 
-  /// Path of the Unix socket, at most 107 bytes; empty for other names.
-  const std::string& unix_path() const noexcept { return unix_path_; }
+  const std::string& unix_path() const noexcept { return unix_path_; }  ///< at most 107 bytes; empty for other names
 
-  /// The DNS-SD instance; empty for other names.
-  const std::optional<dns_sd::Instance>& instance() const noexcept { return instance_; }
+  const std::optional<dns_sd::Instance>& instance() const noexcept { return instance_; }  ///< empty for other names
 
   struct Place {
     std::vector<Address> addresses;  ///< in order of preference; at least one
     std::string device;              ///< from DNS-SD; empty: none
   };
 
-  /// Resolves the name. A numeric address is returned immediately; a Unix socket is represented by "127.240.0.0:0".
-  /// For host names and DNS-SD this blocks, up to some seconds if no name server answers. Throws std::runtime_error
-  /// if the name cannot be resolved: "cannot find haptics.lab: Name or service not known".
-  ///
-  /// Any host can announce any DNS-SD name, and a client without a key trusts whichever server answers. DNS-SD names
-  /// are therefore refused unless the caller sets `has_key` and uses that key for all sessions.
+  /// Resolves the name. A numeric address is returned immediately; a Unix socket is represented by "127.240.0.0:0". For
+  /// host names and DNS-SD this blocks, up to some seconds if no name server answers. Throws std::runtime_error if the
+  /// name cannot be resolved: "cannot find haptics.lab: Name or service not known". Any host can announce any DNS-SD
+  /// name, and a client without a key trusts whichever server answers. DNS-SD names are therefore refused unless the
+  /// caller sets `has_key` and uses that key for all sessions.
   Place look_up(bool has_key = false) const;
 
   /// Returns this name, followed by the address if it differs: "haptics.lab:47100 (192.0.2.7:47100)".

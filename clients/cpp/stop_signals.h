@@ -7,9 +7,7 @@ namespace tendon {
 
 /// Catches SIGINT and SIGTERM during its lifetime. The first signal sets `asked`; a second one of the same kind
 /// terminates the process. Only one instance per process, because signal handlers are global. A signal that arrives
-/// immediately before a sleep does not interrupt it, so sleep for at most 100 ms.
-///
-/// Thread-safe: no. Realtime-safe: no.
+/// immediately before a sleep does not interrupt it, so sleep for at most 100 ms. Thread-safe: no. Realtime-safe: no.
 class StopSignals {
  public:
   StopSignals();

@@ -27,24 +27,19 @@ struct Touch {
   /// Index into Config::ways of the method that computed this answer, starting at 1; 0: unspecified. It is not sent
   /// if the index is invalid (Stats::left_out) or the server does not support `kFeatureWays`.
   std::uint32_t way = 0;
-  // For handles with additional actuators (ForceClient::handle()), if the server supports `kFeatureHandle`. Otherwise
-  // only `force` is sent (Stats::left_out).
+  // For more actuators (ForceClient::handle()), with `kFeatureHandle`; else only `force` is sent (Stats::left_out).
   std::optional<Vec3> torque{};  ///< N·m, acting on the hand, in base frame axes, about the position of the handle
-  /// N·m/rad, −∂torque/∂θ at the orientation of the state; symmetric, and positive definite for a spring. Only valid
-  /// if the state has an orientation.
+  /// N·m/rad, −∂torque/∂θ at the state's orientation, which must exist; symmetric, positive definite for a spring.
   std::optional<Mat3> angular_stiffness{};
-  std::optional<double> grip_force{};  ///< N, on the fingers in the gripper; > 0 opens them
-  /// Validity of this answer, clamped to 1 µs … limits::kMaxValidFor. Empty: Config::valid_for.
-  std::optional<Duration> valid_for{};
-  /// The engine has no force for this state. Nothing is sent and the other fields are ignored.
-  bool unknown = false;
+  std::optional<double> grip_force{};   ///< N, on the fingers in the gripper; > 0 opens them
+  std::optional<Duration> valid_for{};  ///< clamped to 1 µs … limits::kMaxValidFor; empty: Config::valid_for
+  bool unknown = false;                 ///< no force for this state: nothing is sent and the other fields are ignored
 };
 
 /// Converts `touch` to a command that answers `hand`. The caller must set `sequence`, `valid_for`, `device` and
 /// `channel`. The angular stiffness is omitted if `hand` has no Turning.
 ForceCommand to_command(const Touch& touch, const DeviceState& hand);
 
-/// Converts back. The result answers the state for which `command` was made.
-Touch to_touch(const ForceCommand& command);
+Touch to_touch(const ForceCommand& command);  ///< answers the state for which `command` was made
 
 }  // namespace tendon

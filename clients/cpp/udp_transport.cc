@@ -35,8 +35,7 @@ udp::endpoint to_endpoint(const Address& address) {
 
 }  // namespace
 
-/// Replaces the socket with a descriptor that was released from Asio. Asio would add its sockets to an epoll
-/// instance, which every datagram would signal without need.
+/// Replaces the socket, released from Asio, whose epoll instance every datagram would signal without need.
 void UdpTransport::use(int connected) noexcept {
   if (fd_ >= 0) ::close(fd_);
   fd_ = connected;

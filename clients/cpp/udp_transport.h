@@ -12,7 +12,6 @@ namespace tendon {
 
 /// A socket connected to one server: UDP from an ephemeral port or, for "unix:PATH", a Unix datagram socket with an
 /// autobind address. Since the socket is connected, the kernel drops datagrams from other senders.
-///
 /// Thread-safe: no. Realtime-safe: no (system calls).
 class UdpTransport : public Link {
  public:
@@ -25,13 +24,11 @@ class UdpTransport : public Link {
   UdpTransport& operator=(const UdpTransport&) = delete;
 
   const Address& server() const noexcept { return server_; }
-  /// The device name found by DNS-SD; empty: none.
-  const std::string& device() const noexcept { return device_; }
+  const std::string& device() const noexcept { return device_; }  ///< device name found by DNS-SD; empty: none
 
-  /// Resolves the name again, which may block. This must only be called while no session is open. Keeps the current
-  /// address if the name still resolves to it; with `another`, selects the next address. Reopens a Unix socket, since
-  /// its path may belong to a new server. Throws the same exceptions as the constructor. In this case the current
-  /// address is kept.
+  /// Resolves the name again, which may block. Only while no session is open. Keeps the address if the name still
+  /// resolves to it; with `another`, selects the next one. Reopens a Unix socket, since its path may belong to a new
+  /// server. Throws as the constructor does, and then keeps the address.
   void look_up_again(bool another);
 
   /// `to` must be server(). Datagrams to other addresses, and those that the system rejects, are dropped.
@@ -40,14 +37,11 @@ class UdpTransport : public Link {
   /// See Link::receive. Empty datagrams are skipped because the result 0 means that none is available.
   std::size_t receive(Address& from, std::span<std::byte> buffer) override;
 
-  /// Reads std::chrono::steady_clock, the clock that run() uses.
-  LocalTime present(LocalTime now) const override;
+  LocalTime present(LocalTime now) const override;  ///< reads std::chrono::steady_clock, the clock that run() uses
 
-  /// The file descriptor of the socket, for poll(). It changes in look_up_again().
-  int descriptor() const noexcept { return fd_; }
+  int descriptor() const noexcept { return fd_; }  ///< of the socket, for poll(); changes in look_up_again()
 
-  /// Sleeps until a datagram is available or `timeout` has elapsed. A signal handler may end the sleep. Returns
-  /// immediately if `timeout` ≤ 0.
+  /// Sleeps until a datagram is available or `timeout` elapses; a signal handler may end it earlier. No sleep if ≤ 0.
   void wait(Duration timeout);
   /// Sleeps until one of `transports` or the descriptor `also` (−1: none) is readable, or until the timeout. Returns
   /// whether one of them is readable.

@@ -19,16 +19,13 @@ void dress(CLI::App& app);
 /// number 0, for example when a script passes a variable that is not set. Throws CLI::ParseError.
 void parse(CLI::App& app, int argc, const char* const* argv);
 
-/// Returns the error message for a command line. If an option or a command does not exist, the message suggests the
-/// closest one. If a number has a decimal comma, the message says so.
+/// Returns the error message. It suggests the closest option or command, and points out a decimal comma.
 std::string problem(const CLI::App& app, const CLI::ParseError& error);
 
-/// Returns 0 after printing the help or the version to stdout. If the usage is wrong, prints the program's name and the
-/// error message to stderr, and returns 2.
+/// Returns 0 after printing the help or version to stdout; or 2 after the program's name and the error to stderr.
 int exit_code(const CLI::App& app, const CLI::ParseError& error);
 
-/// Returns the error message for a text that is not one of these words: `expected pose or twist, got "wrist"`. If one
-/// of the words is close, the message suggests it.
+/// The error for a text that is none of these words, `expected pose or twist, got "wrist"`; suggests a close word.
 std::string refusal(const std::vector<std::string>& words, const std::string& text);
 
 /// Accepts only these words. The help shows them as `a|b`.

@@ -21,8 +21,7 @@ enum class Contact : std::uint8_t {
   kLost,        ///< the session ended; reconnecting
 };
 
-/// Commands of the buttons on the page.
-enum class Order : std::uint8_t { kArm, kDisarm, kEngage, kDisengage };
+enum class Order : std::uint8_t { kArm, kDisarm, kEngage, kDisengage };  ///< commands of the buttons on the page
 
 struct Press {
   enum class State : std::uint8_t { kUnderWay, kDone, kFailed };
@@ -33,17 +32,14 @@ struct Press {
 };
 
 /// The known state of a server. The Observer updates it; Feed sends it to the page, and /metrics exports it. Counters
-/// never decrease during the lifetime of this object, even if the server restarts.
-///
-/// Thread-safe: no. Realtime-safe: no.
+/// never decrease during the lifetime of this object, even if the server restarts. Thread-safe: no. Realtime-safe: no.
 class Board {
  public:
   /// Limit of states waiting for the page, per device: half a second at 1 kHz. The page reads them 60 times per
   /// second. The oldest states are dropped and counted.
   static constexpr std::size_t kMaxWaiting = 500;
   static constexpr std::size_t kReasons = 32;
-  /// Limit of coupling states waiting for the page: half a second. The oldest are dropped.
-  static constexpr std::size_t kMaxPortsWaiting = 25;
+  static constexpr std::size_t kMaxPortsWaiting = 25;  ///< half a second of coupling states; the oldest are dropped
 
   /// The engine at one channel of a device, from the latest report.
   struct Engine {
@@ -55,8 +51,7 @@ class Board {
     std::uint64_t late_engine = 0;
     std::uint64_t late_unknown = 0;
     RefusedForces refused{};
-    /// Reports on the device since the last report on this engine. There are no reports after an engine has left.
-    std::uint64_t silent_for = 0;
+    std::uint64_t silent_for = 0;  ///< reports on the device since the last on this engine; none come after it has left
   };
 
   /// The states of both ends of a coupling.
@@ -89,12 +84,10 @@ class Board {
 
   void tell(Contact contact, std::string words);
   void tell(Press press);
-  /// A session was opened. Handle descriptions are discarded, because this may be a different server.
-  void welcomed(const Welcome& welcome);
+  void welcomed(const Welcome& welcome);  ///< discards the handles: this may be a different server
   void described(const DeviceDescription& about);
   void described(const HandleDescription& handle);
-  /// Removes devices with larger indices, which belonged to another server.
-  void counted(std::uint32_t devices);
+  void counted(std::uint32_t devices);  ///< removes devices with larger indices, which belonged to another server
   void observe(const DeviceState& state);
   void observe(const DeviceReport& report);
   void observe(const PeerReport& report);
@@ -114,8 +107,7 @@ class Board {
 
   /// Incremented when the connection, a button press, the devices or their descriptions change.
   std::uint64_t version() const noexcept { return version_; }
-  /// Removes and returns the waiting states of a device.
-  std::vector<DeviceState> take_states(std::uint32_t device);
+  std::vector<DeviceState> take_states(std::uint32_t device);  ///< removes and returns the waiting states of a device
   std::vector<Ports> take_ports(std::uint32_t device);
 
  private:
@@ -130,8 +122,7 @@ class Board {
   std::map<std::uint32_t, Device> devices_;
 };
 
-/// Returns whether the device leads or follows, if known.
-std::optional<PortRole> role_of(const Board::Ports& ports);
+std::optional<PortRole> role_of(const Board::Ports& ports);  ///< whether the device leads or follows, if known
 
 /// Returns the energy that both ends of a coupling may still output, in J of the leader: both accounts plus payments
 /// in transit. One joule of the follower is s_f/s_x joules of the leader. Returns nullopt if the scales are unknown,

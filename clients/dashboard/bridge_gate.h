@@ -25,34 +25,26 @@ struct BridgeCounts {
   std::uint64_t too_slow = 0;   ///< dropped: replaced by a newer one because the page is too slow
 };
 
-/// Filters the datagrams between one page (WebSocket) and the server (UDP). Each binary message contains one
-/// unmodified datagram.
-///
-/// For tendond, all datagrams of the bridge come from this machine, and it accepts unencrypted datagrams from this
-/// machine (suite 0). Therefore only pages on this machine may send them; other pages must encrypt. The gate has no
-/// key and reads only the header, which is never encrypted.
-///
-/// Thread-safe: no. Realtime-safe: no.
+/// Filters the datagrams between one page (WebSocket) and the server (UDP). Each binary message contains one unmodified
+/// datagram. For tendond, all datagrams of the bridge come from this machine, and it accepts unencrypted datagrams from
+/// this machine (suite 0). Therefore only pages on this machine may send them; other pages must encrypt. The gate has
+/// no key and reads only the header, which is never encrypted. Thread-safe: no. Realtime-safe: no.
 class BridgeGate {
  public:
   struct Config {
-    double max_rate_hz = 4000;  ///< datagrams per second from one page; enough for four engines at 1 kHz
-    /// Bytes waiting for a page, about 60 ms of states at 1 kHz. Datagrams beyond that are dropped.
-    std::size_t max_waiting = 16 * 1024;
+    double max_rate_hz = 4000;            ///< datagrams per second from one page; enough for four engines at 1 kHz
+    std::size_t max_waiting = 16 * 1024;  ///< bytes for a page: about 60 ms of states at 1 kHz; more are dropped
   };
 
   /// `local`: the page is on this machine and not behind a local proxy. `counts` must outlive the gate.
   BridgeGate(const Config& config, bool local, BridgeCounts& counts, LocalTime now)
       : config_(config), local_(local), counts_(counts), rate_(config.max_rate_hz, now) {}
 
-  /// Returns whether a message from the page may be sent to the server. Increments one of to_server, malformed, plain
-  /// and too_fast.
+  /// Returns whether the page may send this to the server; counts it in to_server, malformed, plain or too_fast.
   bool passes(LocalTime now, std::span<const std::byte> message, bool binary);
 
-  /// Queues a datagram for the page, or drops it if the page is too slow.
-  void offer(std::span<const std::byte> datagram);
-  /// Returns the next datagram for the page, if any.
-  std::optional<std::vector<std::byte>> next();
+  void offer(std::span<const std::byte> datagram);  ///< queues it for the page, or drops it if the page is too slow
+  std::optional<std::vector<std::byte>> next();     ///< next datagram for the page, if any
 
  private:
   Config config_;

@@ -15,22 +15,16 @@
 
 namespace tendon::dash {
 
-/// Distributes changes of the Board to all open pages. It has no socket: it consumes lines and produces texts.
-///
-/// A page watches one device, initially the first one. The line "watch N" selects device N. After "watch N beside",
-/// the page also receives the newest state of each other device in every tick, for the 3-D view.
-///
-/// In each tick, a page receives the new states of its device and its coupling, and once per second the reports on
-/// the loop and the engines. Texts are shared by all pages that watch the same device.
-///
-/// Thread-safe: no. Realtime-safe: no.
+/// Distributes changes of the Board to all open pages. It has no socket: it consumes lines and produces texts. A page
+/// watches one device, initially the first one. The line "watch N" selects device N. After "watch N beside", the page
+/// also receives the newest state of each other device in every tick, for the 3-D view. In each tick, a page receives
+/// the new states of its device and its coupling, and once per second the reports on the loop and the engines. Texts
+/// are shared by all pages that watch the same device. Thread-safe: no. Realtime-safe: no.
 class Feed {
  public:
   using PageId = std::uint64_t;
-  /// The time between two ticks, which is the refresh period of a screen.
-  static constexpr Duration kTick = std::chrono::microseconds(16'667);
-  /// Lines per second that a page may send.
-  static constexpr double kMaxLinesHz = 20;
+  static constexpr Duration kTick = std::chrono::microseconds(16'667);  ///< between ticks: a screen's refresh period
+  static constexpr double kMaxLinesHz = 20;                             ///< lines per second that a page may send
 
   /// `board` and `counts` must outlive the feed.
   Feed(Board& board, Abilities abilities, WebCounts& counts, LocalTime now)
@@ -43,8 +37,7 @@ class Feed {
   /// Handles a line from a page. Returns false if it is invalid or too frequent; the page should then be closed.
   bool receive(LocalTime now, PageId page, std::string_view line);
   void tick(LocalTime now);
-  /// Returns the next text for a page, if any.
-  std::optional<std::string> next(PageId page);
+  std::optional<std::string> next(PageId page);  ///< next text for a page, if any
 
  private:
   struct Page {

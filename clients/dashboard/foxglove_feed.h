@@ -36,13 +36,11 @@ class FoxgloveFeed {
  public:
   struct Config {
     std::string name = "tendon-dash";  ///< shown by viewers
-    /// Unix time − LocalTime. Read once, so later changes of the system clock have no effect.
-    Duration unix_offset{};
+    Duration unix_offset{};  ///< Unix time − LocalTime, read once: later changes of the system clock have no effect
   };
   using ClientId = std::uint64_t;
   static constexpr Duration kClockSlack = std::chrono::milliseconds(1);
-  /// Messages per second from one client, with bursts of a tenth of that. Opening a layout sends one message for each
-  /// topic.
+  /// Messages per second from one client, with bursts of a tenth. Opening a layout sends one message for each topic.
   static constexpr double kMaxOrdersHz = 2000;
 
   /// `board` must outlive the feed.
@@ -51,19 +49,15 @@ class FoxgloveFeed {
   ClientId join(LocalTime now);
   void leave(ClientId client);
   std::size_t clients() const noexcept { return clients_.size(); }
-  /// Whether a client needs all states, which the Observer must then request.
-  bool wants_states() const;
+  bool wants_states() const;  ///< whether a client needs all states, which the Observer must then request
 
   /// Handles a text message. Returns false if messages are too frequent or too many texts are waiting; the client
   /// should then be closed. Invalid messages are answered with a status.
   bool receive(LocalTime now, ClientId client, std::string_view text);
-  /// Collects changes from the board. Must be called after each turn of the Observer and before Feed::tick, which
-  /// removes the states.
+  /// Collects changes from the board. Call it after each turn of the Observer, before Feed::tick removes the states.
   void take(LocalTime now);
-  /// Sends the messages for drawing.
-  void tick(LocalTime now);
-  /// Returns the next message for a client, if any.
-  std::optional<FoxgloveSession::Message> next(ClientId client);
+  void tick(LocalTime now);                                       ///< sends the messages for drawing
+  std::optional<FoxgloveSession::Message> next(ClientId client);  ///< next message for a client, if any
 
  private:
   struct Client {

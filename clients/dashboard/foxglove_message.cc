@@ -19,8 +19,7 @@ namespace {
 
 namespace recorded = tendon::recording::v1;
 
-/// N. Smaller forces have no arrow.
-constexpr double kLeastDrawn = 0.01;
+constexpr double kLeastDrawn = 0.01;       ///< N, smaller forces have no arrow
 constexpr double kBall = 0.02;             ///< m, diameter of the handle
 constexpr double kStylusLength = 0.1;      ///< m
 constexpr double kStylusDiameter = 0.008;  ///< m

@@ -25,10 +25,8 @@ namespace tendon::dash {
 /// Thread-safe: no. Realtime-safe: no.
 class FoxgloveSession {
  public:
-  /// This is about 5 s for one device.
-  static constexpr std::size_t kMaxBytes = 1'000'000;
-  /// Not reached by a client that reads its messages.
-  static constexpr std::size_t kMaxTexts = 64;
+  static constexpr std::size_t kMaxBytes = 1'000'000;  ///< about 5 s for one device
+  static constexpr std::size_t kMaxTexts = 64;         ///< not reached by a client that reads its messages
   static constexpr UnixTime kDropped = 100'000'000;
 
   struct Message {
@@ -36,22 +34,16 @@ class FoxgloveSession {
     bool binary = false;
   };
 
-  /// Returns false if the subscription exists or the channel is already subscribed.
-  bool subscribe(std::uint32_t subscription, std::uint32_t channel);
-  /// Discards the waiting messages of the subscription. Returns false if it does not exist.
-  bool unsubscribe(std::uint32_t subscription);
-  /// Removes the subscription of a removed channel.
-  void forget(std::uint32_t channel);
+  bool subscribe(std::uint32_t subscription, std::uint32_t channel);  ///< false if either is subscribed already
+  bool unsubscribe(std::uint32_t subscription);  ///< discards its waiting messages; false if it does not exist
+  void forget(std::uint32_t channel);            ///< removes the subscription of a removed channel
   bool subscribes_to(std::uint32_t channel) const noexcept { return subscription_of_.contains(channel); }
 
-  /// Queues the payload if the channel is subscribed.
-  void put(std::uint32_t channel, UnixTime at, std::string_view payload);
+  void put(std::uint32_t channel, UnixTime at, std::string_view payload);  ///< if the channel is subscribed
   void put_text(std::string text) { texts_.push_back(std::move(text)); }
-  /// Replaces a waiting server state.
-  void put_server_state(std::string text) { server_state_ = std::move(text); }
+  void put_server_state(std::string text) { server_state_ = std::move(text); }  ///< replaces a waiting server state
 
-  /// Returns the next message: dropped count, texts in order, server state, then data.
-  std::optional<Message> next();
+  std::optional<Message> next();  ///< next message: dropped count, texts in order, server state, then data
 
   bool too_slow() const noexcept { return texts_.size() > kMaxTexts; }
   std::size_t waiting_bytes() const noexcept { return bytes_; }

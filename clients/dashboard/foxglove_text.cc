@@ -10,8 +10,7 @@ namespace {
 
 using Object = nlohmann::ordered_json;
 
-/// RFC 4648, with padding.
-std::string base64(std::string_view bytes) {
+std::string base64(std::string_view bytes) {  // RFC 4648, with padding
   constexpr std::string_view kDigits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
   std::string text;
   for (std::size_t i = 0; i < bytes.size(); i += 3) {

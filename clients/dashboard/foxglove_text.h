@@ -12,9 +12,7 @@
 
 // Encoding of Foxglove's WebSocket protocol, version 1 (foxglove/ws-protocol, docs/spec.md). Text messages are JSON
 // objects with a member `op`. Integers in binary messages are little-endian. Only the parts for publishing are
-// implemented: no parameters, services, assets, connection graph or client publishing.
-//
-// Thread-safe, realtime-safe: no.
+// implemented: no parameters, services, assets, connection graph or client publishing. Thread-safe, realtime-safe: no.
 
 namespace tendon::dash {
 
@@ -48,8 +46,7 @@ struct Subscribe {
 struct Unsubscribe {
   std::vector<std::uint32_t> subscriptions{};
 };
-/// An invalid message. `sentence` describes what was expected.
-struct NotUnderstood {
+struct NotUnderstood {  // `sentence` describes what was expected
   std::string sentence;
 };
 using FoxgloveOrder = std::variant<Subscribe, Unsubscribe, NotUnderstood>;

@@ -16,10 +16,8 @@ struct WebCounts {
   std::uint64_t states_skipped = 0;  ///< not sent to a page that was too slow
 };
 
-/// Returns all metrics in the Prometheus text format 0.0.4. Names follow its conventions: base units (seconds,
-/// meters, newtons, joules), `_total` for counters. Unknown values are omitted. A test compares the names with
-/// deploy/monitoring.
-///
+/// Returns all metrics in the Prometheus text format 0.0.4. Names have base units (seconds, meters, newtons, joules),
+/// and `_total` for counters. Unknown values are omitted. A test compares the names with deploy/monitoring.
 /// Thread-safe: no. Realtime-safe: no.
 std::string metrics_text(const Board& board, const WebCounts& web, const BridgeCounts& bridge);
 

@@ -27,8 +27,7 @@ namespace tendon::dash {
 /// names, and a second one claims all devices.
 ///
 /// * **Reconnection.** It reconnects indefinitely (see Connection).
-/// * **Handles.** It requests the HandleDescription of each device once per session if the server supports
-///   kFeatureHandle.
+/// * **Handles.** It requests each HandleDescription once per session if the server supports kFeatureHandle.
 /// * **Holders.** It requests each description again every `describe_every`, because engines may change.
 ///
 /// Thread-safe: no. Realtime-safe: no.
@@ -39,16 +38,14 @@ class Observer {
     /// Name of one device in the group to observe, since a session is limited to 16 devices. Empty: the first group.
     /// If the server has no such device, it refuses and lists its devices.
     std::string device{};
-    /// Alternative addresses of the server. If there is no answer, the next address is tried.
-    std::vector<Address> further{};
-    std::optional<Key> key{};  ///< see ForceClient::Config::key; a key for observers is enough
-    Seed seed{};               ///< 32 random bytes from the operating system
+    std::vector<Address> further{};  ///< alternative addresses of the server, tried if there is no answer
+    std::optional<Key> key{};        ///< see ForceClient::Config::key; a key for observers is enough
+    Seed seed{};                     ///< 32 random bytes from the operating system
     Duration patience = std::chrono::seconds(2);
     Duration retry_min = std::chrono::milliseconds(100);
     Duration retry_max = std::chrono::seconds(2);
     Duration describe_every = std::chrono::seconds(1);
-    /// The maximum number of datagrams per turn: a quarter of a second of states at 1 kHz.
-    int max_datagrams = 256;
+    int max_datagrams = 256;  ///< maximum number of datagrams per turn: a quarter of a second of states at 1 kHz
   };
   /// States per second and device for /metrics while no page is open. Otherwise all states are requested.
   static constexpr std::uint32_t kIdleStateHz = 20;
@@ -59,13 +56,11 @@ class Observer {
   /// Performs all work due at `now` and returns the time of the next call. Call it earlier if a datagram arrives.
   LocalTime turn(LocalTime now);
 
-  /// Requests states at the full loop rate while `watched`.
-  void set_watched(bool watched) noexcept { watched_ = watched; }
+  void set_watched(bool watched) noexcept { watched_ = watched; }  ///< states at the full loop rate while `watched`
 
   const Address& server() const noexcept { return connection_.server(); }
 
-  /// Sends a Bye. Further turns do nothing.
-  void stop(LocalTime now);
+  void stop(LocalTime now);  ///< sends a Bye; further turns do nothing
 
  private:
   struct Asked {

@@ -28,8 +28,7 @@ std::string because(const std::string& detail, Code code) {
   return detail.empty() ? "the server refused it (code " + std::to_string(static_cast<int>(code)) + ")" : detail;
 }
 
-/// An order cancels pending orders of lower rank.
-int rank(Order order) {
+int rank(Order order) {  // an order cancels pending orders of lower rank
   switch (order) {
     case Order::kDisarm:
       return 2;

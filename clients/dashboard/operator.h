@@ -12,54 +12,44 @@
 
 namespace tendon::dash {
 
-/// Arms and disarms devices, and engages and disengages couplings, on request of the user of the page. This class
-/// does not use sockets, clocks or threads.
+/// Arms and disarms devices, and engages and disengages couplings, for the page. Without sockets, clocks or threads.
 ///
 /// Each button press opens a session separate from that of the Observer: a controller with the operator's key that
-/// claims and holds one channel of the device, sends the order but no force, and leaves after the answer. The result
-/// on the Board depends on the reaction of the device, not only on the answer of the server: the reason "disarmed"
-/// without force, the report "armed", or the coupling state.
+/// claims and holds one channel of the device, sends the order but no force, and leaves after the answer. The result on
+/// the Board depends on the reaction of the device, not only on the answer of the server: the reason "disarmed" without
+/// force, the report "armed", or the coupling state.
 ///
 /// * **Engines are not disturbed.** While another client holds the channel, nothing is sent (`objection`), and leases
 ///   are never taken over, even if the key has the permission. The operator should have a separate channel and key:
-///   tendond replaces a client by a newer one with the same key, and the Board's list of holders may be one second
-///   old.
-/// * **Disarm has priority.** It cancels any other pending order and cannot be canceled. Disengaging cancels arming
-///   and engaging.
+///   tendond replaces a client by a newer one with the same key, and the Board's list of holders may be one second old.
+/// * **Disarm has priority.** It cancels other orders and cannot be canceled. Disengaging cancels arming and engaging.
 /// * **Engaging** requires the leader's end, and both ends must be coupled and waiting.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class Operator {
  public:
   struct Config {
-    std::string name = "tendon-dash operator";  ///< for the log of the server; at most limits::kMaxLabel bytes
-    std::string channel;                        ///< channel reserved for the operator at each device
-    Key key;                                    ///< of a controller
-    Seed seed{};                                ///< 32 random bytes from the operating system
-    /// Timeout for the session and the answer: enough for a round trip of 1 s at 50 % loss.
-    Duration patience = std::chrono::seconds(5);
-    /// Timeout for the reaction of the device after the answer: up to one second for the safety layer and one for the
-    /// next report.
-    Duration granted_within = std::chrono::seconds(4);
+    std::string name = "tendon-dash operator";    ///< for the log of the server; at most limits::kMaxLabel bytes
+    std::string channel;                          ///< channel reserved for the operator at each device
+    Key key;                                      ///< of a controller
+    Seed seed{};                                  ///< 32 random bytes from the operating system
+    Duration patience = std::chrono::seconds(5);  ///< session and answer: enough for a round trip of 1 s at 50 % loss
+    Duration granted_within = std::chrono::seconds(4);  ///< reaction after the answer: safety layer ≤ 1 s, report ≤ 1 s
   };
 
-  /// `link` must be separate from the Observer's, because the server identifies clients by address. The `link` and
-  /// the `board` must outlive this object.
+  /// Not the Observer's `link`: the server identifies clients by address. `link` and `board` must outlive this object.
   Operator(Link& link, const Address& server, const Config& config, Board& board);
 
-  /// Returns the reason if the device cannot be controlled. Empty if it can.
-  std::string objection(std::uint32_t device) const;
+  std::string objection(std::uint32_t device) const;  ///< why the device cannot be controlled; empty if it can
 
   /// Starts an order. Returns the reason if it cannot be started, otherwise an empty string.
   std::string press(LocalTime now, std::uint32_t device, Order order);
 
-  /// Performs all work due at `now`. Must be called about 60 times per second.
-  void turn(LocalTime now);
+  void turn(LocalTime now);  ///< performs the work due at `now`; must be called about 60 times per second
 
   void move_to(const Address& server) { server_ = server; }
 
-  /// Ends the session.
-  void stop(LocalTime now);
+  void stop(LocalTime now);  ///< ends the session
 
  private:
   void ask(LocalTime now);

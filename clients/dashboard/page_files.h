@@ -6,7 +6,6 @@
 
 namespace tendon::dash {
 
-/// A file of the page, embedded at build time.
 struct PageFile {
   std::string_view path;  ///< "/index.html"
   std::string_view type;  ///< Content-Type

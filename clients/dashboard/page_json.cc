@@ -17,8 +17,7 @@ using Json = nlohmann::ordered_json;  // preserves the order of the members
 double milliseconds(Duration d) { return std::chrono::duration<double, std::milli>(d).count(); }
 double nanoseconds(PeerTime t) { return static_cast<double>(t.time_since_epoch().count()); }
 
-/// Written as null.
-constexpr double kUntold = std::numeric_limits<double>::quiet_NaN();
+constexpr double kUntold = std::numeric_limits<double>::quiet_NaN();  ///< written as null
 
 Json vector(const Vec3& v) { return {v.x(), v.y(), v.z()}; }
 
@@ -143,8 +142,7 @@ Json engine_json(const std::string& channel, const PeerReport& peer) {
           {"words", link.words}};
 }
 
-/// Rounds to seven digits, enough for plots.
-double plotted(double number) {
+double plotted(double number) {  // rounds to seven digits, enough for plots
   std::array<char, 32> digits;
   const auto end = std::to_chars(digits.data(), digits.data() + digits.size(), static_cast<float>(number)).ptr;
   double shown = 0;

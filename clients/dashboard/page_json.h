@@ -11,8 +11,7 @@
 #include "clients/dashboard/board.h"
 #include "clients/dashboard/recordings.h"
 
-// Messages for the page, one JSON object per WebSocket message. Names contain units. Unknown numbers are null. The
-// fields are listed in README.md.
+// Messages for the page: one JSON object each, units in names, null for unknown numbers. README.md lists the fields.
 
 namespace tendon::dash {
 
@@ -34,8 +33,7 @@ struct Abilities {
 /// {"type":"server",…}: the connection, the devices and their descriptions. Sent after each change.
 std::string server_json(const Board& board, const Abilities& abilities);
 
-/// {"type":"states",…}: received states of one device in columns. Ticks are missing after packet loss or if the page
-/// was too slow.
+/// {"type":"states",…}: states of one device in columns. Ticks are missing after packet loss or if the page is slow.
 std::string states_json(std::uint32_t device, std::span<const DeviceState> states);
 
 /// {"type":"ports",…}: both ends of the coupling of a device, one row for each time.
@@ -47,13 +45,10 @@ std::string reports_json(std::uint32_t device, const Board& board);
 /// [{"name":…,"size_bytes":…,"modified_unix_s":…}, …]
 std::string recordings_json(std::span<const Recordings::Entry> entries);
 
-/// Names used by the page and /metrics: "active", "holding" …
-std::string_view name(Mode mode) noexcept;
-/// "armed", "fault" …
-std::string_view name(Safety safety) noexcept;
+std::string_view name(Mode mode) noexcept;      ///< names used by the page and /metrics: "active", "holding" …
+std::string_view name(Safety safety) noexcept;  ///< "armed", "fault" …
 std::string_view name(Contact contact) noexcept;
-/// "engaged", "clutched" …
-std::string_view name(PortPhase phase) noexcept;
+std::string_view name(PortPhase phase) noexcept;  ///< "engaged", "clutched" …
 std::string_view name(Order order) noexcept;
 /// Name of a bit in core/base/reason.h: "energy", "max_force" …; "bit_20" for bits without a name.
 std::string reason_name(std::size_t bit);

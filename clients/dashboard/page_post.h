@@ -12,9 +12,7 @@
 
 namespace tendon::dash {
 
-/// Messages waiting for one page. The newest wins: a page that does not read costs at most one text of each kind and
-/// kMaxBatches batches of states.
-///
+/// Messages waiting for one page; the newest win: at most one text of each kind and kMaxBatches batches of states.
 /// Thread-safe: no. Realtime-safe: no.
 class PagePost {
  public:
@@ -23,8 +21,7 @@ class PagePost {
     kReports,  //
     kPorts,    //
   };
-  /// Limit of waiting batches: 1/8 s, which a page can catch up without visible delay.
-  static constexpr std::size_t kMaxBatches = 8;
+  static constexpr std::size_t kMaxBatches = 8;  ///< 1/8 s, which a page can catch up without visible delay
 
   void put(Kind kind, std::string text) { newest_[static_cast<std::size_t>(kind)] = std::move(text); }
 
@@ -39,10 +36,8 @@ class PagePost {
   /// Replaces the waiting state of a device that the page does not watch.
   void put_beside(std::uint32_t device, std::string text) { beside_[device] = std::move(text); }
 
-  /// Returns the number of dropped states since the last call.
-  std::uint64_t take_skipped() noexcept { return std::exchange(skipped_, 0); }
+  std::uint64_t take_skipped() noexcept { return std::exchange(skipped_, 0); }  ///< states dropped since the last call
 
-  /// Returns the next text to send, if any.
   std::optional<std::string> next() {
     for (auto& text : newest_) {
       if (text) return std::exchange(text, std::nullopt);
@@ -54,8 +49,7 @@ class PagePost {
     return text;
   }
 
-  /// Discards waiting states after the page has selected another device.
-  void forget_states() {
+  void forget_states() {  // the page has selected another device
     batches_.clear();
     beside_.clear();
     newest_[static_cast<std::size_t>(Kind::kReports)].reset();

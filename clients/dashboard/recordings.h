@@ -30,7 +30,6 @@ class OpenFile {
 };
 
 /// The recordings (*.mcap) in one folder, without subfolders. Names cannot refer to files outside of the folder.
-///
 /// Thread-safe: no. Realtime-safe: no (file access).
 class Recordings {
  public:
@@ -39,25 +38,20 @@ class Recordings {
     std::uint64_t size = 0;      ///< bytes
     double modified_unix_s = 0;  ///< s since 1970-01-01
   };
-  /// Only the newest recordings are listed.
-  static constexpr std::size_t kMaxListed = 1000;
+  static constexpr std::size_t kMaxListed = 1000;  ///< only the newest recordings are listed
 
-  /// Throws std::runtime_error if `folder` is not a folder: "runs: not a folder".
-  explicit Recordings(std::filesystem::path folder);
+  explicit Recordings(std::filesystem::path folder);  ///< throws std::runtime_error "runs: not a folder"
 
-  /// Newest first.
-  std::vector<Entry> list() const;
+  std::vector<Entry> list() const;  ///< newest first
 
-  /// Opens a recording. Returns nullopt if `name` contains a slash, is hidden, is not *.mcap, or is not a regular
-  /// file (including symbolic links).
+  /// Opens a recording; nullopt if `name` has a slash, is hidden, not *.mcap, a symbolic link or no regular file.
   std::optional<OpenFile> open(std::string_view name) const;
 
  private:
   std::filesystem::path folder_;
 };
 
-/// The bytes [first, first + count) of a file.
-struct ByteRange {
+struct ByteRange {  // [first, first + count) of a file
   std::uint64_t first = 0;
   std::uint64_t count = 0;
   bool operator==(const ByteRange&) const = default;

@@ -32,8 +32,7 @@ struct Request {
   bool proxied = false;     ///< forwarded by a proxy: Forwarded, X-Forwarded-For, X-Real-IP or Via
 };
 
-/// A reply, without Date and Connection.
-struct Reply {
+struct Reply {  // without Date and Connection
   struct Slice {
     OpenFile file;
     ByteRange range;
@@ -43,8 +42,7 @@ struct Reply {
   std::variant<std::string, std::string_view, Slice> body{};
 
   std::uint64_t size() const;
-  /// Returns the status line and headers including the empty line.
-  std::string head(bool keep_alive) const;
+  std::string head(bool keep_alive) const;  ///< status line and headers including the empty line
 };
 
 struct LiveSocket {};
@@ -73,16 +71,15 @@ using Answer = std::variant<Reply, LiveSocket, BridgeSocket, FoxgloveSocket>;
 ///
 /// * **Host** must name this machine (localhost, 127.0.0.1, [::1]) or one of Config::hosts. Other names, which may
 ///   result from DNS rebinding, receive 421.
-/// * **Origin** of a WebSocket must be the same host for /live, the same host or one of Config::origins for
-///   /foxglove, and a page on this machine or one of Config::origins for /bridge; otherwise 403. Programs other than
-///   browsers send no Origin. Pages of other origins cannot read any reply, because no CORS header is sent.
+/// * **Origin** of a WebSocket must be the same host for /live, the same host or one of Config::origins for /foxglove,
+///   and a page on this machine or one of Config::origins for /bridge; otherwise 403. Programs other than browsers send
+///   no Origin. Pages of other origins cannot read any reply, because no CORS header is sent.
 /// * **Subprotocol** of /foxglove: the first requested one that is `foxglove.sdk.v1` or `foxglove.websocket.v1`, two
 ///   names for the same protocol; otherwise 400.
-/// * **Orders** such as arming move a machine. They are accepted only from this page in a browser on this machine,
-///   and refused (403) from other machines, through proxies, with another Origin, and without an Origin. A form or
-///   script of another page cannot send the Origin of this page. Since the machine may have other users,
-///   `Authorization: Bearer PASS` must contain the password printed at the start. 202: started; 409: refused, with
-///   the reason.
+/// * **Orders** such as arming move a machine. They are accepted only from this page in a browser on this machine, and
+///   refused (403) from other machines, through proxies, with another Origin, and without an Origin. A form or script
+///   of another page cannot send the Origin of this page. Since the machine may have other users, `Authorization:
+///   Bearer PASS` must contain the password printed at the start. 202: started; 409: refused, with the reason.
 /// * All other paths only support GET and HEAD (405). Unknown paths receive 404. The only name that is looked up in a
 ///   file system is the plain name of a recording.
 ///
@@ -90,17 +87,15 @@ using Answer = std::variant<Reply, LiveSocket, BridgeSocket, FoxgloveSocket>;
 class Routes {
  public:
   struct Config {
-    std::vector<std::string> hosts{};  ///< other names of this machine, with or without ":PORT"
-    /// Origins of pages that may use /bridge and /foxglove: "https://lab.example".
-    std::vector<std::string> origins{};
+    std::vector<std::string> hosts{};    ///< other names of this machine, with or without ":PORT"
+    std::vector<std::string> origins{};  ///< of pages that may use /bridge and /foxglove: "https://lab.example"
   };
   /// Sources of the replies. All must outlive the routes; `recordings` may be null.
   struct Sources {
     std::span<const PageFile> page;
     const Recordings* recordings = nullptr;
     std::function<std::string()> metrics;
-    /// Starts an order. Returns the reason if it cannot be started, otherwise an empty string. If not set, orders are
-    /// refused.
+    /// Starts an order. Returns why it cannot be started, otherwise an empty string. If not set, orders are refused.
     std::function<std::string(std::uint32_t device, Order order)> press{};
     std::string pass{};  ///< password for `press`; must consist of characters allowed in headers and URLs
   };
@@ -109,7 +104,6 @@ class Routes {
 
   Answer answer(const Request& request) const;
 
-  /// Returns a plain-text reply for a refusal or an error.
   static Reply plain(unsigned status, std::string words, std::string_view allowed = "GET, HEAD");
 
  private:

@@ -72,8 +72,7 @@ class ServerSocket : public Link {
   const Address& server() const noexcept { return server_; }
 
  private:
-  /// Leaves the socket unchanged on failure.
-  error_code connect(const Address& server) {
+  error_code connect(const Address& server) {  // leaves the socket unchanged on failure
     error_code error;
     udp::socket connected(context_);
     connected.connect(udp::endpoint(ip_of(server), server.port), error);

@@ -48,8 +48,7 @@ constexpr std::size_t kMaxRefusals = 64;
 /// A refused connection is read for this time and number of bytes, because a reset would discard the reply.
 constexpr Duration kLinger = std::chrono::seconds(1);
 constexpr std::size_t kMaxLingered = 64 * 1024;
-/// Longest message of a page: "watch 15".
-constexpr std::size_t kMaxLine = 64;
+constexpr std::size_t kMaxLine = 64;  ///< longest message of a page: "watch 15"
 /// Longest message of a viewer, which may subscribe to all channels of 16 devices at once.
 constexpr std::size_t kMaxOrder = 16 * 1024;
 /// Kernel buffer for a viewer that does not read, in addition to FoxgloveSession::kMaxBytes. Linux doubles this

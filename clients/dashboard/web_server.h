@@ -15,15 +15,13 @@
 namespace tendon::dash {
 
 /// The sockets of tendon-dash, on one thread: HTTP and WebSockets for pages, one UDP socket for the Observer, and one
-/// for each page on the bridge. The content comes from Routes, Feed, FoxgloveFeed and BridgeGate. Only the source
-/// file uses Boost.Beast and Boost.Asio.
+/// for each page on the bridge. The content comes from Routes, Feed, FoxgloveFeed and BridgeGate.
 ///
 /// * Connections without a complete request after `request_patience`, or that do not read a reply for `patience`, are
-///   closed. WebSockets that are silent for `patience` get a ping, except on the bridge, where pages send every 50
-///   ms.
+///   closed. WebSockets that are silent for `patience` get a ping, except on the bridge, where pages send every 50 ms.
 /// * There are at most `max_connections`, and `max_per_address` from one address (or IPv6 /64 network). If all are in
-///   use, a new connection replaces the one that has waited longest for a request, or receives 503 if none is
-///   waiting. Clients that send nothing or slowly therefore cannot block others.
+///   use, a new connection replaces the one that has waited longest for a request, or receives 503 if none is waiting.
+///   Clients that send nothing or slowly therefore cannot block others.
 /// * All queues are bounded: for a page that does not read, PagePost keeps only the newest messages, FoxgloveSession
 ///   drops the oldest tenths of a second, and BridgeGate drops datagrams.
 ///
@@ -52,8 +50,7 @@ class WebServer {
   ~WebServer();
 
   Address address() const;
-  /// Link to the server for the Observer. Sends datagrams immediately.
-  Link& link();
+  Link& link();  ///< to the server, for the Observer; sends datagrams immediately
 
   /// Runs until SIGINT or SIGTERM, or for `duration` if it is > 0. Calls `turn(now)` when a datagram has arrived over
   /// link(), at the latest at the time that the last `turn` returned. Calls `tick(now)` every Feed::kTick, before the

@@ -9,14 +9,12 @@
 
 namespace tendon::softbody {
 
-/// The statistics of a kNear body. They are empty for other bodies.
-struct Answered {
+struct Answered {  // statistics of a kNear body; empty for other bodies
   std::vector<FallbackModel::Step> levels;
   std::optional<NearModel::Size> near;
 };
 
-/// Returns one line of text, or an empty string if there is nothing to report.
-std::string in_words(const Answered& answered);
+std::string in_words(const Answered& answered);  ///< one line, or empty if there is nothing to report
 
 /// Returns a line of JSON: {"answers":{"tabulated":812,"learned":97,"linear":3,"fields":5,"fields_late":1}}.
 std::string in_json(const Answered& answered);

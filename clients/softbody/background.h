@@ -8,18 +8,15 @@
 
 namespace tendon::softbody {
 
-/// A function that runs work once, on any thread. The work owns its data. If factors_may_work_at_once() is false, it
-/// must not run during an answer.
+/// Runs work once, on any thread; not during an answer unless factors_may_work_at_once(). The work owns its data.
 using Background = std::function<void(std::packaged_task<void()>)>;
 
 /// A worker thread that runs tasks in order. It runs at nice 5, so on a single processor answers take precedence.
-///
 /// Thread-safe: yes. Realtime-safe: give() takes no lock and does not wait.
 class BackgroundThread {
  public:
   BackgroundThread();
-  /// Waits for the running task; drops the others.
-  ~BackgroundThread();
+  ~BackgroundThread();  ///< waits for the running task; drops the others
   BackgroundThread(const BackgroundThread&) = delete;
   BackgroundThread& operator=(const BackgroundThread&) = delete;
 

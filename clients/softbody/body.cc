@@ -255,8 +255,7 @@ std::unique_ptr<Friction> friction_of(const BodyConfig& config) {
   return std::make_unique<Friction>(*config.friction, sideways_stiffness(config.material, config.patch_radius));
 }
 
-/// Thinner tools slip off the points of the layer (layer.h).
-constexpr double kPointsAcrossTool = 4;
+constexpr double kPointsAcrossTool = 4;  ///< thinner tools slip off the points of the layer (layer.h)
 
 RigidContact rigid_contact_of(const BodyConfig& config, QuasiStaticModel& body, const Solid& solid,
                               const TouchSurface& surface) {
@@ -273,7 +272,6 @@ RigidContact rigid_contact_of(const BodyConfig& config, QuasiStaticModel& body, 
   return {body, solid, surface, std::vector<HeldTool>(config.hands, {shape, config.tool_offset}), made};
 }
 
-/// Returns the depth (m) at which the material rotates somewhere by Body::kLargestTurn.
 double linear_limit(const Solid& solid, const TouchSurface& surface, const Patch& patch, const Solver& solver) {
   const VectorXd load = solid.to_free(patch_load(solid, surface.normal(), patch));
   const VectorXd per_newton = solver.solve(load);
@@ -321,7 +319,6 @@ struct Body::Parts {
   Parts(const BodyConfig& config, const SolverOf& solver) : Parts(config, solver, solid_of(checked(config))) {
     if (!config.cuts.empty()) cutting = std::make_unique<Planned>(config, solid.mesh(), solid.fixed(), surface);
   }
-  /// If there are `fields`, they build the near field.
   Parts(const BodyConfig& config, const SolverOf& solver, Solid of, Background fields = {})
       : solid(std::move(of)),
         surface(solid.mesh(), config.towards_tool, config.patch_radius),

@@ -108,11 +108,9 @@ struct FileShape {
 };
 struct NearConfig {
   Law law = Law::kCorotational;
-  /// Uses all unknowns of the interface instead of modes. This is slow.
-  bool exact_interface = false;
-  /// Precompute shapes (`learn`) or an energy table (`tabulate`) for presses within BodyConfig::reach of `middle` along
-  /// each axis. They answer where their error is at most BodyConfig::tolerance. Both require `reach`, at most kFarthest
-  /// patch radii.
+  bool exact_interface = false;  ///< all unknowns of the interface instead of modes; slow
+  /// Precompute shapes (`learn`) or an energy table (`tabulate`) for presses within the required BodyConfig::reach (at
+  /// most kFarthest patch radii) of `middle` along each axis. They answer with errors up to BodyConfig::tolerance.
   bool learn = false;
   bool tabulate = false;
   std::filesystem::path learned_in{};  ///< folder for precomputed results; empty: not stored
@@ -131,8 +129,7 @@ struct BodyConfig {
   std::vector<Region> regions{};  ///< the last one wins where regions overlap
   ModelKind model = ModelKind::kCondensed;
   NearConfig near{};
-  /// The file with the table of a kCondensed body. If it is empty, Body computes the table.
-  std::optional<std::filesystem::path> table_file{};
+  std::optional<std::filesystem::path> table_file{};  ///< table of a kCondensed body; empty: Body computes it
   int max_iterations = QuasiStaticModel::Config{}.max_iterations;
   /// The accepted relative error of the force in iterative models. Feel::error reports the actual error.
   double tolerance = QuasiStaticModel::Config{}.tolerance;
@@ -146,9 +143,8 @@ struct BodyConfig {
 
   Vec3 towards_tool = Vec3::UnitZ();  ///< unit vector, body frame
   double patch_radius = 0;            ///< m
-  /// m, maximum tangential distance from `middle`, for kCondensed
-  std::optional<double> reach;
-  Vec3 middle = Vec3::Zero();  ///< m; only the tangential position counts
+  std::optional<double> reach;        ///< m, maximum tangential distance from `middle`, for kCondensed
+  Vec3 middle = Vec3::Zero();         ///< m; only the tangential position counts
   Tool tool;
   double layer = 1e-4;              ///< m, rigid tools on nonlinear bodies: Layer::Config::thickness
   std::size_t hands = 1;            ///< number of hands, for rigid tools on nonlinear bodies
@@ -159,20 +155,16 @@ struct BodyConfig {
   bool whole_stiffness = false;
 };
 
-/// Returns true if the tool is rigid and the body is nonlinear (RigidContact).
-bool is_rigid_on_nonlinear(const BodyConfig& config);
+bool is_rigid_on_nonlinear(const BodyConfig& config);  ///< the tool is rigid and the body nonlinear (RigidContact)
 
-/// Returns true if contact produces a torque on the hand.
-bool turns_the_hand(const BodyConfig& config);
+bool turns_the_hand(const BodyConfig& config);  ///< true if contact produces a torque on the hand
 
 /// Returns the vector from the handle to the deepest point of the tool, m, in the body frame.
 Vec3 lowest_of_tool(const BodyConfig& config, const Mat3& turn);
 
-/// Returns the simulated effects, including those of the model.
-EffectSet effects_of(const BodyConfig& config);
+EffectSet effects_of(const BodyConfig& config);  ///< simulated effects, including those of the model
 
-/// Returns true if a closed path of the tool loses no energy.
-bool is_elastic(const BodyConfig& config);
+bool is_elastic(const BodyConfig& config);  ///< true if a closed path of the tool loses no energy
 
 /// Computes the table of a kCondensed body. `solver` uses this machine (with_factor) or MPI (mpi/spread_solver.h).
 /// Throws the errors of Body and of the solver.
@@ -185,8 +177,7 @@ Learned learn(const BodyConfig& config, const Tell& tell);
 /// A body with its mesh, model and contact. Thread-safe: no. Realtime-safe: no.
 class Body {
  public:
-  /// Throws std::invalid_argument if the values describe no valid body.
-  explicit Body(const BodyConfig& config);
+  explicit Body(const BodyConfig& config);  ///< throws std::invalid_argument if the values describe no valid body
   /// Uses `solver`. The body must be kLinear, with no effects other than contact and friction.
   Body(const BodyConfig& config, const SolverOf& solver);
   ~Body();
@@ -203,14 +194,12 @@ class Body {
   /// Returns one answer for each hand. An empty pose means that the hand is absent.
   std::vector<Feel> touch(std::span<const std::optional<Pose>> handles);
 
-  /// Cuts and near fields are prepared by `background`, so that no answer waits for them. Until a cut is ready, the
-  /// uncut body answers, and the error is at least the force, because the cut body may push much less. If the work
-  /// throws, the next touch() rethrows the exception. Without this call, answers wait for cuts and build near fields in
-  /// pieces.
+  /// `background` prepares cuts and near fields, so that no answer waits for them; without this call, answers wait for
+  /// cuts and build fields in pieces. Until a cut is ready, the uncut body answers, and the error is at least the
+  /// force, because the cut body may push much less. The next touch() rethrows an exception of this work.
   void prepare_by(Background background);
 
-  /// Sets the time (s). Young's modulus is updated, and cuts are made if they are due.
-  void tick(double time);
+  void tick(double time);           ///< sets the time (s): updates Young's modulus, and makes the cuts that are due
   bool has_clock() const noexcept;  ///< true if tick() has an effect
 
   /// Presses the model with a patch at `middle`. If the body has time, this is one step. settle() repeats this until
@@ -218,12 +207,10 @@ class Body {
   Reaction press(Prescribed given, double value);
   Reaction settle(Prescribed given, double value);
 
-  /// Returns the depth (m) at which the material rotates somewhere by kLargestTurn. If the tool is deeper, a model
-  /// without geometric nonlinearity is wrong, because it treats rotation as strain. Infinite for all other models.
-  /// Computes a factor, unless a table file contains the depth.
+  /// Depth (m) at which the material rotates somewhere by kLargestTurn. Deeper, a model without geometric nonlinearity
+  /// is wrong: it treats rotation as strain. Infinite for other models. Computes a factor unless a table file has it.
   double linear_up_to() const;
-  /// rad; the force on B1 is then too large by 5 to 7 %
-  static constexpr double kLargestTurn = 0.1;
+  static constexpr double kLargestTurn = 0.1;  ///< rad; the force on B1 is then too large by 5 to 7 %
 
   double step() const noexcept;  ///< s; 0: the body is always at rest
 
@@ -239,8 +226,7 @@ class Body {
     std::size_t bytes;
   };
   Size size() const;
-  /// Empty if the model is not kNear.
-  std::optional<NearModel::Size> near_field() const;
+  std::optional<NearModel::Size> near_field() const;  ///< empty if the model is not kNear
   std::vector<FallbackModel::Step> fallbacks() const;
   /// `under_patch` is the number of nodes below the patch at `middle`. Throws the errors of the constructor.
   static Size size_of(const BodyConfig& config, int& under_patch);

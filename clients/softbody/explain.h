@@ -12,11 +12,9 @@
 
 namespace tendon::softbody {
 
-/// The report of `tendon-softbody explain SCENE`: the effects of a scene and their costs.
-///
-/// The costs are measured on this machine. The cost of an answer is the mean processor time while a tool presses 3 mm
-/// into the body and returns, and the minimum of up to 4 rounds. The cost of an effect is the difference to the same
-/// scene without the effect, and can be negative.
+/// The report of `tendon-softbody explain SCENE`: the effects of a scene and their costs, measured on this machine. The
+/// cost of an answer is the mean processor time while a tool presses 3 mm into the body and returns, and the minimum of
+/// up to 4 rounds. The cost of an effect is the difference to the same scene without the effect, and can be negative.
 struct Explanation {
   struct Cost {
     double answer_s = 0;
@@ -38,14 +36,12 @@ struct Explanation {
   };
   std::optional<Tool> tool;
   std::optional<double> off_exact;
-  /// The background thread. Empty if it makes no fields.
-  struct Beside {
+  struct Beside {  // the background thread; empty if it makes no fields
     double field_s = 0;
     std::size_t bytes = 0;
   };
   std::optional<Beside> beside;
-  /// The cost of an answer for each level of the FallbackModel.
-  struct Learned {
+  struct Learned {  // the cost of an answer for each level of the FallbackModel
     FallbackLevel::Size size;
     double answer_s = 0;
   };

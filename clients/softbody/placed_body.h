@@ -23,12 +23,11 @@ class PlacedBody {
   Feel touch(const Vec3& position) { return touch(Pose{.position = position}); }
   Feel touch(const Pose& handle);
 
-  /// Returns the answer for the server. It contains the torque if turns_the_hand() is true, and the angular stiffness
-  /// if the device measures the orientation of the handle. If Scene::table is set, it contains the force at several
-  /// depths. The table starts at the surface, or half of its depth above the tool if the tool is deeper.
-  ///
-  /// If the body has time, the tool moves from the previous position to this one in steps. If no step fits between the
-  /// samples, the previous answer is repeated. After a pause of more than kMostBehind, there is only one step.
+  /// Returns the answer for the server, with the torque if turns_the_hand(), the angular stiffness if the device
+  /// measures the orientation of the handle, and the force at several depths if Scene::table is set, from the surface
+  /// or from half of the table's depth above a deeper tool. If the body has time, the tool moves from the previous
+  /// position to this one in steps. If no step fits between the samples, the previous answer is repeated. After a pause
+  /// of more than kMostBehind, there is only one step.
   Touch answer(const DeviceState& hand);
   static constexpr Duration kMostBehind = std::chrono::milliseconds(200);
 

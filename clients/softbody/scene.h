@@ -27,8 +27,7 @@ struct Scene {
   double table = 0;  ///< m, depth range of the force table in an answer; 0: no table
 };
 
-/// Returns the rotation from the body frame to the device frame.
-Mat3 to_device(const Scene& scene);
+Mat3 to_device(const Scene& scene);  ///< rotation from the body frame to the device frame
 
 /// Reads a scene file (TOML). The effects in the file must include all effects that the model always simulates, and
 /// only effects that it supports. Throws SceneError, or std::runtime_error if the file cannot be read.
@@ -37,20 +36,17 @@ Scene read_scene(const std::filesystem::path& file);
 /// Mesh files are relative to `directory`. `name` is used in error messages.
 Scene parse_scene(std::string_view text, const std::string& name, const std::filesystem::path& directory);
 
-/// Returns the description of all keys of a scene.
-std::string scene_reference();
+std::string scene_reference();  ///< description of all keys of a scene
 
 /// Returns the warnings about the body and its files. Throws std::invalid_argument if a file cannot be read.
 std::vector<std::string> warnings(const BodyConfig& body);
-/// Writes each warning as a line "PROGRAM: warning: …".
-void warn(std::ostream& to, std::string_view program, const BodyConfig& body);
+void warn(std::ostream& to, std::string_view program, const BodyConfig& body);  ///< lines "PROGRAM: warning: …"
 
 /// Returns the depth (m) up to which a patch of fixed size is valid on a nonlinear body. Infinite for other models and
 /// tools. beyond_the_patch() returns the warning for deeper tools.
 double patch_up_to(const BodyConfig& body);
 std::string beyond_the_patch(const BodyConfig& body);
 
-/// Returns the warning for a tool that is deeper than Body::linear_up_to().
-std::string turned_too_far(double linear_up_to);
+std::string turned_too_far(double linear_up_to);  ///< warning for a tool that is deeper than Body::linear_up_to()
 
 }  // namespace tendon::softbody

@@ -29,8 +29,7 @@ using namespace tendon;
 
 namespace {
 
-/// The self-test stays on the surface.
-constexpr double kWay = 0.003;
+constexpr double kWay = 0.003;  ///< the self-test stays on the surface
 
 constexpr std::chrono::seconds kBetweenLines{10};
 
@@ -123,7 +122,6 @@ void prepare_beside(const softbody::Scene& scene, std::optional<softbody::Backgr
             << ", because this OpenBLAS only supports one thread; install libopenblas0-pthread\n";
 }
 
-/// Returns the exit code.
 int answer(const softbody::Scene& scene, const Options& options, softbody::PlacedBody& body) {
   const double linear_up_to = body.linear_up_to();
   const double patch_up_to = softbody::patch_up_to(scene.body);

@@ -37,11 +37,9 @@ using Tool = std::variant<PatchTool, SphereTool, CapsuleTool, BoxTool, MeshTool>
 inline bool is_patch(const Tool& tool) { return std::holds_alternative<PatchTool>(tool); }
 inline bool is_sphere(const Tool& tool) { return std::holds_alternative<SphereTool>(tool); }
 
-/// Returns the name with an article: "a sphere".
-std::string_view name_of(const Tool& tool);
+std::string_view name_of(const Tool& tool);  ///< with an article: "a sphere"
 
-/// Returns the radius in m, or 0 for a box and a mesh.
-double radius_of(const Tool& tool);
+double radius_of(const Tool& tool);  ///< radius in m, or 0 for a box and a mesh
 
 /// Returns the shape of a rigid tool. A patch is treated as a sphere. `layer` is Layer::Config::thickness. A mesh needs
 /// some tenths of a second for its grid. Throws std::invalid_argument if the file is invalid.

@@ -41,8 +41,7 @@ namespace {
 using chai3d::Host;
 using chai3d::SharedHands;
 
-/// A CHAI3D program counts its devices only once, at its start. It is therefore started when all devices have
-/// answered, or after this time.
+/// A CHAI3D program counts its devices only at its start, so it is started after all have answered, or this time.
 constexpr Duration kBeforeTheProgram = std::chrono::seconds(1);
 constexpr int kMaxWakes = 64;  ///< wake-ups read in one turn; the program sends one for each force
 
@@ -57,8 +56,7 @@ struct Options {
 
 [[noreturn]] void fail(const std::string& what) { throw std::runtime_error(what + ": " + std::strerror(errno)); }
 
-/// Shared with the program. It exists as long as one of the two processes.
-class Memory {
+class Memory {  // shared with the program; exists as long as either process
  public:
   Memory() : file_(::memfd_create("tendon-chai3d", MFD_CLOEXEC)) {
     if (file_ < 0 || ::ftruncate(file_, sizeof(SharedHands)) != 0) fail("cannot create shared memory");

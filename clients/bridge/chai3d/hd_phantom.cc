@@ -32,8 +32,7 @@ namespace tendon::bridge::chai3d {
 namespace {
 
 constexpr std::int64_t kMillisecond = 1'000'000;
-/// CHAI3D counts its devices only once, at the start.
-constexpr std::int64_t kLongestCount = 400 * kMillisecond;
+constexpr std::int64_t kLongestCount = 400 * kMillisecond;  ///< CHAI3D counts its devices only once, at the start
 /// Older states are not used, because the bridge or the server has stopped.
 constexpr std::int64_t kOldestState = 500 * kMillisecond;
 constexpr std::int64_t kLongestPace = 2 * kMillisecond;
@@ -48,8 +47,7 @@ std::int64_t now_ns() noexcept {
   return time.tv_sec * 1'000'000'000 + time.tv_nsec;
 }
 
-/// A spin lock for writers. It is only held for about 30 stores. Acquiring it fails after some attempts, in case the
-/// holding thread was killed.
+/// A spin lock for writers, held for about 30 stores. Acquiring it fails after some attempts, if its holder was killed.
 class Turnstile {
  public:
   explicit Turnstile(std::atomic_flag& flag) noexcept : flag_(flag) {
@@ -175,8 +173,7 @@ bool read(int id, HandNow& hand) noexcept {
   return now_ns() - hand.at_ns <= kOldestState;
 }
 
-/// Blocks until a state arrives that this thread has not read, for at most kLongestPace. The haptic loops of CHAI3D
-/// do not sleep themselves.
+/// Blocks until a new state for this thread, at most kLongestPace: the haptic loops of CHAI3D do not sleep themselves.
 void pace(int id) noexcept {
   Attached& memory = attached();
   if (memory.hands()->paced == 0 || !pacer.waits(id)) return;

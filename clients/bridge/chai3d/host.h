@@ -12,21 +12,17 @@
 
 namespace tendon::bridge::chai3d {
 
-/// The tendon-bridge side of the memory shared with a CHAI3D program. It transfers states to the program, in the frame
-/// of CHAI3D, and requests of the program to the BridgedDevice. This class does not use sockets, clocks or threads.
-///
-/// A force requested at time t is valid until t + Config::stale, independent of when it is read here. A program with
-/// a low frame rate must not apply its last force for long.
-///
-/// Thread-safe: no. Realtime-safe: no.
+/// The tendon-bridge side of the memory shared with a CHAI3D program, without sockets, clocks or threads. It transfers
+/// states to the program, in the frame of CHAI3D, and requests of the program to the BridgedDevice. A force requested
+/// at time t is valid until t + Config::stale, independent of when it is read here, because a program with a low frame
+/// rate must not apply its last force for long. Thread-safe: no. Realtime-safe: no.
 class Host {
  public:
   struct Config {
     Duration stale = std::chrono::milliseconds(50);
     std::string model{};  ///< device model, from which CHAI3D derives limits; at most 254 bytes
   };
-  /// Workspace radius reported to CHAI3D if the device has no described workspace, m.
-  static constexpr double kWorkspaceRadius = 0.1;
+  static constexpr double kWorkspaceRadius = 0.1;  ///< m, reported to CHAI3D if the device describes no workspace
 
   /// `hands` must outlive this object and contain the number of devices.
   Host(SharedHands& hands, Config config) : hands_(hands), config_(std::move(config)) {}
@@ -35,9 +31,7 @@ class Host {
   /// BridgedDevice should then be turned again so that the force is sent immediately.
   bool exchange(std::size_t i, BridgedDevice& bridged, LocalTime now);
 
-  /// Must be called after all devices. Announces news to the program. Returns true if one of its threads must be
-  /// woken.
-  bool announce();
+  bool announce();  ///< must be called after all devices; true if a thread of the program must be woken
 
  private:
   struct Device {

@@ -14,9 +14,7 @@ namespace tendon::bridge::chai3d {
 // other. Values are in the frame of CHAI3D, x to the user, y right, z up, in SI units. Times are CLOCK_MONOTONIC in
 // ns.
 
-/// A value protected by a sequence lock, shared between processes. If a writer dies during put(), get() fails but
-/// does not block.
-///
+/// A value under a sequence lock, shared between processes. If a writer dies in put(), get() fails but does not block.
 /// Thread-safe: one writer at a time, any number of readers. Realtime-safe: yes.
 template <typename T>
 class Box {
@@ -34,8 +32,7 @@ class Box {
     turn_.store(turn + 1, std::memory_order_release);
   }
 
-  /// Returns false and leaves `value` unchanged before the first put(), or if a write is in progress in kTries
-  /// attempts.
+  /// Returns false, with `value` unchanged, before the first put() or if a write is in progress in kTries attempts.
   bool get(T& value) const noexcept {
     std::array<std::uint64_t, kWords> words;
     for (int i = 0; i < kTries; ++i) {
@@ -99,8 +96,7 @@ struct SharedHands {
   std::array<SharedDevice, kMaxDevices> device;
 };
 
-/// Environment variables for the library: the path of the memory, /proc/PID/fd/N, and the abstract name of the socket
-/// that wakes tendon-bridge.
+/// Environment of the library: path of the memory, /proc/PID/fd/N; abstract name of the socket that wakes the bridge.
 inline constexpr const char* kMemoryVariable = "TENDON_CHAI3D_MEMORY";
 inline constexpr const char* kWakeVariable = "TENDON_CHAI3D_WAKE";
 

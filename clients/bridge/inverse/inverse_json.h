@@ -53,15 +53,12 @@ namespace tendon::bridge {
 /// otherwise returns nullopt. 24 of the 48 permutations are left-handed.
 std::optional<Mat3> basis_of(std::string_view permutation);
 
-/// Returns the frame of a client: the frame of the service, rotated by B.
-Frame inverse_frame(const Mat3& basis);
+Frame inverse_frame(const Mat3& basis);  ///< frame of a client: the frame of the service, rotated by B
 
-/// The commands for one device.
 struct DeviceWish {
   std::string device_id;
   std::optional<std::string> permutation;
-  /// From a force command: the force in the frame of the client, N, acting on the hand; torque in N·m, grip force in
-  /// N.
+  /// From a force command: force in the frame of the client, N, acting on the hand; torque in N·m, grip force in N.
   std::optional<Vec3> force;
   std::optional<Vec3> torque;
   std::optional<double> grip_force;
@@ -80,12 +77,11 @@ inline constexpr std::size_t kLongestMessage = 64 * 1024;  ///< bytes; 16 device
 inline constexpr int kDeepest = 16;                        ///< nesting depth; valid messages have 5
 inline constexpr std::size_t kMostRefusals = 8;            ///< per reply
 
-/// Parses a message. Never throws. Messages that are too long, too deep or not a JSON object, or that contain numbers
-/// outside of the range of double (1e999), set `read` to false. Invalid commands are refused individually.
+/// Parses a message. Never throws. `read` is false if it is too long, too deep or not a JSON object, or if a number
+/// exceeds double (1e999). Invalid commands are refused individually.
 Wish read_wish(std::string_view text);
 
-/// Reply for one device, in the frame of the client.
-struct DeviceNews {
+struct DeviceNews {  // for one device, in the frame of the client
   struct State {
     Vec3 position;
     Vec3 velocity;
@@ -120,7 +116,6 @@ struct News {
 
 std::string to_json(const News& news);
 
-/// Returns the id of a device: eight hexadecimal digits, computed from its name.
-std::string id_of(std::string_view name);
+std::string id_of(std::string_view name);  ///< id of a device: eight hexadecimal digits, computed from its name
 
 }  // namespace tendon::bridge

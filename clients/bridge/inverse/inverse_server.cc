@@ -52,8 +52,7 @@ constexpr Duration kSilence = std::chrono::seconds(30);
 /// The maximum number of connections without a complete request. Further connections are closed immediately.
 constexpr std::size_t kMostWaiting = 16;
 constexpr std::uint32_t kLongestRequest = 16 * 1024;
-/// After a plain HTTP response, the connection is read for this time and number of bytes, because a reset would
-/// discard the response.
+/// After a plain HTTP response, the connection is read for this time and size, because a reset would discard it.
 constexpr Duration kLinger = std::chrono::seconds(1);
 constexpr std::size_t kMostLingered = 64 * 1024;
 
@@ -73,8 +72,7 @@ auto waiting_time(Duration d) {
   return std::chrono::duration_cast<asio::steady_timer::duration>(std::max(d, Duration::zero()));
 }
 
-/// A socket of the BridgeHost, watched through a duplicated descriptor because the BridgeHost may close its own at any
-/// time.
+/// A socket of the BridgeHost, watched through a duplicated descriptor: the BridgeHost may close its own at any time.
 struct WatchedSocket {
   std::uint64_t number = 0;  ///< 1, 2, 3 …; lets handlers of a closed socket detect that it was replaced
   ino_t id = 0;              ///< inode; unlike descriptor numbers, it is not reused immediately
@@ -104,8 +102,7 @@ struct InverseShared {
   std::function<void()> read_one{};  ///< called after a message was read
 };
 
-/// One connection from its request until it is closed. Deleted only after it is closed and has no pending operations,
-/// so that handlers can use `this`.
+/// One connection, deleted only when it is closed without pending operations, so that handlers can use `this`.
 class InverseConnection {
  public:
   InverseConnection(InverseShared& shared, tcp::socket socket) : shared_(shared), stream_(std::move(socket)) {

@@ -13,18 +13,15 @@
 
 namespace tendon::bridge {
 
-/// The WebSocket server of the bridge. It uses one thread; each client has an InverseSession, and all share one
-/// BridgeHost. Only the source file uses Boost.Beast and Boost.Asio.
+/// The WebSocket server of the bridge, on one thread. Each client has an InverseSession; all share one BridgeHost.
 ///
 /// * **Turns.** A turn reads at most kMostMessages of each client and 256 in total. Their forces are sent before the
 ///   replies are written, and the replies contain the newest states.
 /// * **Messages** may be text or binary, because some clients send JSON as bytes. Replies are text.
-/// * **Limits.** Clients beyond `max_clients` receive status 503. A message above 64 kB closes the connection (1009).
-///   A client with more than `max_unread` bytes of unread replies is not read, and is closed after it has read
-///   nothing for `patience`. Connections without a complete request after `request_patience` are closed; at most 16
-///   may be waiting.
-/// * **Browsers.** Requests with an Origin must pass may_come_from() or receive status 403. Other programs send no
-///   Origin.
+/// * **Limits.** Clients beyond `max_clients` receive status 503. A message above 64 kB closes the connection (1009). A
+///   client with more than `max_unread` bytes of unread replies is not read, and is closed if it reads nothing for
+///   `patience`. Connections without a complete request after `request_patience` are closed; at most 16 may be waiting.
+/// * **Browsers.** Requests with an Origin must pass may_come_from() or receive status 403. Other programs send none.
 /// * **Plain HTTP** requests receive status 404 with an explanation.
 ///
 /// Thread-safe: no. Realtime-safe: no.
@@ -49,8 +46,7 @@ class InverseServer {
   Address address() const;
   const InverseCounts& counts() const noexcept;
 
-  /// Runs until SIGINT or SIGTERM, or for `duration` if it is > 0.
-  void run(Duration duration);
+  void run(Duration duration);  ///< runs until SIGINT or SIGTERM, or for `duration` if it is > 0
 
  private:
   struct State;  // hides Beast

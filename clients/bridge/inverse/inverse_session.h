@@ -13,8 +13,7 @@
 
 namespace tendon::bridge {
 
-/// A device as presented to the clients of the bridge.
-struct InverseDevice {
+struct InverseDevice {  // as presented to the clients of the bridge
   std::string name;
   std::string id;
   std::string grip_id;
@@ -24,8 +23,7 @@ struct InverseDevice {
 /// Returns the devices with unique ids. The bridged devices must outlive the result.
 std::vector<InverseDevice> inverse_devices(std::span<const std::pair<std::string, BridgedDevice*>> all_bridged);
 
-/// Counters of the bridge for all clients.
-struct InverseCounts {
+struct InverseCounts {  // of all clients
   std::uint64_t clients = 0;
   std::uint64_t messages = 0;
   std::uint64_t skipped = 0;  ///< messages not read, because one client sent too many and a newer one was available
@@ -34,21 +32,16 @@ struct InverseCounts {
   std::uint64_t ignored = 0;
 };
 
-/// The conversation with one client: a first message, then exactly one reply for each message of the client. This
-/// class does not use sockets or clocks.
+/// The conversation with one client, without sockets or clocks: a first message, then one reply for each message.
 ///
 /// * A force is sent once with the validity kFresh, which must be `client.valid_for` of the bridged devices. After a
 ///   client falls silent or leaves, the server holds, fades and stops the last force (protocol/SESSION.md).
 /// * At most one force is sent for each state, or every kPace while no state arrives, because clients send as fast as
 ///   they receive replies. The newest force waits for the next state and replaces an older waiting one.
-/// * A message contains the complete request for a device: without `tendon`, set_cursor_force requests no torque. A
-///   message without both requests nothing.
-/// * A zero force does not make a client the owner of the device, because clients send it only to obtain replies. It
-///   counts only if the client is the owner already.
-/// * The newest message of a batch is always read. Older messages are read up to kMostPerSecond; beyond that, they
-///   are answered and counted but not read.
-/// * Replies contain the newest state. A button that was pressed in any state since the previous reply is reported as
-///   pressed.
+/// * A message is the complete request for a device: set_cursor_force without `tendon` requests no torque.
+/// * A zero force counts only from the owner: other clients send it to obtain replies.
+/// * Of a batch, the newest message is always read, others up to kMostPerSecond; the rest is answered and counted.
+/// * Replies contain the newest state. A button pressed in any state since the previous reply counts as pressed.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class InverseSession {
@@ -60,17 +53,13 @@ class InverseSession {
   /// `devices` and `counts` must outlive the session. `program` identifies this client at the bridged devices.
   InverseSession(BridgedDevice::Program program, std::span<const InverseDevice> devices, InverseCounts& counts,
                  LocalTime now);
-  /// Releases the devices that it owns.
-  ~InverseSession();
+  ~InverseSession();  ///< releases the devices that it owns
   InverseSession(const InverseSession&) = delete;
   InverseSession& operator=(const InverseSession&) = delete;
 
-  /// Returns the first message to the client.
-  std::string greeting(LocalTime now);
-  /// Returns one reply for each message, in the same order.
-  std::vector<std::string> answer(LocalTime now, std::span<const std::string> messages);
-  /// Must be called after each turn of the bridged devices and at due(). Returns whether a waiting force will be sent
-  /// in the next turn.
+  std::string greeting(LocalTime now);  ///< first message to the client
+  std::vector<std::string> answer(LocalTime now, std::span<const std::string> messages);  ///< one for each, in order
+  /// Must be called after each turn of the bridged devices and at due(). True if the next turn sends a waiting force.
   bool see(LocalTime now);
   /// Time at which a waiting force is sent even without a new state; LocalTime::max(): none is waiting.
   LocalTime due() const noexcept;

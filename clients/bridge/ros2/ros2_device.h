@@ -54,7 +54,6 @@ class RosDevice {
   /// `bridged` must outlive this object.
   RosDevice(BridgedDevice& bridged, Config config) : bridged_(bridged), config_(std::move(config)) {}
 
-  /// The messages that are due.
   struct Messages {
     std::optional<RosPose> pose{};
     std::optional<RosTwist> twist{};
@@ -68,16 +67,13 @@ class RosDevice {
 
   /// Handles a `wrench_command`. `writer` identifies the program in DDS, and `called` is its name in messages.
   void take(std::uint64_t writer, std::string_view called, const RosWrench& command, LocalTime now);
-  /// Releases the device from all programs that are not in `writers`, the current publishers.
-  void keep(std::span<const std::uint64_t> writers);
+  void keep(std::span<const std::uint64_t> writers);  ///< releases the device from all but these publishers
 
-  /// Returns the status for /diagnostics since the previous call.
-  RosDiagnosis diagnosis();
+  RosDiagnosis diagnosis();  ///< status for /diagnostics since the previous call
 
   std::uint64_t refused() const noexcept { return refused_; }  ///< commands with an invalid frame, value or program
 
-  /// Returns the next message about a change. Empty: none.
-  std::optional<std::string> next_sentence();
+  std::optional<std::string> next_sentence();  ///< message about a change; empty: none
 
  private:
   struct Program {

@@ -26,39 +26,33 @@ struct RosHeader {
   RosTime stamp;
   std::string frame_id;
 };
-/// geometry_msgs/PoseStamped
-struct RosPose {
+struct RosPose {  // geometry_msgs/PoseStamped
   RosHeader header;
   Vec3 position = Vec3::Zero();
   Quat orientation;
 };
-/// geometry_msgs/TwistStamped
-struct RosTwist {
+struct RosTwist {  // geometry_msgs/TwistStamped
   RosHeader header;
   Vec3 linear = Vec3::Zero();
   Vec3 angular = Vec3::Zero();
 };
-/// geometry_msgs/WrenchStamped
-struct RosWrench {
+struct RosWrench {  // geometry_msgs/WrenchStamped
   RosHeader header;
   Vec3 force = Vec3::Zero();
   Vec3 torque = Vec3::Zero();
 };
-/// sensor_msgs/Joy
-struct RosJoy {
+struct RosJoy {  // sensor_msgs/Joy
   RosHeader header;
   std::vector<float> axes;
   std::vector<std::int32_t> buttons;
 };
-/// sensor_msgs/JointState, without efforts
-struct RosJointState {
+struct RosJointState {  // sensor_msgs/JointState, without efforts
   RosHeader header;
   std::vector<std::string> name;
   std::vector<double> position;
   std::vector<double> velocity;
 };
-/// diagnostic_msgs/DiagnosticStatus
-struct RosDiagnosis {
+struct RosDiagnosis {  // diagnostic_msgs/DiagnosticStatus
   enum class Level : std::uint8_t { kOk = 0, kWarn = 1, kError = 2 };
   Level level = Level::kOk;
   std::string name;
@@ -67,8 +61,7 @@ struct RosDiagnosis {
   std::vector<std::pair<std::string, std::string>> values;
 };
 
-/// Requires `since_1970` ≥ 0.
-RosTime ros_time(Duration since_1970);
+RosTime ros_time(Duration since_1970);  ///< requires `since_1970` ≥ 0
 
 /// Converts a device name for use in topics and frames: replaces all characters except ASCII letters, digits and "_"
 /// by "_", and inserts "_" before a leading digit.
@@ -86,14 +79,10 @@ class RosView {
   const std::string& base_id() const noexcept { return base_id_; }          ///< "right_base"
   const std::string& operator_id() const noexcept { return operator_id_; }  ///< "right_operator"
 
-  /// The orientation is the identity if the device does not measure it.
-  RosPose pose(const DeviceState& state, RosTime stamp) const;
-  /// In the axes of the base. The angular velocity is 0 if it is not measured.
-  RosTwist twist(const DeviceState& state, RosTime stamp) const;
-  /// The force that the device applies; the torque is about the position of the handle.
-  RosWrench wrench(const DeviceState& state, RosTime stamp) const;
+  RosPose pose(const DeviceState& state, RosTime stamp) const;      ///< identity if the orientation is not measured
+  RosTwist twist(const DeviceState& state, RosTime stamp) const;    ///< base axes; ω is 0 if it is not measured
+  RosWrench wrench(const DeviceState& state, RosTime stamp) const;  ///< applied; torque about the handle's position
 
-  /// The force requested by a `wrench_command`.
   struct Wish {
     Vec3 force = Vec3::Zero();  ///< N and N·m, acting on the hand, device base frame
     Vec3 torque = Vec3::Zero();

@@ -13,12 +13,10 @@
 
 namespace tendon::bridge {
 
-/// The DDS side of the bridge: one participant of Eclipse Cyclone DDS in one ROS domain. Topic `/a/b` is the DDS
-/// topic `rt/a/b`. Types have the DDS names of ROS 2 types (ros2_types.idl). Data is CDR, XCDR1, without type
-/// information.
+/// The DDS side of the bridge: one participant of Eclipse Cyclone DDS in one ROS domain. Topic `/a/b` is the DDS topic
+/// `rt/a/b`. Types have the DDS names of ROS 2 types (ros2_types.idl). Data is CDR, XCDR1, without type information.
 ///
-/// * Writers: reliable, keep last 1, volatile, max_blocking_time 0. They match reliable and best-effort readers, keep
-///   one message for slow readers, and never block.
+/// * Writers: reliable, keep last 1, volatile, max_blocking_time 0. They match all readers, and never block.
 /// * Readers of `wrench_command`: best effort, keep last 1, volatile, so the newest message wins.
 /// * Without Config::interface, only the loopback interface is used, with unicast discovery: participants of this
 ///   machine with the indices 0 … 99 are contacted once per second, and participants that use loopback are found
@@ -45,8 +43,7 @@ class Ros2Node {
   Ros2Node(const Ros2Node&) = delete;
   Ros2Node& operator=(const Ros2Node&) = delete;
 
-  /// Readable after a command or a change of publishers, until clear().
-  int descriptor() const noexcept;
+  int descriptor() const noexcept;  ///< readable after a command or a change of publishers, until clear()
   void clear();
 
   struct Command {
@@ -54,8 +51,7 @@ class Ros2Node {
     std::string called;  ///< name for messages
     RosWrench wrench;
   };
-  /// Returns the newest command for the device, if there is a new one.
-  std::optional<Command> take(std::size_t device);
+  std::optional<Command> take(std::size_t device);  ///< newest command for the device, if there is a new one
   /// Returns the publishers of commands for the device; empty: unchanged since the last call.
   std::optional<std::vector<std::uint64_t>> writers_if_changed(std::size_t device);
 

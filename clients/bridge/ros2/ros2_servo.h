@@ -23,7 +23,6 @@ class RosServo {
  public:
   enum class Kind : std::uint8_t { kTwist, kPose };
 
-  /// `frame_id` is written to the headers.
   RosServo(Kind kind, double scale, std::string frame_id)
       : kind_(kind), scale_(scale), frame_id_(std::move(frame_id)) {}
 
@@ -33,8 +32,7 @@ class RosServo {
   };
   /// `pose` and `twist` must be of the same state, in the base frame of the device.
   Output take(const RosPose& pose, const RosTwist& twist, bool held);
-  /// Must be called while there is no session.
-  void lose() { hand_.reset(); }
+  void lose() { hand_.reset(); }  ///< must be called while there is no session
 
  private:
   struct Hand {

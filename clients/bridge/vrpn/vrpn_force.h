@@ -17,15 +17,13 @@ struct Hand {
   Vec3 velocity = Vec3::Zero();  ///< m/s
 };
 
-/// A plane with the state of its friction bristle.
 struct Surface {
   Plane plane;                 ///< with a unit normal
   std::optional<Vec3> foot{};  ///< end point of the bristle; empty: the hand is outside
   bool slips = false;
 };
 
-/// The forces that a program has requested for a device. There can be a force field and four planes. The force is
-/// their sum:
+/// The forces that a program has requested for a device, the sum of a force field and four planes:
 ///
 ///     plane    gap = (n·x + d) / |n|          negative: the hand is inside
 ///              N = k (−gap) − b n·v, ≥ 0      along +n; k = spring · stiffest, spring clamped to 0 … 1
@@ -36,8 +34,8 @@ struct Surface {
 ///                                             dynamic μ until the hand reverses
 ///
 /// A single plane is also sent as a Contact, so that it never pulls between two answers. In combination with other
-/// forces it is not, because a Contact would remove their pull. Coefficients are clamped to 0 … 1, as in VRPN's
-/// server, and the dynamic coefficient to the static one.
+/// forces it is not, because a Contact would remove their pull. Coefficients are clamped to 0 … 1, as in VRPN's server,
+/// and the dynamic coefficient to the static one.
 ///
 /// Thread-safe: no. Realtime-safe: yes.
 class Drawing {
@@ -45,18 +43,14 @@ class Drawing {
   static constexpr std::size_t kPlanes = 4;
   static constexpr double kLeastDamping = 0.1;
   static constexpr double kBristle = 0.2e-3;  ///< m
-  /// Minimum ratio of dynamic to static friction. A bristle with zero deflection would have no slip direction and
-  /// would stick again immediately.
+  /// Least ratio of dynamic to static friction: without deflection a bristle has no slip direction, and sticks again.
   static constexpr double kLeastSlip = 0.1;
 
-  /// Replaces the field. A field without force and jacobian removes it.
-  void draw(const ForceField& field);
-  /// Replaces the plane with that index; false if the index is invalid. A zero normal removes it.
-  bool draw(const Plane& plane);
+  void draw(const ForceField& field);  ///< replaces the field; one without force and jacobian removes it
+  bool draw(const Plane& plane);       ///< replaces the plane of its index, false if invalid; a zero normal removes it
   bool empty() const;
 
-  /// Returns the force on the hand in the frame of the program. `stiffest` is the stiffness (N/m) of a plane with
-  /// spring 1. Updates the bristles.
+  /// Returns the force on the hand in the program's frame. `stiffest` (N/m) is that of spring 1. Updates the bristles.
   Touch touch(const Hand& hand, double stiffest);
 
  private:
@@ -66,25 +60,22 @@ class Drawing {
   std::array<std::optional<Surface>, kPlanes> surfaces_;
 };
 
-/// Transforms to the device base frame.
-Touch in_base_frame(Touch touch, const View& view);
+Touch in_base_frame(Touch touch, const View& view);  ///< transforms to the device base frame
 
-/// Decides whether the requests of a program are still valid. VRPN has no heartbeat, so a frozen program cannot be
-/// distinguished from one that wants a constant force. A program that sends continuously, however, is known to have
-/// stopped:
+/// Decides whether the requests of a program are still valid. VRPN has no heartbeat, so a frozen program looks like one
+/// that wants a constant force. A program that sends continuously, however, is known to have stopped:
 ///
 ///     stale after 10 × the median interval of the last 8, 100 ms … 2 s, once three are known
 ///
-/// Messages within 10 ms count as one, because a burst of settings at the start is not a stream. Before three
-/// intervals are known, or if their median is above 2 s, requests are valid as long as the connection.
+/// Messages within 10 ms count as one, because a burst of settings at the start is not a stream. Before three intervals
+/// are known, or if their median is above 2 s, requests are valid as long as the connection.
 ///
 /// Thread-safe: no. Realtime-safe: yes.
 class Freshness {
  public:
   void heard(LocalTime now);
   void forget() { *this = {}; }
-  /// Returns LocalTime::max() if requests are valid as long as the connection.
-  LocalTime until() const;
+  LocalTime until() const;  ///< LocalTime::max() if requests are valid as long as the connection
 
  private:
   static constexpr std::size_t kGaps = 8;

@@ -14,7 +14,6 @@
 // Encoding of VRPN messages. VRPN.md specifies each layout, and GOLDEN.md contains golden messages, which a test
 // compares with these functions. All numbers are big-endian. The input is untrusted: read functions return nothing if
 // bytes are missing, left over, or contain numbers that are not finite.
-//
 // Thread-safe, realtime-safe: yes, except functions that append to a vector.
 
 namespace tendon::bridge::vrpn {
@@ -24,17 +23,12 @@ using Buffer = std::vector<std::byte>;
 
 inline constexpr std::size_t kCookieSize = 24;
 inline constexpr std::size_t kHeaderSize = 24;
-/// Maximum payload with padding; the size of VRPN's TCP buffer. The connection is closed if a message is longer.
-inline constexpr std::size_t kLongestPayload = 64000;
-/// Maximum datagram; the size of VRPN's UDP buffer, which is an Ethernet frame without its headers.
-inline constexpr std::size_t kLongestDatagram = 1472;
-/// Maximum length of a sender or type name, without its zero.
-inline constexpr std::size_t kLongestName = 99;
-/// Limit of the sender and type numbers, which each side assigns itself.
-inline constexpr std::int32_t kMostNumbers = 2000;
+inline constexpr std::size_t kLongestPayload = 64000;  ///< padded, VRPN's TCP buffer; longer ones close the connection
+inline constexpr std::size_t kLongestDatagram = 1472;  ///< VRPN's UDP buffer: an Ethernet frame without headers
+inline constexpr std::size_t kLongestName = 99;        ///< maximum length of a sender or type name, without its zero
+inline constexpr std::int32_t kMostNumbers = 2000;     ///< limit of sender and type numbers, assigned by each side
 
-/// Lower ports are reserved for the system.
-inline constexpr int kLowestPort = 1024;
+inline constexpr int kLowestPort = 1024;  ///< lower ports are reserved for the system
 inline constexpr int kHighestPort = 0xffff;
 
 // Predefined types. Other numbers sent by this server are those of `Type`.
@@ -78,8 +72,7 @@ inline constexpr std::array<std::string_view, 20> kTypeNames = {
 };
 std::optional<Type> type_of(std::string_view name);
 
-/// Unix time as sent by VRPN.
-struct Stamp {
+struct Stamp {  // Unix time
   std::uint32_t seconds = 0;
   std::uint32_t us = 0;
   bool operator==(const Stamp&) const = default;
@@ -93,8 +86,7 @@ struct Message {
   Bytes payload;
 };
 
-/// The first bytes sent by either side.
-std::array<std::byte, kCookieSize> cookie();
+std::array<std::byte, kCookieSize> cookie();  ///< first bytes sent by either side
 enum class Kinship : std::uint8_t {
   kSame = 1,
   kOtherMinor = 2,  ///< compatible
@@ -106,7 +98,6 @@ Kinship kinship(Bytes cookie);
 /// trustworthy. Returns nullopt for other datagrams and for ports below 1024.
 std::optional<std::uint16_t> port_in_hello(Bytes datagram);
 
-/// The first message in a buffer.
 struct First {
   std::optional<Message> message;  ///< its payload points into the buffer; empty: incomplete or broken
   std::size_t size = 0;            ///< including padding
@@ -114,15 +105,10 @@ struct First {
 };
 First first_message(Bytes bytes);
 
-/// Appends a message with its padding.
-void append(Buffer& out, const Message& message, std::uint32_t sequence);
-
-// ---- Payloads
-// -------------------------------------------------------------------------------------------------------
+void append(Buffer& out, const Message& message, std::uint32_t sequence);  ///< appends a message with its padding
 
 void append_description(Buffer& out, std::string_view name);
-/// Returns the name, which points into `payload`.
-std::optional<std::string_view> read_description(Bytes payload);
+std::optional<std::string_view> read_description(Bytes payload);  ///< name, which points into `payload`
 
 /// For sensor 0. The velocity also contains the time (s) in which the handle rotates by `rotation`.
 void append_pose(Buffer& out, const Vec3& position, const Quat& rotation);

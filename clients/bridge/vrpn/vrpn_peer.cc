@@ -13,8 +13,7 @@ constexpr std::size_t kMaxSentences = 32;
 constexpr double kTurnTime = 0.01;  ///< s; a quaternion then represents up to half a turn, which is 50 turns per second
 constexpr double kSlowest = 1;      ///< Hz
 constexpr std::string_view kForceDevice = "vrpn_ForceDevice ";
-/// Sender that every VRPN program creates; not a device.
-constexpr std::string_view kControl = "VRPN Control";
+constexpr std::string_view kControl = "VRPN Control";  ///< sender that every VRPN program creates; not a device
 
 std::int32_t number_of(std::size_t i) { return static_cast<std::int32_t>(i); }
 

@@ -60,8 +60,7 @@ class Peer {
     std::uint64_t reports = 0;       ///< poses sent
   };
 
-  /// `stations` must outlive this object.
-  Peer(std::span<const Station> stations, const Moment& now);
+  Peer(std::span<const Station> stations, const Moment& now);  ///< `stations` must outlive this object
 
   void take_stream(const Moment& now, Bytes bytes);
   void take_datagram(const Moment& now, Bytes datagram);
@@ -75,8 +74,7 @@ class Peer {
   Bytes stream() const { return std::span(out_).subspan(sent_); }
   void sent(std::size_t bytes);
   std::vector<Buffer>& datagrams() { return datagrams_; }
-  /// UDP port of the program, at the address of its TCP connection; empty: none.
-  std::optional<std::uint16_t> udp_port() const { return udp_port_; }
+  std::optional<std::uint16_t> udp_port() const { return udp_port_; }  ///< at its TCP address; empty: none
 
   /// The requests of the program for a station, and whether they have changed since the last call.
   Drawing& drawing(std::size_t station) { return wishes_[station].drawing; }
@@ -85,9 +83,8 @@ class Peer {
 
   /// Whether it has exceeded its message rate; reading it may be delayed.
   bool is_above_its_share() const { return allowance_ < 1; }
-  bool open() const { return open_; }  ///< a valid cookie was received
-  /// Reason for the end of the connection; empty while it is open.
-  const std::string& end() const { return end_; }
+  bool open() const { return open_; }              ///< a valid cookie was received
+  const std::string& end() const { return end_; }  ///< reason for the end of the connection; empty while it is open
   std::optional<std::string> next_sentence();
   const Counts& counts() const { return counts_; }
 

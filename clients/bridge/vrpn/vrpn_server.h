@@ -40,14 +40,14 @@ class Descriptor {
 ///     Server server(host, config, now);
 ///     for (…) host.turn(now, server.counts()); next = server.turn(moment); host.wait(server.polled(), now, next);
 ///
-/// * **Connections.** A program sends a datagram with its TCP port, and the server connects to that port *at the
-///   source address of the datagram*; or the program opens a TCP connection. Addresses in the text of the datagram or
-///   in the description of a UDP port are never used. Connecting is asynchronous, limited to kDialsPerSecond and to
-///   one connection per port, and is given up after kPatience.
-/// * **Limits.** At most kMaxClients, including those being connected. Further connections are closed, and a message
-///   is printed for the first of them. A client that sends no cookie within kPatience is closed.
-/// * **Forces.** Each program has an Asker for each station. When its connection ends, it releases the devices, and
-///   the server fades the last force.
+/// * **Connections.** A program sends a datagram with its TCP port, and the server connects to that port *at the source
+///   address of the datagram*; or the program opens a TCP connection. Addresses in the text of the datagram or in the
+///   description of a UDP port are never used. Connecting is asynchronous, limited to kDialsPerSecond and to one
+///   connection per port, and is given up after kPatience.
+/// * **Limits.** At most kMaxClients, including those being connected. Further connections are closed, and a message is
+///   printed for the first of them. A client that sends no cookie within kPatience is closed.
+/// * **Forces.** Each program has an Asker for each station. When its connection ends, it releases the devices, and the
+///   server fades the last force.
 ///
 /// Thread-safe: no. Realtime-safe: no (system calls).
 class Server {
@@ -65,8 +65,7 @@ class Server {
     std::vector<Alias> names;
   };
 
-  /// Throws std::runtime_error "cannot listen at …: …".
-  Server(BridgeHost& host, Config config, LocalTime now);
+  Server(BridgeHost& host, Config config, LocalTime now);  ///< throws std::runtime_error "cannot listen at …: …"
   ~Server();
 
   const Address& address() const noexcept { return address_; }
@@ -74,8 +73,7 @@ class Server {
   /// Serves all clients; must be called after BridgeHost::turn and BridgeHost::wait. Returns the time of the next turn,
   /// or `now` if a requested force should be sent immediately.
   LocalTime turn(const Moment& now);
-  /// Arguments for BridgeHost::wait; valid until the next turn.
-  std::span<pollfd> polled() { return polled_; }
+  std::span<pollfd> polled() { return polled_; }  ///< arguments for BridgeHost::wait; valid until the next turn
   std::span<const BridgeHost::Count> counts();
 
  private:

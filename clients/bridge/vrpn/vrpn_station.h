@@ -27,8 +27,7 @@ struct Station {
 
   Hand hand(const DeviceState& state) const { return {view.position(state.position), view.position(state.velocity)}; }
 
-  /// Reads the device description. Returns a message, once, if the orientation of the device is unknown; the axes of
-  /// the device are then used for VRPN.
+  /// Reads the description. Returns a message, once, if the orientation is unknown; the device's axes then apply.
   std::optional<std::string> learn(const BridgedDevice& bridged);
 };
 
@@ -37,16 +36,13 @@ class Peer;
 /// Requests from a BridgedDevice what a program has drawn at its station: after each change, at most 4000 times per
 /// second, and twice per second while it is fresh (Freshness) to keep the ownership. When the drawing is removed, it
 /// requests a zero force, after which the BridgedDevice releases the program. A program whose force is not applied
-/// because another one owns the device is informed.
-///
-/// Thread-safe: no. Realtime-safe: no.
+/// because another one owns the device is informed. Thread-safe: no. Realtime-safe: no.
 class Asker {
  public:
   /// `number` identifies the program at every BridgedDevice, `who` in messages. `i` is the index of the station.
   Asker(BridgedDevice::Program number, std::string who, std::size_t i) : number_(number), who_(std::move(who)), i_(i) {}
 
-  /// `peer` and `station` must outlive the request, which ends with BridgedDevice::release. Returns true if a request
-  /// was made that should be sent immediately.
+  /// `peer` and `station` must outlive the request, until BridgedDevice::release. Returns true to send it at once.
   bool turn(LocalTime now, Duration since_1970, BridgedDevice& bridged, const Station& station, Peer& peer);
 
   std::optional<std::string> next_sentence() { return std::exchange(sentence_, {}); }

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-//
 // Avahi over D-Bus (org.freedesktop.Avahi.Server.xml and ServiceBrowser.xml of Avahi 0.8).
 #include <systemd/sd-bus.h>
 #include <systemd/sd-event.h>

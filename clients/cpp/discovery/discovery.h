@@ -10,13 +10,10 @@
 #include "protocol/discovery.h"
 #include "protocol/link.h"
 
-/// Finds servers by DNS-SD. Programs use ServerName (server_name.h) instead.
-///
-/// The domain "local" is queried through Avahi over D-Bus, other domains through the name servers of the system. The
-/// results are not trustworthy, because any host can announce any name.
-///
-/// Each function blocks for up to some seconds. It throws std::runtime_error if the query cannot be sent or is not
-/// answered. Thread-safe. Realtime-safe: no.
+/// Finds servers by DNS-SD; programs use ServerName (server_name.h) instead. The domain "local" is queried through
+/// Avahi over D-Bus, other domains through the name servers of the system. The results are not trustworthy, because any
+/// host can announce any name. Each function blocks for up to some seconds, and throws std::runtime_error if the query
+/// cannot be sent or is not answered. Thread-safe. Realtime-safe: no.
 namespace tendon::dns_sd {
 
 struct Found {

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-//
 // DNS-SD in records of name servers: PTR, SRV and TXT, by the C library's resolver.
 #include <arpa/inet.h>
 #include <arpa/nameser.h>
@@ -30,8 +29,7 @@ struct Answer {
   std::vector<unsigned char> bytes;
   std::vector<Record> records;
 
-  /// Returns the name at `offset` in a record's data, escaped as in zone files; empty if there is none or its
-  /// compression pointers form a loop.
+  /// The name at `offset` in a record's data, escaped as in zone files. Empty if there is none or its pointers loop.
   std::string name(const Record& record, std::size_t offset) const {
     std::array<char, NS_MAXDNAME> text{};
     const unsigned char* const end = bytes.data() + bytes.size();

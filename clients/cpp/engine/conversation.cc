@@ -114,7 +114,6 @@ class Words {
     for (std::string word; stream >> word;) words_.push_back(word);
   }
 
-  /// Consumes the next word if it equals `word`.
   bool take_word(std::string_view word) {
     if (!more() || words_[next_] != word) return false;
     ++next_;

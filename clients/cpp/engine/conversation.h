@@ -8,13 +8,11 @@
 
 #include "clients/cpp/force_client.h"
 
-// Records the states that an engine receives and its answers, so that a bug can be reproduced without the device and
-// the network, and a refactoring can be checked for bit-identical answers.
-//
-// Format: text. The first line is `tendon conversation 1`. Each further line is one answer, separated by spaces:
-// tick, sampled (ns, server clock), position, velocity, force_applied (three values each), energy, permitted_force,
-// reasons, force_sequence, force_age (ns), mode, device, channel (see DeviceState), then the force and these optional
-// fields of Touch in this order:
+// Records the states that an engine receives and its answers, to reproduce a bug without the device and the network,
+// and to check a refactoring for bit-identical answers. The format is text. The first line is `tendon conversation 1`;
+// each further line is one answer, separated by spaces: tick, sampled (ns, server clock), position, velocity,
+// force_applied (three values each), energy, permitted_force, reasons, force_sequence, force_age (ns), mode, device,
+// channel (see DeviceState), then the force and these optional fields of Touch in this order:
 //
 //     stiffness    row-major, N/m       contact      normal, gap in m
 //     radius       in m                 table        start and step in m, number of entries, entries in N
@@ -24,9 +22,8 @@
 
 namespace tendon {
 
-/// Wraps `engine` so that each answer is written to `to`, which must outlive the result. Exceptions of `engine`
-/// propagate and write no line. If the stream fails (disk full), recording stops and the engine continues; check the
-/// stream.
+/// Wraps `engine`: writes each answer to `to`, which must outlive the result. Exceptions of `engine` propagate and
+/// write no line. If the stream fails (disk full), recording stops and the engine continues; check the stream.
 Physics recorded(Physics engine, std::ostream& to);
 
 struct Replay {
@@ -40,8 +37,7 @@ struct Replay {
   std::uint64_t differing = 0;  ///< answers whose bits differ; all NaNs are equal
   double largest_n = 0;         ///< N, largest norm of a force difference; 0 if there is none or none is finite
   std::optional<Difference> first;
-  /// Returns a summary: "1200 answers, all the same".
-  std::string text() const;
+  std::string text() const;  ///< summary: "1200 answers, all the same"
 };
 
 /// Passes the recorded states to `engine` in order and compares the answers. Throws std::runtime_error "line 7: …" if

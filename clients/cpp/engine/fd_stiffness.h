@@ -14,7 +14,6 @@ struct SavedState {
   std::function<void()> restore{};  ///< to the last saved state; may be called repeatedly
 };
 
-/// A stiffness computed by finite differences, and two error measures.
 struct FdStiffness {
   Mat3 stiffness = Mat3::Zero();  ///< N/m, symmetric: (D + Dᵀ)/2, as the server requires
   /// N/m, max |D_ij − D_ji|/2, the part that symmetrization removes. Nonzero if the force is not a gradient

@@ -12,15 +12,13 @@ struct SurfacePoint {
   Mat3 curvature = Mat3::Zero();  ///< ∇∇d, 1/m: 0 for a plane, (I − n·nᵀ)/(distance to the center) for a sphere
 };
 
-/// Penalty contact with its exact stiffness, for engines that detect contact but compute no force, and for signed
-/// distance functions. The force never pulls:
+/// Penalty contact with its exact stiffness, for engines that only detect contact, and signed distances. Never pulls:
 ///
 ///     F = max(0, −k·d − b·v·n)·n  if d < 0, else 0                 N, acting on the hand
 ///     K = k·n·nᵀ + k·d·∇∇d        if F ≠ 0, else 0                 N/m, without the contribution of b
 ///
-/// with k in N/m and b in N·s/m. With b > 0, the force jumps at contact to b times the approach speed. A distance,
-/// normal or velocity that is not finite, or a zero normal, results in a force that is not finite, which ForceClient
-/// does not send. Realtime-safe: yes.
+/// with k in N/m and b in N·s/m. With b > 0, the force jumps at contact to b times the approach speed. An input that is
+/// not finite, or a zero normal, gives a force that is not finite, which ForceClient does not send. Realtime-safe: yes.
 class PenaltyContact {
  public:
   struct Config {
@@ -28,11 +26,9 @@ class PenaltyContact {
     double damping = 0;      ///< b, ≥ 0
   };
 
-  /// Throws std::invalid_argument "FIELD = VALUE: expected …" if `config` is invalid.
-  explicit PenaltyContact(const Config& config);
+  explicit PenaltyContact(const Config& config);  ///< throws std::invalid_argument "FIELD = VALUE: expected …"
 
-  /// Returns the answer for a hand at that point with the given velocity (m/s).
-  Touch touch(const SurfacePoint& surface, const Vec3& velocity) const noexcept;
+  Touch touch(const SurfacePoint& surface, const Vec3& velocity) const noexcept;  ///< `velocity` of the hand in m/s
 
  private:
   Config config_;

@@ -80,8 +80,7 @@ class Hand {
   }
   void pause(Duration time) { state_.sampled += time; }
 
-  /// Moves to `to` on a straight line from rest to rest at most at `speed`, and calls `each` with every position and
-  /// answer.
+  /// Moves to `to` on a straight line from rest to rest at most at `speed`; calls `each` with each position and answer.
   template <typename Each>
   void go(const Vec3& to, double speed, Each each) {
     const Vec3 from = state_.position;
@@ -108,8 +107,7 @@ class Hand {
 class WorkAlong {
  public:
   WorkAlong(const Vec3& position, const Vec3& force) : position_(position), force_(force) {}
-  /// J.
-  double to(const Vec3& position, const Vec3& force) {
+  double to(const Vec3& position, const Vec3& force) {  // J
     const double part = (force_ + force).dot(position - position_) / 2;
     position_ = position;
     force_ = force;
@@ -193,8 +191,7 @@ class Tester {
     try {
       const Work work = around(hand_, std::move(corners), speed);
       felt_ = felt_ || work.largest_n > 0;
-      // Three times the trapezoidal-rule error, since doubling the step quadruples the error (Richardson
-      // extrapolation).
+      // Three times the trapezoidal-rule error: doubling the step quadruples the error (Richardson extrapolation).
       const double doubt = std::abs(work.given - work.every_2);
       const double bound = std::max(script_.work_tolerance * work.put_in + doubt, kNothingJ);
       std::ostringstream why;

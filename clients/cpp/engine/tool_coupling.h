@@ -24,16 +24,14 @@ class ToolCoupling {
     double damping = 2;       ///< b, N·s/m, ≥ 0
     double tool_mass = 0.05;  ///< m, kg, > 0, as in the engine. A heavier tool is more stable but is felt in free space
     double step_s = 0.001;    ///< T, s, > 0, as in the engine
-    /// N, > 0, limit of the force, so that a jump of the hand does not accelerate the tool too much.
-    double max_force = 10;
+    double max_force = 10;    ///< N, > 0, so that a jump of the hand does not accelerate the tool too much
   };
   struct Forces {
     Vec3 on_tool = Vec3::Zero();  ///< N, to apply to the body in the engine
     Vec3 on_hand = Vec3::Zero();  ///< N, to return to the server
   };
 
-  /// Throws std::invalid_argument "FIELD = VALUE: expected …" if `config` is invalid.
-  explicit ToolCoupling(const Config& config);
+  explicit ToolCoupling(const Config& config);  ///< throws std::invalid_argument "FIELD = VALUE: expected …"
 
   /// Must be called before each step of the engine. Positions (m) and velocities (m/s) that are not finite result in
   /// a force that is not finite. ForceClient does not send such a force; do not apply it in the engine.

@@ -62,8 +62,7 @@ bool is_finite(const Pose& pose) {
   return pose.position.allFinite() && std::isfinite(q.w + q.x + q.y + q.z) && std::isfinite(pose.grip.value_or(0));
 }
 
-/// Returns the factor that limits a displacement of length `whole` to `most`.
-double share(double whole, double most) { return whole <= most ? 1 : most / whole; }
+double share(double whole, double most) { return whole <= most ? 1 : most / whole; }  ///< limits a length to `most`
 
 }  // namespace
 

@@ -17,8 +17,7 @@ struct Pose {
   std::optional<double> grip{};       ///< opening of the gripper, m or rad; empty: no gripper
 };
 
-/// Force that the environment exerts on the tool, in the frame of the robot. For example, a table exerts an upward
-/// force.
+/// Force that the environment exerts on the tool, in the frame of the robot: a table pushes up.
 struct ToolContact {
   Vec3 force = Vec3::Zero();           ///< N
   std::optional<Vec3> torque{};        ///< N·m, about the position of the tool
@@ -46,23 +45,22 @@ enum class Following : std::uint8_t {
 ///       return follow.touch(robot.contact());
 ///     });
 ///
-/// With positions p, orientations q, the hand l (leader), the tool f (follower), and 0 for the values at the time of
-/// engaging:
+/// With positions p, orientations q, the hand l (leader), the tool f (follower), and 0 for the values when engaging:
 ///
 ///     p_f = p_f0 + s_x R M (p_l − p_l0)        q_f = (R q_l q_l0⁻¹ R⁻¹) q_f0        M selects the coupled axes
 ///     F_l = s_f M Rᵀ F_f                       τ_l = s_f / s_x Rᵀ τ_f               K_l = s_f s_x M Rᵀ K_f R M
 ///
 /// so the power at the hand is s_f / s_x times the power at the tool. The robot does not move until the operator
 /// engages with the button or with engage(). The offset is defined by the poses at that time, so that the robot does
-/// not move when it is engaged or when the clutch is released. The reaction to missing states depends on the age of
-/// the newest state beyond the smoothed delay, where v is three periods, at least 20 ms:
+/// not move when it is engaged or when the clutch is released. The reaction to missing states depends on the age of the
+/// newest state beyond the smoothed delay, where v is three periods, at least 20 ms:
 ///
 ///     v             the target stops
 ///     v + 20 ms     no target: the robot must hold its pose
 ///     v + 250 ms    lost: new states couple again, but the operator must engage again
 ///
-/// Absolute times of the two clocks are never compared. The coupling ends if the device has a fault or is disarmed,
-/// or if a pose is not finite. There are equivalent implementations in Python and TypeScript;
+/// Absolute times of the two clocks are never compared. The coupling ends if the device has a fault or is disarmed, or
+/// if a pose is not finite. There are equivalent implementations in Python and TypeScript;
 /// tests/clients/follower_cases.json checks all three.
 ///
 /// Thread-safe: no. Realtime-safe: yes, except the constructor and set_scale when they throw.
@@ -88,19 +86,15 @@ class Follower {
     double rate_hz = 500;     ///< rate at which target() is called, 1 … 100000
   };
 
-  /// Throws std::invalid_argument "FIELD = VALUE: expected …" if `config` is invalid.
-  explicit Follower(const Config& config);
+  explicit Follower(const Config& config);  ///< throws std::invalid_argument "FIELD = VALUE: expected …"
 
   Following phase() const noexcept { return phase_; }
-  /// Newest message for the operator; empty: none.
-  std::string_view words() const noexcept { return words_; }
+  std::string_view words() const noexcept { return words_; }  ///< newest message for the operator; empty: none
 
   /// Engages at the next state. Returns false and does nothing unless phase() is kCoupled.
   bool engage() noexcept { return asked_ = phase_ == Following::kCoupled; }
-  /// Stops the robot until the operator engages again.
-  void disengage() noexcept;
-  /// Has no effect and returns false while the robot follows. Throws std::invalid_argument if a scale is out of
-  /// bounds.
+  void disengage() noexcept;  ///< stops the robot until the operator engages again
+  /// Returns false without effect while the robot follows. Throws std::invalid_argument if a scale is out of bounds.
   bool set_scale(double scale, double force_scale);
 
   /// Returns the next target of the tool, which moves at most at `speed`; empty: the robot must hold its pose. `pose`
@@ -109,9 +103,8 @@ class Follower {
   /// Must be called every few milliseconds while no state arrives. Returns the last target at first, then empty.
   std::optional<Pose> silence(LocalTime now) noexcept;
 
-  /// Returns the force on the hand for a contact of the tool; the force is zero while the robot does not follow. If
-  /// `contact` is empty, returns a Touch that is not sent (Touch::unknown), because a zero force would look like a
-  /// measurement.
+  /// Returns the force on the hand for a contact of the tool; zero while the robot does not follow. An empty `contact`
+  /// gives a Touch that is not sent (Touch::unknown), because a zero force would look like a measurement.
   Touch touch(const std::optional<ToolContact>& contact) noexcept;
 
  private:
@@ -136,8 +129,7 @@ class Follower {
   bool held_ = true;  ///< button in the newest state. Initially true, so that a press counts only after a release
   std::uint64_t tick_ = 0;
   PeerTime sampled_{};
-  /// Arrival and sampling time of the first state. Delays are measured relative to it.
-  struct Base {
+  struct Base {  // arrival and sampling time of the first state; delays are relative to it
     LocalTime came;
     PeerTime sampled;
   };

@@ -12,9 +12,7 @@
 namespace tendon::worker {
 
 /// An engine for run() whose answers come from a worker, a separate program that may be slow, stop or crash. The
-/// session with the server stays open in all cases.
-///
-/// Thread-safe: no. Realtime-safe: no.
+/// session with the server stays open in all cases. Thread-safe: no. Realtime-safe: no.
 class ProxyEngine : public Elsewhere {
  public:
   struct Config {
@@ -23,8 +21,7 @@ class ProxyEngine : public Elsewhere {
     WorkerProcess::Config process;
   };
 
-  /// `says` receives a message for each change of the worker and must outlive this object. Throws as ProxyScheduler and
-  /// WorkerProcess do.
+  /// `says` receives each change of the worker, and must outlive this. Throws as ProxyScheduler and WorkerProcess do.
   ProxyEngine(const Config& config, LocalTime now, std::ostream& says);
 
   void see(LocalTime now, const Seen& seen) override;

@@ -16,8 +16,7 @@ namespace tendon::worker {
 /// Scheduling policy of a ProxyEngine: when to send a state to the worker, which answers to use, and when to replace
 /// the worker. A pure state machine without sockets, processes or clocks.
 ///
-/// * **Newest wins.** The worker has one state at a time. After its answer it gets the newest one; states are not
-///   queued.
+/// * **Newest wins.** The worker has one state at a time, then gets the newest one; states are not queued.
 /// * **Late answers are dropped.** Answers that exceed the deadline are counted and dropped. The worker stays.
 /// * **Timing statistics use answers with a force.** Answers in free space are fast and frequent, so they are not
 ///   representative. The first answer with a force may be slow because a solver has no warm start yet.
@@ -26,8 +25,8 @@ namespace tendon::worker {
 /// * **A dead worker is replaced.** A worker is given up after `dead` without an answer, or when its stream ends. The
 ///   next one starts after `retry_min`. The wait doubles with each failure up to `retry_max`, and is reset once a
 ///   worker has answered for longer than the wait.
-/// * **Fallback.** While no worker is available or the answer is late, `fallback` (if set) answers each new state.
-///   Its error is increased by its last difference from an answer of the worker to the same state.
+/// * **Fallback.** While no worker is available or the answer is late, `fallback` (if set) answers each new state. Its
+///   error is increased by its last difference from an answer of the worker to the same state.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class ProxyScheduler {
@@ -74,13 +73,11 @@ class ProxyScheduler {
   // Inputs:
 
   void see(const Seen& seen);
-  /// The stream to the worker is open.
-  void opened();
+  void opened();  ///< the stream to the worker is open
   /// The worker answered the last state, or its answer is invalid for the reason `why` (stream.h).
   void answered(LocalTime now, const Touch& touch);
   void refused(std::string_view why);
-  /// Must be called if the stream or the program has ended.
-  void ended(LocalTime now, const std::string& why);
+  void ended(LocalTime now, const std::string& why);  ///< must be called if the stream or the program has ended
 
   // Outputs; call turn() until it returns empty:
 
@@ -95,8 +92,7 @@ class ProxyScheduler {
   using Order = std::variant<Launch, GiveUp, Ask, Reply>;
   std::optional<Order> turn(LocalTime now);
 
-  /// Time of the next turn; LocalTime::max() while only waiting for an input.
-  LocalTime next_turn() const;
+  LocalTime next_turn() const;  ///< time of the next turn; LocalTime::max() while only waiting for an input
 
   Stats stats() const;
 

@@ -10,9 +10,7 @@
 namespace tendon::worker {
 
 /// The worker's end of the stream to its proxy (stream.h). An MPI program uses it on one rank, which broadcasts the
-/// record; every rank decodes the state from it (Codec).
-///
-/// Thread-safe: no. Realtime-safe: no (system calls).
+/// record; every rank decodes the state from it (Codec). Thread-safe: no. Realtime-safe: no (system calls).
 class WorkerStream {
  public:
   /// Connects to the address in the environment and opens the stream, which reports that the worker is ready. Throws
@@ -24,8 +22,7 @@ class WorkerStream {
 
   /// Blocks until the next record, which contains a state. Returns empty when the proxy has closed the stream.
   std::optional<Record> next();
-  /// Sends an answer (Codec::answer). Returns false if the stream is closed.
-  bool send(const Record& answer);
+  bool send(const Record& answer);  ///< of Codec::answer; false if the stream is closed
 
  private:
   int socket_ = -1;

@@ -11,18 +11,15 @@
 
 namespace tendon::worker {
 
-/// Launches the worker program and owns the stream to it. There is one worker at a time;
-/// all ranks of `mpirun` are one worker.
-///
-/// The stream is a Unix socket in a directory that is accessible only to this user, or, with Config::listen, TCP
-/// without Nagle's algorithm. The program receives the address and a secret in its environment (stream.h). Each
-/// launch has a new secret, which opens the stream once. TCP is not encrypted: use it only in the network of a
-/// cluster.
+/// Launches the worker program and owns the stream to it. There is one worker at a time; all ranks of `mpirun` are one.
+/// The stream is a Unix socket in a directory that only this user can access, or, with Config::listen, TCP without
+/// Nagle's algorithm. The program receives the address and a secret in its environment (stream.h). Each launch has a
+/// new secret, which opens the stream once. TCP is not encrypted: use it only in the network of a cluster.
 ///
 /// All processes started by the program are killed with it, including those that left its process group, as the ranks
-/// of Open MPI do: this process adopts orphans (PR_SET_CHILD_SUBREAPER) and kills all its descendants. If this
-/// process dies, the kernel kills the program, and workers end with their stream. Processes on other machines are
-/// ended by their launcher. Only one object per process, because it kills all other children of the process as well.
+/// of Open MPI do: this process adopts orphans (PR_SET_CHILD_SUBREAPER) and kills all its descendants. If this process
+/// dies, the kernel kills the program, and workers end with their stream. Processes on other machines are ended by
+/// their launcher. Only one object per process, because it kills all other children of the process as well.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class WorkerProcess {
@@ -34,17 +31,14 @@ class WorkerProcess {
 
   /// Throws std::system_error or std::runtime_error if it cannot listen at the address.
   explicit WorkerProcess(const Config& config);
-  /// Kills the running program.
-  ~WorkerProcess();
+  ~WorkerProcess();  ///< kills the running program
   WorkerProcess(const WorkerProcess&) = delete;
   WorkerProcess& operator=(const WorkerProcess&) = delete;
 
   /// Starts the program. `secret` must consist of kSecretDigits hexadecimal digits. Throws std::system_error.
   void launch(const std::string& secret);
-  /// Sends SIGKILL and closes the stream. Remaining processes are killed again in each turn.
-  void kill();
-  /// Sends a record. The stream is ended if the worker does not read it.
-  void send(const Record& record);
+  void kill();  ///< sends SIGKILL and closes the stream; remaining processes are killed again in each turn
+  void send(const Record& record);  ///< ends the stream if the worker does not read it
 
   struct Opened {};
   struct Ended {
@@ -53,11 +47,9 @@ class WorkerProcess {
   using Event = std::variant<Opened, Record, Ended>;
   /// Returns the next event; call until it returns empty. There is one Ended event for each program.
   std::optional<Event> next();
-  /// File descriptor for poll(). Readable if next() has an event.
-  int descriptor() const noexcept;
+  int descriptor() const noexcept;  ///< for poll(); readable if next() has an event
 
-  /// Address passed to the program: "unix:PATH" or "tcp:HOST:PORT".
-  const std::string& address() const noexcept { return address_; }
+  const std::string& address() const noexcept { return address_; }  ///< "unix:PATH" or "tcp:HOST:PORT"
 
  private:
   struct Files;

@@ -31,8 +31,7 @@ struct Estimate {
   Cost factor;
   std::vector<Spread> multigrid;
   enum class Take : std::uint8_t { kTable, kFactor, kMultigrid } take = Take::kTable;
-  /// The number of ranks for kMultigrid.
-  int ranks = 1;
+  int ranks = 1;  ///< number of ranks for kMultigrid
 };
 inline constexpr double kFeltLate = 0.01;  ///< s
 inline constexpr double kMostTableBytes = 4e9;

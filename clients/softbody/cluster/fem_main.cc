@@ -36,7 +36,6 @@ std::string shell_word(const std::string& word) {
   return text + "'";
 }
 
-/// The worker is in the same folder as this program.
 std::string own_worker() {
   std::error_code error;
   const auto beside = std::filesystem::read_symlink("/proc/self/exe", error).replace_filename("tendon-fem-worker");

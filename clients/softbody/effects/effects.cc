@@ -14,7 +14,6 @@ std::size_t bytes_of(const VectorXd& vector) noexcept {
 }
 
 void add_diagonal(const VectorXd& diagonal, SymmetricMatrix& to) {
-  // diagonal
   for (int i = 0; i < to.size; ++i) to.values[at(to.column_starts[at(i)])] += diagonal[i];
 }
 

@@ -10,11 +10,8 @@
 
 namespace tendon::softbody {
 
-/// An effect on the whole body. In each time step it is a quadratic energy of the free displacements u. The body moves
-/// to the minimum of the total energy; with inertia this is the implicit Euler method. If a scene does not list an
-/// effect, it is not constructed.
-///
-/// Thread-safe: no. Realtime-safe: no.
+/// An effect on the whole body: in each time step a quadratic energy of the free displacements u. The body moves to the
+/// minimum of the total energy; with inertia this is the implicit Euler method. Thread-safe: no. Realtime-safe: no.
 class Effect {
  public:
   Effect() = default;
@@ -104,13 +101,11 @@ struct EffectsConfig {
   bool has_time() const noexcept { return inertia || damping || viscosity; }
 };
 
-/// Throws std::invalid_argument if a field is invalid. The message contains its name.
-void check(const EffectsConfig& config);
+void check(const EffectsConfig& config);  ///< throws std::invalid_argument with the name of an invalid field
 
 using Effects = std::vector<std::unique_ptr<Effect>>;
 
-/// Creates the effects that act on a body at rest, and those that act only on a moving body. The body starts from rest
-/// at u (m, free displacements).
+/// Create the effects on a body at rest, and those of motion, starting from rest at u (m, free displacements).
 Effects effects_at_rest(const EffectsConfig& config, const Elastic& elastic);
 void add_effects_of_time(Effects& effects, const EffectsConfig& config, const Elastic& elastic, const VectorXd& u);
 

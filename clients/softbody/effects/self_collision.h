@@ -15,15 +15,13 @@ namespace tendon::softbody {
 ///
 ///     energy = Σ ½ kᵢ gᵢ²,   gᵢ = max(0, −n·(xᵢ − y)),   kᵢ = ½ c Aᵢ
 ///
-/// y is the nearest point of the facet, n is the normal of the facet, and Aᵢ is the area of the node at rest. The
-/// forces on the node and on the facet are opposite and collinear (Hallquist, Goudreau & Benson 1985). The facet, y and
-/// n are constant during a solution and are updated after it until they do not change. y is the nearest point, so the
-/// forces are the gradient of the energy.
+/// y is the nearest point of the facet, n its normal, and Aᵢ the area of the node at rest. The forces on node and facet
+/// are opposite and collinear (Hallquist, Goudreau & Benson 1985). The facet, y and n are constant during a solution
+/// and then updated until they do not change. y is the nearest point, so the forces are the gradient of the energy.
 ///
 /// Facets are divided into triangles around their centers and extend a little beyond their edges. A facet does not push
-/// a node if an element of the node has a node on the facet. The following cases are not detected: folds over fewer
-/// than two elements, edges that cross edges, and sides that overlapped by more than half a facet before the first
-/// search.
+/// a node if an element of the node has a node on the facet. Not detected are folds over fewer than two elements, edges
+/// that cross edges, and sides that overlapped by more than half a facet before the first search.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class SelfCollision {
@@ -31,39 +29,31 @@ class SelfCollision {
   /// `bed` is c in Pa/m. `elastic` must outlive this object. Throws std::invalid_argument if `bed` is not positive.
   SelfCollision(const Elastic& elastic, double bed, const VectorXd& u);
 
-  /// Returns the relative change of the forces (0 … 2).
-  double look(const VectorXd& u);
+  double look(const VectorXd& u);  ///< relative change of the forces (0 … 2)
 
   VectorXd free_forces(const VectorXd& u) const { return elastic_.to_free(forces(u)); }
   /// Adds the energy and the free forces of the bed to `to`.
   void add_forces(const VectorXd& u, Elastic::Forces& to) const;
 
   /// Predicts the nodes that are pushed at the end of a Newton step, because a step without this prediction would make
-  /// no progress. The step d minimizes
-  ///
-  ///     ½ dᵀK d − d·b + energy(u + d)
-  ///
-  /// If `held` is given, held·d is equal to `by`, and the force (N) along `held` is returned. `factor` is the factor of
-  /// K. For the forces on the nodes this is a linear complementarity problem, which is solved by projected Gauss–Seidel
-  /// iteration (Cottle, Pang & Stone 1992, chapter 5).
+  /// no progress. The step d minimizes ½ dᵀK d − d·b + energy(u + d). If `held` is given, held·d is equal to `by`, and
+  /// the force (N) along `held` is returned. `factor` is the factor of K. For the forces on the nodes this is a linear
+  /// complementarity problem, solved by projected Gauss–Seidel iteration (Cottle, Pang & Stone 1992, chapter 5).
   double foresee(const Factor& factor, const VectorXd& u, const VectorXd& b, const VectorXd* held, double by);
 
-  /// Returns true if a node is pushed at u or at the end of the step.
-  bool pushes(const VectorXd& u) const;
+  bool pushes(const VectorXd& u) const;  ///< true if a node is pushed at u or at the end of the step
 
   /// Returns the change of the free forces if exactly the predicted nodes are pushed.
   VectorXd foreseen_forces(const VectorXd& u) const;
 
-  /// Solves (K + bed stiffness) x = b for each column. `factor` is the factor of K. This needs one solve for each
-  /// pushed node (Woodbury's identity).
+  /// Solves (K + bed stiffness) x = b by columns, with the `factor` of K and a solve for each pushed node (Woodbury).
   MatrixXd solve(const Factor& factor, const MatrixXd& b) const;
 
   double overlap(const VectorXd& u) const;
   std::size_t bytes() const noexcept;
 
  private:
-  /// A weighted sum of nodes.
-  struct Point {
+  struct Point {  // a weighted sum of nodes
     std::vector<int> nodes;
     std::vector<double> shares;
   };
@@ -83,8 +73,7 @@ class SelfCollision {
     double stiffness;       ///< kᵢ, N/m
     std::vector<int> ring;  ///< ascending
   };
-  /// A node and a facet point: gap(u) = offset + Σ along·u = n·(xᵢ − y).
-  struct Pair {
+  struct Pair {  // a node and a facet point: gap(u) = offset + Σ along·u = n·(xᵢ − y)
     int node;
     double stiffness;
     double offset;

@@ -28,7 +28,6 @@ Fixed fix_where(const Mesh& mesh, Predicate holds) {
 
 /// A mesh with an elastic energy: its value and first two derivatives with respect to the displacements u of all nodes,
 /// in m. The energy has its minimum, 0, at u = 0. Two nodes interact only if they share an element.
-///
 /// Stateless. Thread-safe: yes, after construction. Realtime-safe: no.
 class Elastic {
  public:
@@ -36,8 +35,7 @@ class Elastic {
 
   const Mesh& mesh() const noexcept { return mesh_; }
 
-  /// Length of u: 3 per node, plus the further unknowns.
-  int size() const noexcept { return static_cast<int>(free_of_.size()); }
+  int size() const noexcept { return static_cast<int>(free_of_.size()); }  ///< of u: 3 per node, and further unknowns
   int free_count() const noexcept { return static_cast<int>(all_of_.size()); }
   int free_of(int component) const noexcept { return free_of_[at(component)]; }
   Fixed fixed() const;
@@ -48,8 +46,7 @@ class Elastic {
   virtual VectorXd beginning() const { return VectorXd::Zero(size()); }
 
   virtual double energy(const VectorXd& u) const = 0;
-  /// force = ∂energy/∂u, N: the external forces that hold the nodes at u.
-  struct Forces {
+  struct Forces {  // force = ∂energy/∂u, N: the external forces that hold the nodes at u
     double energy;
     VectorXd force;
   };
@@ -58,16 +55,14 @@ class Elastic {
   enum class Curvature : std::uint8_t { kExact, kWithoutNegative };
   /// The second derivative with respect to the free displacements, N/m.
   virtual void stiffness(const VectorXd& u, Curvature curvature, SymmetricMatrix& to) const = 0;
-  /// All values are zero.
-  const SymmetricMatrix& pattern() const;
+  const SymmetricMatrix& pattern() const;  ///< all values are zero
 
   virtual std::size_t bytes() const noexcept = 0;
 
  protected:
   /// Throws std::invalid_argument if the mesh is invalid or no displacement is fixed.
   Elastic(Mesh mesh, const Fixed& fixed);
-  /// Additional unknowns that move the nodes of `rim`. The components of these nodes are fixed.
-  struct Together {
+  struct Together {  // additional unknowns that move the nodes of `rim`, whose components are fixed
     int count = 0;
     std::vector<int> rim = {};
   };
@@ -79,8 +74,7 @@ class Elastic {
   Elastic& operator=(const Elastic&) = default;
   Elastic& operator=(Elastic&&) = default;
 
-  /// Returns −1 for an entry above the diagonal and for fixed components.
-  int slot(int row_component, int column_component) const;
+  int slot(int row_component, int column_component) const;  ///< −1 above the diagonal and for fixed components
   std::size_t mesh_bytes() const noexcept;
 
  private:
@@ -91,8 +85,7 @@ class Elastic {
   Lazy<SymmetricMatrix> pattern_;
 };
 
-/// Returns the lumped masses (kg).
-VectorXd lumped_mass(const Elastic& elastic, double density);
+VectorXd lumped_mass(const Elastic& elastic, double density);  ///< lumped masses (kg)
 
 /// Returns the forces of 1 N on the patch, against the normal.
 VectorXd patch_load(const Elastic& elastic, const Vec3& normal, const Patch& patch);

@@ -40,11 +40,9 @@ class ByteReader {
   std::string_view left_;
 };
 
-/// Returns the XXH3 hash (64 bits).
-std::uint64_t checksum(std::string_view bytes);
+std::uint64_t checksum(std::string_view bytes);  ///< XXH3 hash (64 bits)
 
-/// Writes a temporary file, which the caller renames once it is complete. Throws std::runtime_error and removes the
-/// file if it cannot be written.
+/// Writes a file for the caller to rename. If it cannot be written, removes it and throws std::runtime_error.
 void write_draft(const std::filesystem::path& draft, std::string_view bytes);
 
 }  // namespace tendon::softbody

@@ -21,15 +21,13 @@ struct FileMesh {
 
 /// Joins the elements of a file into one body. Each repair is added to `notes`.
 ///
-/// - If several elements have the same nodes, in any order, only the first is used. Format 2.2 of gmsh writes an
-///   element once for each physical group.
+/// - Of elements with the same nodes, in any order, the first is used: gmsh 2.2 writes one per physical group.
 /// - Nodes at the same place (kSamePlace) are merged. If `slits` is true, they are not merged, because the mesh may
 ///   contain a slit or a crack. The note gives the number of places in both cases.
 ///
-/// Elements that are connected by faces form a part. More than one part is not an error: see expect_held().
-///
-/// Throws std::invalid_argument "`name`: …" with the element numbers of the file if an element has two nodes at the
-/// same place, or if elements overlap: more than two share a face, or two are on the same side of a shared face.
+/// Elements that are connected by faces form a part. More than one part is not an error: see expect_held(). Throws
+/// std::invalid_argument "`name`: …" with the element numbers of the file if an element has two nodes at the same
+/// place, or if elements overlap: more than two share a face, or two are on the same side of a shared face.
 FileMesh joined(FileMesh file, bool slits, std::string_view name);
 
 /// Throws std::invalid_argument with the number and the place of an element if a part is not held. A part is held if it

@@ -25,8 +25,7 @@ class Words {
  public:
   Words(std::string_view text, std::string_view name) : rest_(without_mark(text, name)), name_(name) {}
 
-  /// Returns an empty word at the end of the file.
-  std::string_view next() {
+  std::string_view next() {  // empty at the end of the file
     std::size_t begin = 0;
     while (begin < rest_.size() &&
            (rest_[begin] == ' ' || rest_[begin] == '\t' || rest_[begin] == '\r' || rest_[begin] == '\n')) {
@@ -58,7 +57,6 @@ class Words {
     if (found != keyword) fail("expected " + std::string(keyword) + ", found \"" + std::string(found) + '"');
   }
 
-  /// Returns false if the keyword is missing.
   bool seek(std::string_view keyword) {
     for (;;) {
       const std::string_view found = next();
@@ -88,8 +86,7 @@ class Words {
   int line_ = 1;
 };
 
-/// `shape` is empty if the type is not supported.
-struct Type {
+struct Type {  // `shape` is empty if it is not supported
   int number;
   int nodes;
   std::optional<Shape> shape;

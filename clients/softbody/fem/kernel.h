@@ -18,18 +18,15 @@ using Lanes [[gnu::vector_size(sizeof(double) * kLanes)]] = double;
 /// Energy and forces of elements of one shape and law, four elements at a time. Everything independent of the
 /// displacements is stored as a structure of arrays, with the values of four elements next to each other. The order of
 /// summation does not depend on the processor, so results are bit-identical with and without wide registers.
-///
 /// Thread-safe: yes, after construction. Realtime-safe: only add_forces().
 class Kernel {
  public:
-  /// Creates an empty kernel for elements with 4, 8, 20 or 27 nodes.
-  Kernel(Law law, int nodes, int points);
+  Kernel(Law law, int nodes, int points);  ///< creates an empty kernel for elements with 4, 8, 20 or 27 nodes
 
   using Nodal = Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, kMaxNodes>;
   using Gradient = Eigen::Map<const Nodal, 0, Eigen::Stride<3 * kLanes, kLanes>>;
 
-  /// Appends an element. set_point() then sets each of its quadrature points: ∂Nᵢ/∂X in 1/m, and µ and λ times volume
-  /// in J.
+  /// Appends an element. set_point() then sets its quadrature points: ∂Nᵢ/∂X in 1/m, and µ and λ times volume in J.
   void add_element(std::span<const int> nodes);
   void set_point(int element, int point, const Nodal& gradient, double mu, double lambda);
   Gradient gradient(int element, int point) const;
@@ -55,8 +52,7 @@ class Kernel {
   int points_;
   int elements_ = 0;
   std::vector<int> nodes_;
-  /// Per quadrature point and group of four elements: 3 × nodes lanes of ∂N/∂X, and two lanes of moduli. Zero-padded if
-  /// the last group is not full.
+  /// Per point and group of four elements: 3 × nodes lanes of ∂N/∂X, and two lanes of moduli. The last group is padded.
   std::vector<double> gradients_;
   std::vector<double> moduli_;
 };

@@ -27,8 +27,7 @@ struct Material {
   double lambda() const noexcept { return young * poisson / ((1 + poisson) * (1 - 2 * poisson)); }
 };
 
-/// Throws std::invalid_argument that names the field.
-void check(const Material& material);
+void check(const Material& material);  ///< throws std::invalid_argument with the name of an invalid field
 
 using Mat9 = Eigen::Matrix<double, 9, 9>;
 

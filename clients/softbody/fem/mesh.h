@@ -53,8 +53,7 @@ struct Facet {
 /// The surface: faces that coincide with no other face. The two sides of a closed cut coincide and are excluded.
 std::vector<Facet> surface(const Mesh& mesh);
 
-/// Returns the faces that belong to one element, including both sides of a cut.
-std::vector<Facet> sides(const Mesh& mesh);
+std::vector<Facet> sides(const Mesh& mesh);  ///< faces that belong to one element, including both sides of a cut
 
 std::vector<std::pair<Facet, Facet>> inner_faces(const Mesh& mesh);
 

@@ -17,20 +17,17 @@ namespace {
 
 constexpr double kLeastFacing = 0.2588;  // cos 75°; steeper facets have almost no projected area
 
-/// Relative to the patch radius. If the patch moves over a facet, the compliance of block B1 changes by 1e-5; with 0.2,
-/// it changes by 2e-4.
+/// In patch radii. The compliance of B1 changes by 1e-5 while the patch moves over a facet; with 0.2, by 2e-4.
 constexpr double kPiece = 0.1;
 
 /// With two pieces for each side of a quadratic facet, block B1 with 32 cells is too soft by 0.3 %.
 constexpr int kLeastCutsOfQuadratic = 4;
 
-/// This limits facets that are wider than three patches.
-constexpr int kMostCuts = 32;
+constexpr int kMostCuts = 32;  ///< limits facets that are wider than three patches
 
 constexpr int kMostFacetNodes = 9;
 
-/// Relative to the width of the touchable side.
-constexpr double kFlat = 1e-6;
+constexpr double kFlat = 1e-6;  ///< relative to the width of the touchable side
 
 }  // namespace
 

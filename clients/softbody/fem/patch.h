@@ -30,7 +30,6 @@ struct Patch {
 };
 
 /// The touchable side of a body: the facets that face the tool, as a height field over the plane normal to `normal()`.
-///
 /// Thread-safe: yes, after construction. Realtime-safe: no.
 class TouchSurface {
  public:

@@ -14,8 +14,7 @@
 
 namespace tendon::softbody {
 
-/// Two points coincide if their distance is below this fraction of the longest side of the bounding box: about the
-/// rounding of a file with six digits.
+/// Points coincide below this fraction of the longest side of the bounding box: the rounding of a file with six digits.
 inline constexpr double kSamePlace = 1e-6;
 
 Eigen::AlignedBox3d box_around(std::span<const Vec3> points);
@@ -24,14 +23,12 @@ using Cell = std::array<std::int64_t, 3>;
 struct HashOfCell {
   std::size_t operator()(const Cell& cell) const;
 };
-/// The distance from `origin` must be below 10¹⁸ times `size`.
-Cell cell_of(const Vec3& point, const Vec3& origin, double size);
+Cell cell_of(const Vec3& point, const Vec3& origin, double size);  ///< `point` within 10¹⁸ `size` of `origin`
 
 /// For each point, the index of the first point that coincides with it.
 std::vector<int> first_at_place(std::span<const Vec3> points);
 
-/// Formats the coordinates with four digits: "(1, 2, 3)".
-std::string in_words(const Vec3& place);
+std::string in_words(const Vec3& place);  ///< formats the coordinates with four digits: "(1, 2, 3)"
 
 /// Formats a count with its noun: "1 place", "2 places".
 std::string counted(std::size_t count, std::string_view one, std::string_view several);

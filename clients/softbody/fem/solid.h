@@ -13,9 +13,7 @@
 
 namespace tendon::softbody {
 
-/// A finite-element mesh of a material.
-///
-/// Stateless. Thread-safe: yes, after construction. Realtime-safe: no.
+/// A finite-element mesh of a material. Stateless. Thread-safe: yes, after construction. Realtime-safe: no.
 class Solid : public Elastic {
  public:
   /// `of_elements`: the material of each element, if it is not uniform (region.h). Throws std::invalid_argument if the
@@ -37,10 +35,8 @@ class Solid : public Elastic {
   Forces forces(const VectorXd& u) const override;
   void stiffness(const VectorXd& u, Curvature curvature, SymmetricMatrix& to) const override;
 
-  /// Number of elements with a quadrature point at which det F ≤ 0.
-  int inverted(const VectorXd& u) const;
-  /// Largest rotation angle of the material at any quadrature point, rad.
-  double largest_turn(const VectorXd& u) const;
+  int inverted(const VectorXd& u) const;         ///< number of elements with a quadrature point at which det F ≤ 0
+  double largest_turn(const VectorXd& u) const;  ///< rad, largest rotation of the material at a quadrature point
 
   std::size_t bytes() const noexcept override;
 
@@ -53,8 +49,7 @@ class Solid : public Elastic {
   const Point& point(int element, int index) const { return parts().points[at(element * per_element_ + index)]; }
   using Nodal = Kernel::Nodal;
   Kernel::Gradient gradient(int element, int point) const { return parts().kernel.gradient(element, point); }  ///< 1/m
-  /// point() and gradient(), computed without storing them, for one-time use.
-  struct Part {
+  struct Part {  // point() and gradient(), computed without storing them, for one-time use
     Point point;
     Nodal gradient;
   };

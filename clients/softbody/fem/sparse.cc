@@ -13,8 +13,7 @@
 namespace tendon::softbody {
 namespace {
 
-/// A solve needs 4 operations for each entry of the factor. They take the time of 6 operations of a factorization,
-/// measured with 7803 unknowns.
+/// A solve needs 4 operations per entry of the factor, which take as long as 6 of a factorization (7803 unknowns).
 constexpr double kWorkPerEntry = 6;
 
 using View = Eigen::Map<const Eigen::SparseMatrix<double>>;
@@ -28,7 +27,6 @@ View view(const SymmetricMatrix& matrix) {
           matrix.values.data()};
 }
 
-/// Returns null if the function is not loaded.
 template <class Function>
 Function* function_named(const char* name) {
   return reinterpret_cast<Function*>(dlsym(RTLD_DEFAULT, name));

@@ -24,15 +24,11 @@ struct SymmetricMatrix {
 };
 
 /// The Cholesky factor of a symmetric positive definite matrix (CHOLMOD, supernodal). The ordering is computed once for
-/// each pattern.
-///
-/// factorize() limits OpenBLAS to one thread in the whole process, and OpenMP to the calling thread.
-///
+/// each pattern. factorize() limits OpenBLAS to one thread in the whole process, and OpenMP to the calling thread.
 /// Thread-safe: no, but two threads can use different factors if factors_may_work_at_once(). Realtime-safe: no.
 class Factor {
  public:
-  /// Computes the ordering only; there are no values yet.
-  explicit Factor(const SymmetricMatrix& pattern);
+  explicit Factor(const SymmetricMatrix& pattern);  ///< computes the ordering only; there are no values yet
   ~Factor();
   Factor(Factor&&) noexcept;
   Factor& operator=(Factor&&) noexcept;
@@ -42,8 +38,7 @@ class Factor {
 
   /// Changes the factor to that of `grown`, in which some unknowns have twins. The twins follow the old unknowns, and
   /// `twin_of` contains their originals. If the twins are tied to their originals, `grown` is equal to the old matrix.
-  /// T is the map that ties the twins, C is the map that moves only the twins, and d are the distances of the twins
-  /// from their originals:
+  /// T maps to tied twins, C moves only the twins, and d are the distances of the twins from their originals:
   ///
   ///     TᵀAT = the old matrix,   S = CᵀAC − (CᵀAT)(TᵀAT)⁻¹(TᵀAC),   S d = Cᵀb − (CᵀAT)(TᵀAT)⁻¹Tᵀb
   ///

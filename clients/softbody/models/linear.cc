@@ -10,11 +10,9 @@
 namespace tendon::softbody {
 namespace {
 
-/// The relative change of W for which the glide is used again.
-constexpr double kSlopesAlike = 0.1;
+constexpr double kSlopesAlike = 0.1;  ///< relative change of W for which the glide is used again
 
-/// Steeper surfaces are outside the range of linear elasticity.
-constexpr double kSteepest = 10;
+constexpr double kSteepest = 10;  ///< steeper surfaces are outside the range of linear elasticity
 
 constexpr Eigen::Index kAtOnce = 64;  // makes CHOLMOD use products of matrices
 

@@ -14,9 +14,8 @@ namespace tendon::softbody {
 /// the whole body change K and f, and an answer is then two solves.
 class LinearModel : public Model {
  public:
-  /// The initial shape is the shape at rest with gravity. The solid must outlive this object. If `glides` is true, an
-  /// answer at rest contains Reaction::glide. Throws std::invalid_argument if the law of the solid is not linear, and
-  /// std::runtime_error if the solid is not held.
+  /// Starts at rest with gravity. `solid` must outlive it. With `glides`, an answer at rest has Reaction::glide. Throws
+  /// std::invalid_argument if the law is not linear, and std::runtime_error if the solid is not held.
   LinearModel(const Solid& solid, const TouchSurface& surface, const EffectsConfig& effects = {}, bool glides = false);
 
   Reaction press(const Patch& patch, Prescribed given, double value) override;
@@ -27,8 +26,7 @@ class LinearModel : public Model {
   bool glides() const noexcept override { return glides_ && step_ == 0; }
   std::size_t bytes() const noexcept override;
 
-  /// Returns the free displacements (m) for 1 N on the patch.
-  VectorXd displacements(const Patch& patch) const;
+  VectorXd displacements(const Patch& patch) const;  ///< free displacements (m) for 1 N on the patch
 
  private:
   Mat2 giving(const Patch& patch);
@@ -87,12 +85,10 @@ std::unique_ptr<Solver> with_factor(const Solid& solid);
 MatrixXd surface_compliance(const Solid& solid, const Vec3& normal, const std::vector<int>& nodes,
                             const Solver& solver);
 
-/// A linear model without effects that uses a Solver. Each answer is one approximate solve.
-///
-/// Reaction::error covers the error of the solve. If c is the compliance and m is its uncertainty, the force F is too
-/// large by at most F m / (c + m). By the Cauchy–Schwarz inequality, the error of the slope is at most F q √m, where q²
-/// = sᵀ K⁻¹ s for the loads s that read the slope. q is computed at `middle` and increased by a fifth for other
-/// positions.
+/// A linear model without effects that uses a Solver: each answer is one approximate solve. Reaction::error covers the
+/// error of the solve. If the compliance c has the uncertainty m, the force F is too large by at most F m / (c + m). By
+/// the Cauchy–Schwarz inequality, the error of the slope is at most F q √m, where q² = sᵀ K⁻¹ s for the loads s that
+/// read the slope. q is computed at `middle` and increased by a fifth for other positions.
 class SolvedModel : public Model {
  public:
   /// The solid must outlive this object.
@@ -122,8 +118,7 @@ class CondensedModel : public Model {
   bool glides() const noexcept override { return glides_; }
   std::size_t bytes() const noexcept override;
 
-  /// m/N, symmetric, in the order of nodes().
-  const MatrixXd& table() const noexcept { return table_; }
+  const MatrixXd& table() const noexcept { return table_; }  ///< m/N, symmetric, in the order of nodes()
   const std::vector<int>& nodes() const noexcept { return nodes_; }
 
  private:

@@ -14,7 +14,6 @@ namespace tendon::softbody {
 struct Division;
 struct EffectsConfig;
 
-/// The quantity that is given.
 enum class Prescribed : std::uint8_t {
   kDepth,       ///< mean depth of the patch, m; the force may pull
   kLeastDepth,  ///< minimum of the mean depth, m; the tool cannot pull
@@ -36,7 +35,6 @@ constexpr std::string_view name_of(SolverPath path) {
   return path == SolverPath::kOnly ? "" : kSolverPathNames.at(static_cast<std::size_t>(path) - 1);
 }
 
-/// The answer of a body to a patch.
 struct Reaction {
   double force = 0;  ///< N, along the normal
   double depth = 0;  ///< m, mean over the patch
@@ -44,8 +42,7 @@ struct Reaction {
   /// without the stiffness that inertia adds within one step.
   double stiffness = 0;
   Vec2 slope = Vec2::Zero();  ///< ∂depth/∂(patch position) for the present shape
-  /// The derivatives with respect to the patch position c. W is ∂w/∂c for the weights w of the patch, and A is the
-  /// stiffness of the body.
+  /// Derivatives with respect to the patch position c: W is ∂w/∂c for its weights w, and A the stiffness of the body.
   struct Glide {
     Vec2 tilting = Vec2::Zero();  ///< 1/m, ∂slope/∂depth
     Mat2 curving = Mat2::Zero();  ///< 1/m, ∂slope/∂c for the present shape
@@ -57,15 +54,11 @@ struct Reaction {
   SolverPath way = SolverPath::kOnly;  ///< the one with the larger share if two are blended
 };
 
-/// Returns the force (N) of the tool. `untouched` is the depth without the tool (m), and `compliance` is the change of
-/// depth per force (m/N).
+/// Returns the force (N) of the tool. `untouched` is the depth without it (m), `compliance` the depth per force (m/N).
 double constrained_force(Prescribed given, double value, double untouched, double compliance);
 
-/// `rest` is the depth (m) at rest.
-double secant(const Reaction& reaction, double rest);
+double secant(const Reaction& reaction, double rest);  ///< `rest` is the depth (m) at rest
 
-/// The interface of all models.
-///
 /// Thread-safe: no. Realtime-safe: no.
 class Model {
  public:
@@ -78,22 +71,17 @@ class Model {
   /// this is one step. If the patch has no nodes, there is no contact.
   virtual Reaction press(const Patch& patch, Prescribed given, double value) = 0;
 
-  /// Must be called after the solid has been cut in place. Throws std::logic_error if the model does not support
-  /// cutting.
+  /// Must be called after the solid has been cut in place. Throws std::logic_error if the model cannot be cut.
   virtual void cut(const Division& division, const EffectsConfig& effects);
 
-  /// Continues from the shape of `before`, which is the same model before a cut. Node i of this model was
-  /// node_before[i]. Throws the errors of cut().
+  /// Continues from the shape of `before`, this model before a cut. Node i was node_before[i]. Throws as cut() does.
   virtual void go_on_from(const Model& before, std::span<const int> node_before);
 
-  /// Returns the time that one press simulates in s, or 0 if the body is always at rest.
-  virtual double step() const noexcept { return 0; }
+  virtual double step() const noexcept { return 0; }  ///< s, time that one press simulates; 0: always at rest
 
-  /// Returns true if an untouched body always has the shape of its mesh.
-  virtual bool still() const noexcept { return true; }
+  virtual bool still() const noexcept { return true; }  ///< an untouched body always has the shape of its mesh
 
-  /// Returns true if Reaction::glide is computed for patches with curvatures.
-  virtual bool glides() const noexcept { return false; }
+  virtual bool glides() const noexcept { return false; }  ///< computes Reaction::glide for patches with curvatures
 
   virtual std::size_t bytes() const noexcept = 0;
 };

@@ -4,8 +4,7 @@
 namespace tendon::softbody {
 namespace {
 
-/// Minimum cosine between a step and its change of forces.
-constexpr double kLeastCurvature = 1e-8;
+constexpr double kLeastCurvature = 1e-8;  ///< minimum cosine between a step and its change of forces
 
 }  // namespace
 

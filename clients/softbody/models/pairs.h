@@ -11,9 +11,7 @@ namespace tendon::softbody {
 
 /// Limited-memory BFGS (Nocedal 1980) with a kept factor K₀ of the stiffness and up to eight pairs of a step and its
 /// change of forces. The inverse H maps the last change of forces to the last step, and is positive definite if K₀ is.
-///
 /// The caller passes K₀⁻¹ times each change of forces, because it usually has this result already.
-///
 /// Thread-safe: no. Realtime-safe: no.
 class Pairs {
  public:
@@ -21,15 +19,12 @@ class Pairs {
 
   void clear() noexcept { order_.clear(); }
 
-  /// `change` is the change of the forces by `step` (N), and `solved` is K₀⁻¹ `change`. The pair is ignored if the
-  /// curvature along the step is not positive.
+  /// `change` is that of the forces by `step` (N), `solved` K₀⁻¹ `change`. Ignored if the curvature is not positive.
   void add(const VectorXd& step, const VectorXd& change, const VectorXd& solved);
 
-  /// Returns H b. `solved` is K₀⁻¹ b.
-  VectorXd times(const VectorXd& b, const VectorXd& solved) const;
+  VectorXd times(const VectorXd& b, const VectorXd& solved) const;  ///< H b; `solved` is K₀⁻¹ b
 
-  /// Returns the rows and columns of H − K₀⁻¹ for `unknowns`.
-  MatrixXd adds(const std::vector<int>& unknowns) const;
+  MatrixXd adds(const std::vector<int>& unknowns) const;  ///< rows and columns of H − K₀⁻¹ for `unknowns`
 
   int count() const noexcept { return static_cast<int>(order_.size()); }
   std::size_t bytes() const noexcept;

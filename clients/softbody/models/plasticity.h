@@ -16,8 +16,7 @@ struct Yield {
   double hardening = 0;  ///< H, Pa
 };
 
-/// Throws std::invalid_argument if a field is invalid. The message contains its name.
-void check(const Yield& yield);
+void check(const Yield& yield);  ///< throws std::invalid_argument with the name of an invalid field
 
 /// A solid with a plastic strain p, symmetric and traceless, at every quadrature point. With ε the strain of its law
 /// (linear: sym(F − I); corotational: RᵀF − I, so p rotates with the material) its stress is that of ε − p. A step from
@@ -25,10 +24,9 @@ void check(const Yield& yield);
 ///
 ///     min over p:  Ψ(ε − p) + ⅓ H |p|² + √⅔ σ |p − p₀|
 ///
-/// The terms are the elastic energy, the hardening energy, and the dissipation. The minimum is the radial return
-/// (Wilkins 1964; Simo & Hughes 1998, box 3.1). Because a step has an energy (Ortiz & Stainier 1999), Newton's method
-/// can use a line search as for an elastic body. Before the first yield the forces are bit-identical to those of the
-/// original solid.
+/// The terms are elasticity, hardening and dissipation. The minimum is the radial return (Wilkins 1964; Simo & Hughes
+/// 1998, box 3.1). Because a step has an energy (Ortiz & Stainier 1999), Newton's method can use a line search as for
+/// an elastic body. Before the first yield the forces are bit-identical to those of the original solid.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class PlasticSolid : public Solid {

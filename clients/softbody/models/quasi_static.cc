@@ -19,8 +19,7 @@ constexpr double kDecrease = 1e-4;
 constexpr double kShortest = 1.0 / 64;
 
 /// The factor is computed again after kPatience steps without an accurate answer. If sides of the body are in contact,
-/// it is computed again if a step leaves more than kSlow of the remaining energy, because the set of nodes in contact
-/// changes.
+/// it is computed again if a step leaves more than kSlow of the remaining energy, because the contact changes.
 constexpr int kPatience = 16;
 constexpr double kSlow = 1.0 / 16;
 
@@ -33,8 +32,7 @@ constexpr int kTangentRounds = 5;
 /// If the relative error of the force is larger, the body is not at rest, and there is no glide.
 constexpr double kAtRest = 0.1;
 
-/// The relative change of the load and the force for which the glide is used again.
-constexpr double kGlidesAlike = 0.04;
+constexpr double kGlidesAlike = 0.04;  ///< relative change of the load and the force for which the glide is used again
 
 /// The step (m) of finite differences. In a body of some mm its relative error is 1e-4.
 constexpr double kNudge = 1e-7;
@@ -43,11 +41,9 @@ constexpr double kNudge = 1e-7;
 constexpr int kLooks = 10;
 constexpr double kParted = 1e-3;
 
-/// Smaller relative changes are rounding errors.
-constexpr double kHeard = 1e-8;
+constexpr double kHeard = 1e-8;  ///< smaller relative changes are rounding errors
 
-/// An error that corresponds to a smaller depth (m) is ignored.
-constexpr double kUnseen = 1e-12;
+constexpr double kUnseen = 1e-12;  ///< an error that corresponds to a smaller depth (m) is ignored
 
 }  // namespace
 
@@ -174,9 +170,8 @@ VectorXd QuasiStaticModel::needed(const VectorXd& shape, const Elastic::Forces& 
   return change;
 }
 
-/// The state at the last step of an answer.
-struct QuasiStaticModel::Tangent {
-  const VectorXd& by_tool;  ///< H w
+struct QuasiStaticModel::Tangent {  // the state at the last step of an answer
+  const VectorXd& by_tool;          ///< H w
   const Elastic::Forces& now;
   bool among_sides;
 };

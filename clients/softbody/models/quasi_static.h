@@ -11,9 +11,8 @@
 
 namespace tendon::softbody {
 
-/// Newton's method on the elastic energy, for large rotations and strains. The depth of the tool is a constraint, and
-/// the initial shape is that of the last answer. With inertia this is the implicit Euler method. Without it there is no
-/// velocity and no mass.
+/// Newton's method on the elastic energy, for large rotations and strains, from the shape of the last answer. The depth
+/// of the tool is a constraint. With inertia this is implicit Euler; otherwise there is no velocity and no mass.
 ///
 /// The factor is used for several answers and is corrected by the last eight steps (Pairs), because a new factor needs
 /// the time of thirty steps. If the stiffness is not positive definite, the negative eigenvalues are removed at each
@@ -28,8 +27,7 @@ class QuasiStaticModel : public Model {
     double tolerance = 1e-6;
     std::optional<double> self_collision = {};  ///< Pa/m, c of SelfCollision
     bool glides = true;
-    /// The accepted relative uncertainty of the stiffness. The error is usually the square of it.
-    double tangent = 0.02;
+    double tangent = 0.02;  ///< accepted relative uncertainty of the stiffness, whose error is usually the square of it
   };
   /// The initial shape is the shape at rest with gravity. `elastic` must outlive this object.
   QuasiStaticModel(const Elastic& elastic, const TouchSurface& surface, const Config& config,
@@ -55,10 +53,8 @@ class QuasiStaticModel : public Model {
     glided_.reset();
     forget_forces();
   }
-  /// Must be called if `elastic` has changed.
-  void forget_forces() { known_.reset(); }
-  /// Removes the tool and finds the shape at rest, or advances by one time step. Returns the remaining energy (J).
-  double release();
+  void forget_forces() { known_.reset(); }  ///< must be called if `elastic` has changed
+  double release();  ///< removes the tool and finds rest, or takes one time step; returns the remaining energy (J)
 
   // For RigidContact: the energy and the free forces without a tool.
   Elastic::Forces forces() const;

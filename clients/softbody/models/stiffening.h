@@ -18,15 +18,12 @@ struct StiffnessOverTime {
   double factor_at(double time) const;
 };
 
-/// Throws std::invalid_argument if a field is invalid. The message contains its name.
-void check(const StiffnessOverTime& law);
+void check(const StiffnessOverTime& law);  ///< throws std::invalid_argument with the name of an invalid field
 
 /// A body with a variable Young's modulus, such as a muscle. The tool must be the only load, and the energy must be
-/// proportional to the modulus. The shape at a given depth does not depend on the modulus, so only the forces are
-/// scaled.
-///
-/// The body is not passive: if the modulus changes, the stored energy changes without work of the hand. The limiter of
-/// the server protects the hand.
+/// proportional to the modulus: the shape at a given depth then does not depend on it, and only the forces are scaled.
+/// The body is not passive, because a change of the modulus changes the stored energy without work of the hand. The
+/// limiter of the server protects the hand.
 class StiffeningModel : public Model {
  public:
   /// Starts with the factor at time 0. Throws the errors of check().

@@ -19,8 +19,7 @@ constexpr std::string_view kMagic = "TENDONST";
 constexpr std::uint32_t kVersion = 1;
 constexpr std::uintmax_t kMostBytes = std::uintmax_t{4} << 30;
 constexpr std::size_t kHeader = 64;
-/// The tolerance for negative eigenvalues, relative to the diagonal.
-constexpr double kRounding = 1e-10;
+constexpr double kRounding = 1e-10;  ///< tolerance for negative eigenvalues, relative to the diagonal
 
 std::size_t bytes_of(std::size_t nodes) {
   return kHeader + 4 * nodes + 4 * (nodes % 2) + 4 * nodes * (nodes + 1) + sizeof(std::uint64_t);

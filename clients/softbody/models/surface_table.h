@@ -9,10 +9,8 @@
 
 namespace tendon::softbody {
 
-/// The surface compliance of a linear body. It needs a factor of the whole body once, and an answer then needs some
-/// microseconds (CondensedModel).
-///
-/// The format of the file is little-endian. The first column is the number of bytes:
+/// The surface compliance of a linear body. It needs a factor of the whole body once, then some microseconds per answer
+/// (CondensedModel). The file is little-endian; the first column is the number of bytes:
 ///
 ///     8   "TENDONST"
 ///     4   version, 1                                4   m, the number of nodes
@@ -37,8 +35,7 @@ std::uint64_t digest_of(const Solid& solid, const Vec3& normal);
 /// Throws std::runtime_error if the file cannot be written, or if it exists and is not a table.
 void write_table(const std::filesystem::path& file, const SurfaceTable& table);
 
-/// Throws std::invalid_argument if the file is not a valid table. The table must be positive semidefinite, because it
-/// could generate energy otherwise.
+/// Throws std::invalid_argument unless it is a valid table: positive semidefinite, since others could generate energy.
 SurfaceTable read_table(const std::filesystem::path& file);
 
 }  // namespace tendon::softbody

@@ -11,8 +11,7 @@ namespace {
 
 constexpr double kSame = 1e-6;  // relative
 
-/// `free` is −1 for fixed nodes.
-struct Grid {
+struct Grid {  // `free` is −1 for fixed nodes
   std::array<int, 3> count{};
   std::vector<int> free;
   int free_nodes = 0;

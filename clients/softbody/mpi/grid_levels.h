@@ -8,11 +8,9 @@
 
 namespace tendon::softbody {
 
-/// The interpolation from a coarse grid to a fine grid, for geometric multigrid. It is the same on every rank.
-///
-/// The nodes must form a grid with equal steps, as in block(). A coarse cell contains two fine cells along each axis.
-/// Interpolation is quadratic for hex27 and linear for other elements. The components of a node must be all free or all
-/// fixed.
+/// The interpolation from a coarse grid to a fine grid, for geometric multigrid, the same on every rank. The nodes must
+/// form a grid with equal steps, as in block(); a coarse cell contains two fine cells along each axis. Interpolation is
+/// quadratic for hex27 and linear for other elements. The components of a node must be all free or all fixed.
 struct GridLevel {
   struct Weight {
     int node;

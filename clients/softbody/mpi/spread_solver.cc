@@ -26,7 +26,6 @@ void check(PetscErrorCode code) {
                            (more != nullptr && *more != '\0' ? std::string(": ") + more : std::string()));
 }
 
-/// Destroys an object of PETSc.
 template <class Handle, PetscErrorCode (*kDestroy)(Handle*)>
 class Owned {
  public:
@@ -175,8 +174,7 @@ class SpreadSolver : public Solver {
  private:
   static constexpr PetscInt kMostRounds = 1000;
 
-  /// Ranks own whole nodes.
-  PetscInt first_row(int rank) const { return 3 * share(size_ / 3, rank, count_of(comm_)); }
+  PetscInt first_row(int rank) const { return 3 * share(size_ / 3, rank, count_of(comm_)); }  // ranks own whole nodes
 
   void expect_convergence() const {
     KSPConvergedReason reason = KSP_CONVERGED_ITERATING;

@@ -13,8 +13,7 @@ namespace tendon::softbody {
 /// Initializes MPI and PETSc. All functions below are collective.
 class Ranks {
  public:
-  /// Throws std::runtime_error if MPI or PETSc cannot be started.
-  Ranks(int& argc, char**& argv);
+  Ranks(int& argc, char**& argv);  ///< throws std::runtime_error if MPI or PETSc cannot be started
   ~Ranks();
   Ranks(const Ranks&) = delete;
   Ranks& operator=(const Ranks&) = delete;
@@ -44,18 +43,15 @@ inline constexpr double kMostPoisson = 0.49;
 ///
 /// where λ is 0.8 times the smallest Ritz value of M K from a first exact solve.
 ///
-/// Results are byte-identical for the same number of ranks; across numbers of ranks they agree to about 1e-12 of the
-/// largest value (factor) or to the tolerance. The mesh is replicated on every rank, which limits it to about 10⁶
-/// unknowns.
+/// Results are byte-identical for the same number of ranks; for others they agree to about 1e-12 of the largest value
+/// (factor) or to the tolerance. The mesh is replicated on every rank, which limits it to about 10⁶ unknowns.
 ///
-/// The solid's law is treated as linear, and the solid is not kept. Throws std::runtime_error with PETSc's message on
-/// failure or if a solver does not converge.
+/// Treats the law as linear. Does not keep the solid. Throws std::runtime_error with PETSc's message on failure or
+/// divergence.
 std::unique_ptr<Solver> on_ranks(const Solid& solid, Method method = Method::kChosen);
 inline constexpr double kRough = 1e-3;
 
-/// Sends bytes from rank 0 to all ranks.
-void share_out(std::vector<std::byte>& bytes);
-/// Ends all ranks.
+void share_out(std::vector<std::byte>& bytes);  ///< sends bytes from rank 0 to all ranks
 [[noreturn]] void end_all_ranks();
 
 }  // namespace tendon::softbody

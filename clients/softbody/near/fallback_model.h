@@ -11,17 +11,14 @@
 namespace tendon::softbody {
 
 /// Uses the first precomputed level that is valid for a press, and NearModel otherwise. Answers are blended at the
-/// border of a level. NearModel answers all presses with a given force.
-///
-/// While a level answers, NearModel follows the hand, so that a field is ready when it takes over (NearModel::follow).
+/// border of a level. NearModel answers all presses with a given force, and follows the hand while a level answers, so
+/// that a field is ready when it takes over (NearModel::follow).
 class FallbackModel : public Model {
  public:
-  /// The first level is preferred.
   FallbackModel(std::vector<std::unique_ptr<FallbackLevel>> levels, std::unique_ptr<NearModel> near);
 
   Reaction press(const Patch& patch, Prescribed given, double value) override;
-  /// Removes the levels, which are valid for the uncut body only.
-  void cut(const Division& division, const EffectsConfig& effects) override;
+  void cut(const Division& division, const EffectsConfig& effects) override;  ///< removes the levels of the uncut body
   void go_on_from(const Model& before, std::span<const int> node_before) override;
   bool glides() const noexcept override { return true; }
   std::size_t bytes() const noexcept override;
@@ -41,8 +38,7 @@ class FallbackModel : public Model {
   std::unique_ptr<NearModel> near_;
 };
 
-/// Interpolates the force and the stiffness. `share` (0 … 1) is the weight of `from`. The difference is added to
-/// `error`.
+/// Interpolates force and stiffness. `share` (0 … 1) is the weight of `from`. Adds the difference to `error`.
 Reaction blended(const Reaction& from, const Reaction& to, double share);
 
 }  // namespace tendon::softbody

@@ -12,8 +12,7 @@
 
 namespace tendon::softbody {
 
-/// Precomputed results for a body.
-struct Learned {
+struct Learned {  // precomputed results for a body
   std::optional<LearnedShapes> shapes{};
   std::optional<TabulatedAnswers> answers{};
   std::vector<std::string> warnings{};
@@ -29,10 +28,8 @@ struct LearnConfig {
   std::filesystem::path folder{};
 };
 
-/// Reads stored results, or computes them. An existing file is never overwritten. If a file is damaged, the result
-/// contains a warning, and the data are computed again.
-///
-/// The format is little-endian. The first column is the number of bytes:
+/// Reads stored results, or computes them. Never overwrites a file. A damaged file gives a warning, and its data are
+/// computed again. The format is little-endian; the first column is the number of bytes:
 ///
 ///     8   "TENDONSH" or "TENDONAN"                  4   version, 3; then 4 zeros
 ///     8   digest of the input

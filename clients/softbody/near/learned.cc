@@ -28,8 +28,7 @@ constexpr double kGoodEnough = 0.015;
 /// The accepted error of the chosen elements, and their maximum number.
 constexpr double kElementsLeft = 5e-3;
 constexpr int kMostElements = 240;
-/// Only the elements with the largest nonlinear parts are considered.
-constexpr Eigen::Index kCandidates = 1500;
+constexpr Eigen::Index kCandidates = 1500;  ///< only the elements with the largest nonlinear parts are considered
 
 /// The step of finite differences, relative to |q|, and its minimum (√J).
 constexpr double kNudged = 1e-6;
@@ -39,11 +38,9 @@ constexpr double kLeastNudge = 1e-9;
 constexpr int kMostSteps = 8;
 constexpr double kShortestShare = 1.0 / 64;
 constexpr double kShareOfDecrease = 1e-4;
-/// The minimum cosine between a step and its change of forces.
-constexpr double kLeastCurved = 1e-8;
+constexpr double kLeastCurved = 1e-8;  ///< minimum cosine between a step and its change of forces
 
-/// The fraction of the tolerance for Newton's method.
-constexpr double kForNewton = 0.25;
+constexpr double kForNewton = 0.25;  ///< fraction of the tolerance for Newton's method
 
 /// Relative tolerances for knots and for validation. The error of the force is quadratic.
 constexpr double kExactly = 1e-6;
@@ -70,8 +67,7 @@ Kernel apart(const Solid& solid, Law law, const std::vector<int>& elements, cons
   return kernel;
 }
 
-/// The nodes of some elements, and their indices for each corner.
-struct Corners {
+struct Corners {  // the nodes of some elements, and their indices for each corner
   Corners(const Mesh& mesh, const std::vector<int>& elements) {
     for (const int element : elements) {
       for (const int node : mesh.element(element)) nodes.push_back(node);
@@ -97,8 +93,7 @@ MatrixXd rows_of(const Solid& solid, const MatrixXd& free, const std::vector<int
   return rows;
 }
 
-/// Shapes that are orthonormal with the stiffness at rest.
-struct Basis {
+struct Basis {  // shapes that are orthonormal with the stiffness at rest
   MatrixXd shapes;
   MatrixXd q;
 };
@@ -126,8 +121,7 @@ Basis basis_of(const std::vector<const SolvedPress*>& presses, const SymmetricMa
   return {all * mix, mix.transpose() * gram * sizes.asDiagonal()};
 }
 
-/// The nonlinear part of the forces for each element.
-class Added {
+class Added {  // the nonlinear part of the forces for each element
  public:
   Added(const Solid& solid, const Basis& basis)
       : basis_(basis), elements_(static_cast<std::size_t>(solid.mesh().element_count())) {
@@ -252,8 +246,7 @@ bool go(const LearnedBody& body, const VectorXd& step, double& energy, VectorXd&
   return false;
 }
 
-/// BFGS.
-void learn_step(const VectorXd& step, const VectorXd& change, MatrixXd& inverse) {
+void learn_step(const VectorXd& step, const VectorXd& change, MatrixXd& inverse) {  // BFGS
   const double stiff = step.dot(change);
   if (!(stiff > kLeastCurved * step.norm() * change.norm())) return;
   const VectorXd solved = inverse * change;
@@ -261,7 +254,6 @@ void learn_step(const VectorXd& step, const VectorXd& change, MatrixXd& inverse)
   inverse += mixed * step.transpose() + step * mixed.transpose();
 }
 
-/// Returns false if there is no solution.
 bool solve_knot(const LearnedBody& body, const VectorXd& load, double depth, VectorXd& q, MatrixXd& inverse) {
   VectorXd slope(q.size());
   for (int i = 0; i < kMostSteps; ++i) {

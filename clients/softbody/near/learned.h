@@ -9,13 +9,11 @@
 
 namespace tendon::softbody {
 
-/// A reduced model of a nonlinear body under a patch. u = Φ q for some shapes Φ, and ω > 0 are the weights of some
-/// elements. The energy is
+/// A reduced model of a nonlinear body under a patch: u = Φ q with shapes Φ, and weights ω > 0 of elements. Energy:
 ///
 ///     E(q) = ½ qᵀq + Σ_e ω_e [W_e(Φ_e q) − ½ (Φ_e q)ᵀ K₀ₑ (Φ_e q)],     Φᵀ K₀ Φ = 1
 ///
-/// The linear part is exact. Only the nonlinear part is a sum over some elements (An, Kim & James 2008; Farhat, Chapman
-/// & Avery 2015).
+/// The linear part is exact, the rest a sum over some elements (An, Kim & James 2008; Farhat, Chapman & Avery 2015).
 struct LearnedShapes {
   PressGrid grid;
   std::vector<int> elements{};  ///< ascending
@@ -28,15 +26,12 @@ struct LearnedShapes {
   std::vector<double> errors{};
 };
 
-/// Ignores inaccurate solutions and unstable knots. A knot is unstable if ∂²E/∂q² at constant depth is not positive
-/// definite.
+/// Ignores inaccurate solutions and unstable knots, where ∂²E/∂q² at constant depth is not positive definite.
 LearnedShapes learn_shapes(const Solid& solid, const TouchSurface& surface, const SolvedPresses& presses,
                            const Tell& tell);
 
-/// Newton's method for E at constant depth. The initial shape is a cubic interpolation between knots. The inverse of
-/// the stiffness is interpolated as well and is updated by BFGS. The error of the stiffness is the square of the error
-/// of the inverse.
-///
+/// Newton's method for E at constant depth. The initial shape and the inverse of the stiffness, which BFGS updates, are
+/// cubic interpolations between knots. The error of the stiffness is the square of the error of the inverse.
 /// Thread-safe: yes, after construction. Realtime-safe: no.
 class LearnedBody {
  public:
@@ -46,10 +41,8 @@ class LearnedBody {
   std::optional<Reaction> press(const Patch& patch, double depth, const PressGrid::Point& point,
                                 double tolerance) const;
 
-  /// Returns the energy E (J) and its derivative in `slope`.
-  double energy(const VectorXd& q, VectorXd& slope) const;
-  /// Returns the depth of the patch per q.
-  VectorXd load(const Patch& patch) const;
+  double energy(const VectorXd& q, VectorXd& slope) const;  ///< energy E (J) and its derivative in `slope`
+  VectorXd load(const Patch& patch) const;                  ///< depth of the patch per q
 
   int shapes() const noexcept { return static_cast<int>(shapes_.cols()); }
   std::size_t elements() const noexcept { return static_cast<std::size_t>(kernel_.elements()); }

@@ -10,10 +10,8 @@
 namespace tendon::softbody {
 namespace {
 
-/// Relative to the diagonal, for columns that are linearly dependent.
-constexpr double kRidge = 1e-12;
-/// Smaller entries are zero.
-constexpr double kNone = 1e-12;
+constexpr double kRidge = 1e-12;  ///< relative to the diagonal, for columns that are linearly dependent
+constexpr double kNone = 1e-12;   ///< smaller entries are zero
 
 }  // namespace
 

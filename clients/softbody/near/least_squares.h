@@ -12,9 +12,8 @@ struct Squares {
   double square = 0;  ///< |b|²
 };
 
-/// Minimizes |G x − b| for x ≥ 0 with few entries (Lawson & Hanson 1974). It ends if |G x − b| ≤ `left` |b|, if there
-/// are `most` entries, or if no other entry helps. One entry is added at a time, because the method stalls with
-/// several.
+/// Minimizes |G x − b| for x ≥ 0 with few entries (Lawson & Hanson 1974), added one at a time because the method stalls
+/// with several. Ends if |G x − b| ≤ `left` |b|, at `most` entries, or if no other entry helps.
 VectorXd few_not_negative(const Squares& squares, double left, int most);
 
 }  // namespace tendon::softbody

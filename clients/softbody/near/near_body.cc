@@ -17,8 +17,7 @@ constexpr double kLeft = 1e-3;
 
 constexpr Eigen::Index kLoadsAtOnce = 8;
 
-/// The maximum number of elements that left_out() evaluates.
-constexpr std::size_t kWatched = 96;
+constexpr std::size_t kWatched = 96;  ///< maximum number of elements that left_out() evaluates
 
 Vec3 middle_of(const Mesh& mesh, int element) {
   Vec3 sum = Vec3::Zero();
@@ -26,8 +25,7 @@ Vec3 middle_of(const Mesh& mesh, int element) {
   return sum / static_cast<double>(mesh.element(element).size());
 }
 
-/// Random numbers between −1 and 1, always the same.
-class Noise {
+class Noise {  // random numbers between −1 and 1, always the same
  public:
   double next() { return static_cast<double>(random_() >> 11U) * 0x1p-52 - 1; }
 

@@ -10,20 +10,18 @@
 
 namespace tendon::softbody {
 
-/// A solid in which only the elements near the tool have a nonlinear law. The far field is linear about a shape u* and
-/// is condensed to the common nodes Γ. The motion of Γ is limited to some modes Ψ. The energy is
+/// A solid in which only the elements near the tool have a nonlinear law. The far field is linear about a shape u*,
+/// condensed to the common nodes Γ, whose motion is limited to some modes Ψ. The energy is
 ///
 ///     E(u_n, y) = Σ_near W_e(u) + r·y + ½ yᵀ S y,   u_Γ = u*_Γ + Ψ y,   r = Ψᵀ (force of the far elements on Γ at u*),
 ///     S = Ψᵀ (K_ΓΓ − K_Γf K_ff⁻¹ K_fΓ) Ψ,   K of the far elements at u*
 ///
 /// It is exact to first order at u*, which is the shape at rest or a shape with tools on near nodes.
 ///
-/// The modes are singular vectors of the motion of Γ for random forces on near nodes. The forces are larger close to
-/// the center. Each motion is a solution of the whole body, which is linear about u*. The forces of the near field on Γ
-/// are then −S Ψ, so the far field needs no factor.
-///
-/// The unknowns are the near nodes and y. The nodes of Γ count as fixed, and their values in u are ignored. own_node()
-/// returns the numbers of the nodes. The initial shape is u*, and its energy can be different from 0.
+/// The modes are singular vectors of the motion of Γ for random forces on near nodes, larger close to the center. Each
+/// motion is a solution of the whole body, linear about u*, so the forces of the near field on Γ are −S Ψ, and the far
+/// field needs no factor. The unknowns are the near nodes and y. The nodes of Γ count as fixed, and their values in u
+/// are ignored; own_node() numbers the nodes. The initial shape is u*, whose energy can differ from 0.
 ///
 /// Stateless. Thread-safe: yes, after construction. Realtime-safe: no.
 class NearBody : public Elastic {
@@ -31,17 +29,15 @@ class NearBody : public Elastic {
   struct Config {
     Vec3 middle = Vec3::Zero();  ///< m
     double radius = 0;           ///< m, maximum distance of the centers of near elements
-    /// The maximum number of modes. If Γ does not have more unknowns than this, the interface is exact.
-    int modes = 60;
+    int modes = 60;              ///< at most; the interface is exact if Γ has no more unknowns
     std::vector<int> pressed;
     VectorXd press;          ///< N: the load of a tool at `middle`
     VectorXd about{};        ///< u*, m; empty: at rest
     double about_depth = 0;  ///< m, depth of the tool in u*
   };
 
-  /// Builds the body in pieces, most of which are solves for a few loads. The last piece sets `made`, which is null if
-  /// all elements are near. `factor` is the factor of the stiffness at u*. `whole` and `factor` must outlive the
-  /// pieces.
+  /// Builds the body in pieces, most of which are solves for a few loads. The last piece sets `made`, null if all
+  /// elements are near. `factor` is that of the stiffness at u*. `whole` and `factor` must outlive the pieces.
   static Pieces make(const Solid& whole, const Factor& factor, Config config, std::unique_ptr<NearBody>& made);
 
   VectorXd beginning() const override { return beginning_; }
@@ -56,9 +52,8 @@ class NearBody : public Elastic {
   int modes() const noexcept { return static_cast<int>(modes_.cols()); }
   int interface() const noexcept { return static_cast<int>(rim_.size()); }
 
-  /// Estimates the force (N) on a tool at `depth` (m) that is missing because the far field is linear: z·(f(v) − f(u*)
-  /// − K (v − u*)). v is the shape of the linear far field, and z is the shape per depth. Only some elements next to Γ
-  /// are evaluated, and their result is scaled.
+  /// Estimates the force (N) at `depth` (m) that the linear far field misses: z·(f(v) − f(u*) − K (v − u*)), v its
+  /// shape, z the shape per depth. Evaluates only some elements next to Γ, and scales their result.
   double left_out(const VectorXd& u, double depth) const;
 
  private:

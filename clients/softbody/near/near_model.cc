@@ -23,16 +23,14 @@ constexpr double kRadiusIncompressible = 2;
 constexpr double kIncompressible = 0.45;
 constexpr double kElementsBeyond = 2;
 
-/// The motion of the hand, in patch radii, until only the new field is used.
-constexpr double kFadesOver = 0.25;
+constexpr double kFadesOver = 0.25;  ///< motion of the hand, in patch radii, until only the new field is used
 
 /// Without a background thread, a new field is built while the distance of the patch from the center grows from
 /// serves_to() to kWaits times this value. 60 modes need 29 pieces. The old field is valid up to twice serves_to().
 constexpr double kWaits = 1.7;
 constexpr double kPiecesOnTheWay = 30;
 
-/// The value of `room` at which a field must be complete.
-constexpr double kRoomLeft = 0.3;
+constexpr double kRoomLeft = 0.3;  ///< value of `room` at which a field must be complete
 
 /// Iterations for each piece, pieces that press the new field, and the piece that computes the factor.
 constexpr int kIterationsAtOnce = 6;
@@ -43,22 +41,17 @@ constexpr int kFactorAt = 1;
 constexpr double kFarSafety = 3;
 constexpr double kModesSafety = 3;
 
-/// The maximum distance between a patch and the center of its field, in patch radii.
-constexpr double kReach = 0.45;
+constexpr double kReach = 0.45;  ///< maximum distance between a patch and the center of its field, in patch radii
 
-/// A new field is requested if the depth has changed by this, in patch radii.
-constexpr double kDeeper = 0.1;
+constexpr double kDeeper = 0.1;  ///< a new field is requested if the depth has changed by this, in patch radii
 
-/// The accepted relative error of the shape of the whole body, and the maximum number of solves. A shape with ten times
-/// this error is not used.
+/// The accepted relative error of the shape of the whole body, unused above ten times this, and the most solves.
 constexpr double kShape = 1e-3;
 constexpr int kShapePresses = 6;
 
-/// If the distance is larger, the field is abandoned.
-constexpr double kLeftBehind = 3;
+constexpr double kLeftBehind = 3;  ///< if the distance is larger, the field is abandoned
 
-/// The number of answers in the mean motion of the hand.
-constexpr double kAnswersInMean = 16;
+constexpr double kAnswersInMean = 16;  ///< number of answers in the mean motion of the hand
 
 /// The distance (m) from the center at which a new field is needed.
 double serves_to(const TouchSurface& surface) { return kReach * surface.radius() / 2; }

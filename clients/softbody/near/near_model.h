@@ -30,16 +30,14 @@ Reaction kept(const Handover& before, double share, const Reaction& reaction);
 /// if ν > 0.45. The elements that the patch can touch within 0.45 a are also near. If the patch has moved by half of
 /// this distance, a new field is built. If all elements are near, QuasiStaticModel is used.
 ///
-/// Without a background thread, a field is linear about the shape at rest and is built in about 30 pieces. Each answer
-/// builds one piece, and more if the hand moves by more than a/200 in an answer. If the hand leaves the old field, one
-/// answer builds the rest. The number of pieces does not depend on a clock, so the answers are the same on every
-/// machine.
+/// Without a background thread, a field is linear about the shape at rest and is built in about 30 pieces: one per
+/// answer, more if the hand moves by more than a/200 in an answer, and the rest at once if the hand leaves the old
+/// field. No clock sets the number of pieces, so the answers are the same on every machine.
 ///
-/// With make_fields_by(), a field is requested when the patch has moved or when the depth has changed by a/10. The
-/// background thread solves the whole body at a predicted position of the hand, and the field is linear about this
-/// shape. An atomic pointer transfers the field, so that no answer waits or takes a lock. Old fields are freed by the
-/// background thread. If no field contains the patch, an answer is the linear shape and one Newton step with the factor
-/// K₀ at rest:
+/// With make_fields_by(), a field is requested when the patch has moved or the depth has changed by a/10. The
+/// background thread solves the whole body at a predicted position of the hand, and makes the field linear about this
+/// shape. An atomic pointer transfers it, so that no answer waits or takes a lock; the background thread frees old
+/// fields. Outside of a field, an answer is the linear shape and one Newton step with the factor K₀ at rest:
 ///
 ///     u₀ = δ z,   F₀ = z·f(u₀),   s = −P K₀⁻¹ (f(u₀) − F₀ w),   q = s·f(u₀ + s) / s·f(u₀),
 ///     u = u₀ + s/(1 − q),         F = F₀ + (z·f(u₀ + s) − F₀)/(1 − q)
@@ -49,32 +47,26 @@ Reaction kept(const Handover& before, double share, const Reaction& reaction);
 /// the error of the linear force is 15 %. If the step does not converge (ν = 0.499), its weight is reduced, and the
 /// error is larger.
 ///
-/// A cut discards all fields of the uncut body. The next answer builds a new field or requests it.
-///
-/// When a new field is used, the ratio of the forces and the difference of the slopes decrease to zero while the hand
-/// moves by a/4. Meanwhile the force is not the gradient of an energy, so a hand may gain the difference times a/4 on a
-/// closed path. The error includes this difference.
-///
-/// Reaction::error includes the error of Newton's method, three times NearBody::left_out(), and three times the error
-/// of the modes, which is the largest excess of the stiffness at five positions.
+/// A cut discards all fields; the next answer builds or requests one. When a new field is used, the ratio of the forces
+/// and the difference of the slopes decrease to zero while the hand moves by a/4. Meanwhile the force is not the
+/// gradient of an energy, so a hand may gain the difference times a/4 on a closed path. Reaction::error includes this
+/// difference, the error of Newton's method, three times NearBody::left_out(), and three times the error of the modes,
+/// which is the largest excess of the stiffness at five positions.
 class NearModel : public Model {
  public:
   struct Config {
     QuasiStaticModel::Config newton = {};
     int modes = NearBody::Config{}.modes;
   };
-  /// Builds the near field of `first`. `solid` and `surface` must remain valid for the lifetime of this object. Throws
-  /// the errors of QuasiStaticModel.
+  /// Builds the near field of `first`. `solid` and `surface` must outlive this object. Throws as QuasiStaticModel does.
   NearModel(const Solid& solid, const TouchSurface& surface, const Patch& first, const Config& config);
   /// Builds all near fields in `background`.
   NearModel(const Solid& solid, const TouchSurface& surface, const Config& config, Background background);
   ~NearModel() override;
 
-  /// Builds the next fields in `background`, one at a time. The work owns a copy of the body. If it throws, the next
-  /// press() rethrows the exception.
+  /// Builds further fields one at a time, on a copy of the body. The next press() rethrows an exception of this work.
   void make_fields_by(Background background);
-  /// Must be called before the body is cut.
-  void make_no_more_fields();
+  void make_no_more_fields();  ///< must be called before the body is cut
 
   Reaction press(const Patch& patch, Prescribed given, double value) override;
   /// Must be called if a level has answered. `room` is 0 at the border of the level, and 1 if the border is far. If
@@ -84,8 +76,7 @@ class NearModel : public Model {
   /// The first answers use the cut body without a field. They are scaled by the nonlinear part of the last force.
   void go_on_from(const Model& before, std::span<const int> node_before) override;
   bool glides() const noexcept override { return true; }
-  /// Includes the background thread, but not a field that is being built. Such a field needs two numbers for each
-  /// unknown and each of the 2 modes + 1 loads.
+  /// Includes the background thread, not a field being built: 2 numbers per unknown and each of 2 modes + 1 loads.
   std::size_t bytes() const noexcept override;
 
   /// The present near field, and counters since construction.
@@ -113,11 +104,8 @@ class NearModel : public Model {
   struct Making;
   struct Oracle;
 
-  /// Starts to build a field around the patch.
-  void begin(const Patch& patch, double depth);
-  /// Builds the pieces that are due. If `room` is 0, all of them are due.
-  void go_on(const Patch& patch, const Vec3& place, double depth, double room);
-  /// Builds or takes a field for the patch.
+  void begin(const Patch& patch, double depth);  ///< starts to build a field around the patch
+  void go_on(const Patch& patch, const Vec3& place, double depth, double room);  ///< builds due pieces; all at room 0
   void make_or_take(const Patch& patch, const Vec3& place, double depth, double room);
   void keep(const Patch& patch, const Vec3& place, const Reaction& felt);
   void take_over(std::unique_ptr<Field> field);
@@ -126,12 +114,9 @@ class NearModel : public Model {
   // With a background thread.
   void take_made(const Patch& patch, const Vec3& place, double depth);
   void ask();
-  /// Uses linear_press() if the field does not contain the patch.
   Reaction press_by_field_or_linear(const Patch& patch, const Vec3& place, Prescribed given, double value);
-  /// Uses the linear body and one Newton step.
-  Reaction linear_press(const Patch& patch, Prescribed given, double value) const;
-  /// Returns the difference between the last answer and linear_press().
-  Handover beyond_linear() const;
+  Reaction linear_press(const Patch& patch, Prescribed given, double value) const;  ///< linear body and one Newton step
+  Handover beyond_linear() const;  ///< difference between the last answer and linear_press()
 
   const Solid& solid_;
   const TouchSurface& surface_;

@@ -7,9 +7,7 @@
 namespace tendon::softbody {
 
 /// A coroutine that is divided into pieces by `co_await kPieceDone`. Its arguments must outlive it. If a piece throws,
-/// next() throws, and there are no more pieces.
-///
-/// Thread-safe: no. Realtime-safe: no.
+/// next() throws, and there are no more pieces. Thread-safe: no. Realtime-safe: no.
 class [[nodiscard]] Pieces {
  public:
   struct promise_type {  // NOLINT(readability-identifier-naming): the language has this name

@@ -17,25 +17,20 @@ namespace {
 constexpr double kPlaceApart = 0.25;
 constexpr double kDepthApart = 0.07;
 
-/// The error of the force is 2e-6, because the force includes the last step. The error of the stiffness is about
-/// kTangentTo².
+/// The error of the force is 2e-6, as it includes the last step, and that of the stiffness about kTangentTo².
 constexpr double kSolvedTo = 1e-5;
 constexpr double kTangentTo = 1e-3;
 constexpr double kSolvedWellEnough = 1e-4;
 constexpr int kMostIterations = 60;
 
-/// If a press does not converge, it is repeated in this number of steps.
-constexpr int kSmallSteps = 4;
+constexpr int kSmallSteps = 4;  ///< if a press does not converge, it is repeated in this number of steps
 
-/// The cost of a factor, in steps.
-constexpr int kStepsOfFactor = 30;
+constexpr int kStepsOfFactor = 30;  ///< cost of a factor, in steps
 
-/// The accepted relative difference between a force and its extrapolation. If it is larger, the body is on another
-/// branch.
+/// Accepted relative difference of a force from its extrapolation; above it, the body is on another branch.
 constexpr double kGoesOn = 0.05;
 
-/// A safety factor for points between knots and centers.
-constexpr double kUnseenBetween = 2;
+constexpr double kUnseenBetween = 2;  ///< safety factor for points between knots and centers
 
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
 
@@ -83,8 +78,7 @@ class Presser {
     return solved;
   }
 
-  /// The next press does not use the present state.
-  void leave() { lost_ = true; }
+  void leave() { lost_ = true; }  // the next press does not use the present state
 
   VectorXd shape() const { return solid_.to_free(model_.displacements()); }
   Eigen::Index size() const { return solid_.free_count(); }

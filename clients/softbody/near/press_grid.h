@@ -13,9 +13,8 @@
 
 namespace tendon::softbody {
 
-/// The presses that are solved in advance. The positions form a square grid with steps of a quarter of the patch
-/// radius, and each position has five depths. The outer ring and the last depth are needed for the transition to the
-/// next model (Trust).
+/// The presses that are solved in advance: a square grid of positions at steps of a quarter of the patch radius, with
+/// five depths each. The outer ring and the last depth are for the transition to the next model (Trust).
 struct PressGrid {
   Vec2 middle = Vec2::Zero();  ///< m, tangential
   double spacing = 0;          ///< m
@@ -23,8 +22,7 @@ struct PressGrid {
   double step = 0;             ///< m, between depths
   static constexpr int kLevels = 5;
 
-  /// For hands up to `reach` (m) from the center along each axis.
-  static PressGrid over(const Vec2& middle, double reach, double patch_radius);
+  static PressGrid over(const Vec2& middle, double reach, double patch_radius);  ///< hands within `reach` (m) per axis
 
   int side() const noexcept { return 2 * around + 1; }
   int places() const noexcept { return side() * side(); }
@@ -39,8 +37,7 @@ struct PressGrid {
   int column(int i, int j) const noexcept { return i * 2 * around + j; }
   Vec2 place(double i, double j) const { return middle + spacing * Vec2(i - around, j - around); }
 
-  /// A cell, and the coordinates 0 … 1 in the cell (position, position, depth).
-  struct Point {
+  struct Point {  // a cell, and the coordinates 0 … 1 in the cell (position, position, depth)
     int i;
     int j;
     int level;
@@ -48,8 +45,7 @@ struct PressGrid {
     int cell;
   };
   std::optional<Point> find(const Vec2& place, double depth) const;
-  /// The knots of a cell with their trilinear weights.
-  struct Corner {
+  struct Corner {  // a knot of a cell with its trilinear weight
     int knot;
     double share;
   };
@@ -58,16 +54,14 @@ struct PressGrid {
   std::array<Corner, 64> around_point(const Point& point) const;
 };
 
-/// The answer of the whole body to one press.
-struct SolvedPress {
+struct SolvedPress {  // the answer of the whole body to one press
   bool good = false;  ///< Newton's method has found the expected shape
   double energy = 0;  ///< J
   Reaction reaction;
   VectorXd shape;  ///< m, free
 };
 
-/// The answers at all knots, and at the centers of all cells for validation.
-struct SolvedPresses {
+struct SolvedPresses {  // at all knots, and at the centers of all cells for validation
   PressGrid grid;
   std::vector<SolvedPress> knots;
   std::vector<SolvedPress> middles;
@@ -80,23 +74,18 @@ struct SolvedPresses {
   Work work{};
 };
 
-/// Receives the progress as text.
-using Tell = std::function<void(std::string_view)>;
+using Tell = std::function<void(std::string_view)>;  ///< receives the progress as text
 
 /// Solves all presses on the whole body by Newton's method, from small to large depths. Each press starts from the
 /// extrapolation of the shapes above it, and each center of a cell from the cubic interpolation of the knots, so that
 /// all solutions are on the same branch. A factor is used again until this costs more steps than a new factor. If a
 /// force does not follow from the press above, the body has changed to another branch; the press is not `good`, and
-/// deeper ones are skipped.
-///
-/// If `glides` is true, Reaction::glide is computed, which doubles the number of solves.
-///
-/// Throws std::invalid_argument if no position is on the body, and the errors of QuasiStaticModel.
+/// deeper ones are skipped. `glides` computes Reaction::glide, which doubles the number of solves. Throws
+/// std::invalid_argument if no position is on the body, and the errors of QuasiStaticModel.
 SolvedPresses solve_presses(const Solid& solid, const TouchSurface& surface, const PressGrid& grid, bool glides,
                             const Tell& tell);
 
 /// The relative error of a level in each cell.
-///
 /// Thread-safe: yes, after construction. Realtime-safe: only Allowed::share() and room().
 class Trust {
  public:
@@ -114,8 +103,7 @@ class Trust {
    public:
     Allowed(const Trust& trust, double tolerance);
     double share(const PressGrid::Point& point) const;
-    /// Returns 1 if all cells around are accurate, and 0 where share() decreases.
-    double room(const PressGrid::Point& point) const;
+    double room(const PressGrid::Point& point) const;  ///< 1 if all cells around are accurate, 0 where share() falls
     int cells() const noexcept { return cells_; }
 
    private:

@@ -20,16 +20,13 @@ namespace tendon::softbody {
 /// interpolated energy, so a closed path gives no energy.
 struct TabulatedAnswers {
   PressGrid grid;
-  /// E, F and k in units of the grid, each with ∂x, ∂y, ∂x∂y.
-  static constexpr std::size_t kNumbers = 12;
+  static constexpr std::size_t kNumbers = 12;  ///< E, F and k in units of the grid, each with ∂x, ∂y, ∂x∂y
   std::vector<double> numbers{};
   std::vector<double> errors{};
 };
 
-/// The error is computed from the centers of the cells.
-TabulatedAnswers tabulate(const SolvedPresses& presses);
+TabulatedAnswers tabulate(const SolvedPresses& presses);  ///< the error is computed from the centers of the cells
 
-/// E and its derivatives in SI units.
 struct TabulatedEnergy {
   double energy = 0;           ///< J
   double force = 0;            ///< N, ∂E/∂δ

@@ -13,13 +13,11 @@ namespace tendon::softbody {
 
 using Flat = std::vector<Eigen::Vector2d>;
 
-/// Projects a polygon along the coordinate axis that gives the largest area. The coordinates are copied, so there is no
-/// rounding. The orientation may be reversed.
+/// Projects a polygon along the axis of the largest area, without rounding. The orientation may be reversed.
 Flat flat(std::span<const Vec3> corners);
 
-/// Checks if a polygon is simple. If it is not, returns the first corners of two sides that intersect or overlap. The
-/// result is exact unless a product of coordinates overflows or underflows. The time is quadratic in the number of
-/// corners.
+/// Returns the first corners of two sides that intersect or overlap; empty if the polygon is simple. Exact unless a
+/// product of coordinates overflows or underflows. The time is quadratic in the number of corners.
 std::optional<std::pair<int, int>> sides_that_meet(const Flat& polygon);
 
 /// Divides a simple polygon with n ≥ 3 corners into n − 2 triangles of positive area and the same orientation. If all

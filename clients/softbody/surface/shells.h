@@ -8,8 +8,7 @@
 
 namespace tendon::softbody {
 
-/// A closed part of a surface.
-struct Shell {
+struct Shell {  // a closed part of a surface
   std::vector<std::size_t> facets;
   double volume = 0;  ///< negative if the facets point inwards
   int depth = 0;      ///< number of shells around it
@@ -19,13 +18,11 @@ struct Shell {
 /// Returns the shells. If the surface is not closed, `depth` and `within` are undefined.
 std::vector<Shell> shells(const Triangles& surface);
 
-/// A shell inside an even number of others is a body and must point outwards. A shell inside an odd number of others
-/// is a cavity and must point inwards. Otherwise, or if there are more than kMostShells, throws std::invalid_argument
-/// "`name`: …" with a facet and its place.
+/// A shell inside an even number of others is a body and must point outwards; inside an odd number, a cavity and
+/// inwards. Otherwise, or above kMostShells, throws std::invalid_argument "`name`: …" with a facet and its place.
 void check_shells(const Triangles& surface, std::string_view name);
 
-/// Separates the bodies with their cavities.
-std::vector<Triangles> bodies(const Triangles& surface);
+std::vector<Triangles> bodies(const Triangles& surface);  ///< separates the bodies with their cavities
 
 /// Returns Triangles::notes, and notes about cavities and about several bodies.
 std::vector<std::string> notes_on(const Triangles& surface);

@@ -19,16 +19,14 @@ struct Triangles {
   std::vector<int> numbers{};  ///< numbers of the facets in the file, if they are different
   std::vector<std::string> notes{};
 
-  /// The volume is negative if the surface is inside out.
-  double volume() const;
+  double volume() const;  ///< negative if the surface is inside out
   double longest_side() const;
   int number(std::size_t facet) const { return numbers.empty() ? static_cast<int>(facet) + 1 : numbers[facet]; }
   std::array<Vec3, 3> corners(std::size_t facet) const;
   std::string place(std::size_t facet) const;  ///< "facet 7 at (1, 2, 3)"
 };
 
-/// Reads a surface file (read_facets()) and triangulates its polygons (triangles_of()). Each repair is added to
-/// `notes`:
+/// Reads a surface file (read_facets()) and triangulates it (triangles_of()). Each repair is added to `notes`:
 ///
 /// - Coincident points (kSamePlace) are merged. For STL this is normal and not a repair.
 /// - A facet with fewer than three distinct corners is removed.
@@ -40,8 +38,7 @@ Triangles read_surface(const std::filesystem::path& file);
 /// `ending` is the extension (".stl"), and `name` is used in error messages.
 Triangles parse_surface(std::string_view text, std::string_view ending, std::string_view name);
 
-/// The maximum number of corners of a polygon.
-inline constexpr std::size_t kMostCorners = 10'000;
+inline constexpr std::size_t kMostCorners = 10'000;  ///< maximum number of corners of a polygon
 
 /// Checks that the surface bounds one or more volumes: each edge belongs to two facets with opposite directions, no two
 /// facets intersect or overlap, and each shell is oriented correctly (check_shells()). Otherwise throws

@@ -126,8 +126,7 @@ void CapsuleContact::give_way(std::vector<Node>& nodes, const std::vector<Eigen:
 ///
 ///     δf = m δλ + λ (P v/r + δθ × m),   δu = G δf,   m·v = 0
 ///
-/// where P projects on the directions in which the capsule is curved. Solved by fixed-point iteration: δλ with the
-/// previous v.
+/// where P projects on the directions in which the capsule is curved. Fixed-point iteration: δλ with the previous v.
 void CapsuleContact::add_slopes(const Capsule& tool, const Vec3& about, const std::vector<Node>& nodes,
                                 const Pushes& pushes, Feel& feel) const {
   constexpr int kTurns = 5;  // each one reduces the error to a quarter

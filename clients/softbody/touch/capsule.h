@@ -21,33 +21,28 @@ namespace tendon::softbody {
 ///
 ///     force = −Σ λᵢ mᵢ,   torque = −Σ (yᵢ − p) × λᵢ mᵢ   about a point p
 ///
-/// The tangential compliance is included. SphereContact does not include it, and the difference is some percent for a
-/// deep press with ν = 0.45. In each iteration, the capsule is replaced by a tangent plane at each node, and a problem
-/// of `pushes.h` is solved. The capsule is convex, so the energy never increases. The search ends if the directions of
-/// the forces change by less than kEnough. Feel::error contains the rest.
+/// The tangential compliance is included; SphereContact omits it, which is some percent for a deep press with ν = 0.45.
+/// Each iteration replaces the capsule by a tangent plane at each node, and solves a problem of `pushes.h`. The capsule
+/// is convex, so the energy never increases. The search ends if the directions of the forces change by less than
+/// kEnough; Feel::error contains the rest.
 ///
 /// The stiffnesses are derivatives for a constant set of pushed nodes. They include the changes of the forces, of the
-/// normals and of the levers. If E has a negative curvature, as for a long handle that stands on its end, the stiffness
-/// is 0.
-///
-/// The contact must be many nodes wide, and the strains must be small.
+/// normals and of the levers, and are 0 if E has a negative curvature, as for a long handle that stands on its end. The
+/// contact must be many nodes wide, and the strains must be small.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class CapsuleContact {
  public:
-  /// `nodes` are the touchable nodes, in ascending order. `half_length` is the distance (m) from the center to the
-  /// center of an end. Computes the compliance with three solves for each node. Throws std::invalid_argument. `surface`
-  /// must outlive this object.
+  /// `nodes` are the touchable nodes, ascending; `half_length` (m) is from the center to the center of an end. Computes
+  /// the compliance with three solves for each node. `surface` must outlive this object. Throws std::invalid_argument.
   CapsuleContact(const Solid& solid, const TouchSurface& surface, const std::vector<int>& nodes, double radius,
                  double half_length);
 
-  /// Returns the answer for a capsule at `middle` with the unit vector `axis` (body frame). The torque is about
-  /// `about`. There is no force if an argument is not finite. Throws std::out_of_range if the capsule touches the body
-  /// outside `nodes`.
+  /// Answers a capsule at `middle` with the unit vector `axis` (body frame); the torque is about `about`. No force if
+  /// an argument is not finite. Throws std::out_of_range if the capsule touches the body outside `nodes`.
   Feel at(const Vec3& middle, const Vec3& axis, const Vec3& about);
 
-  /// Returns the number of problems that the last answer has solved.
-  int rounds() const noexcept { return rounds_; }
+  int rounds() const noexcept { return rounds_; }  ///< number of problems that the last answer has solved
 
   std::size_t bytes() const noexcept;
 
@@ -65,8 +60,7 @@ class CapsuleContact {
     double half_length;
     Vec3 nearest_of_axis(const Vec3& y) const;
     Plane nearest(const Vec3& y, const Vec3& otherwise) const;
-    /// Returns the height (m) of the capsule above x along n, if there is one.
-    std::optional<double> above(const Vec3& x, const Vec3& n) const;
+    std::optional<double> above(const Vec3& x, const Vec3& n) const;  ///< m, of the capsule above x along n, if any
   };
   struct Node {
     Eigen::Index row;

@@ -12,7 +12,6 @@
 
 namespace tendon::softbody {
 
-/// Position and orientation of a handle.
 struct Pose {
   Vec3 position = Vec3::Zero();  ///< m
   Mat3 turn = Mat3::Identity();  ///< from the handle frame
@@ -23,15 +22,12 @@ struct FeltTorque {
   Mat3 stiffness = Mat3::Zero();  ///< N·m/rad, −∂torque/∂θ, positive semidefinite
 };
 
-/// Returns the nearest positive semidefinite matrix.
-Mat3 not_negative(const Mat3& stiffness);
+Mat3 not_negative(const Mat3& stiffness);  ///< nearest positive semidefinite matrix
 
 struct Feel {
-  Vec3 force = Vec3::Zero();  ///< N, on the hand
-  /// N/m, −∂force/∂position. It is symmetric and can be indefinite.
-  Mat3 stiffness = Mat3::Zero();
-  /// The distance from the tool to the surface at rest along the normal (m). Negative if the tool is inside.
-  double gap = 0;
+  Vec3 force = Vec3::Zero();      ///< N, on the hand
+  Mat3 stiffness = Mat3::Zero();  ///< N/m, −∂force/∂position, symmetric; can be indefinite
+  double gap = 0;  ///< m, from the tool to the surface at rest along the normal; negative: the tool is inside
   /// The tool may move by this distance (m) before `force` and `stiffness` are invalid. It does not consider `gap`.
   double valid_radius = 0;
   double error = 0;  ///< N, estimated by the solver
@@ -42,17 +38,15 @@ struct Feel {
   std::optional<FeltTorque> torque{};  ///< empty if the force cannot turn the handle
 };
 
-/// A tool that presses a patch of a body.
-///
-/// Without friction the force is the gradient of an energy E(q), the minimum of the elastic energy for the tool at q.
-/// If the body is at rest, it never gives out energy. c is the tangential position of the patch, h(c) is the mean
-/// height of the surface at rest, δ = h(c) − q·n is the depth, and F(δ, c) is the force of the body:
+/// A tool on a patch of a body. Without friction the force is the gradient of an energy E(q), the minimum of the
+/// elastic energy for the tool at q. If the body is at rest, it never gives out energy. c is the tangential position of
+/// the patch, h(c) the mean height of the surface at rest, δ = h(c) − q·n the depth, and F(δ, c) the force of the body:
 ///
 ///     force = F·n + F·(∂depth/∂c − ∂h/∂c)
 ///
-/// The second part is tangential: the surface below the patch has a slope. The stiffness is the second derivative of E.
-/// k = ∂F/∂δ, P is the tangential projection, g = ∂depth/∂c − ∂h/∂c, and t = tilting, M = curving and D = giving are
-/// from Reaction::Glide:
+/// The second part is tangential, from the slope of the surface. The stiffness is the second derivative of E. P is the
+/// tangential projection, k = ∂F/∂δ, g = ∂depth/∂c − ∂h/∂c, and t = tilting, M = curving and D = giving are from
+/// Reaction::Glide:
 ///
 ///     K = k v vᵀ + F (v (Pᵀt)ᵀ + Pᵀt vᵀ) + F Pᵀ (∂²h/∂c² − M − F D) P,   v = n + Pᵀg
 ///
@@ -67,8 +61,7 @@ class PatchContact {
     kBilateral,   ///< after the first contact the tool sticks and can pull
   };
 
-  /// A tool with a `tool_radius` (m) above 0 touches earlier. `model` and `surface` must remain valid for the lifetime
-  /// of this object.
+  /// A tool with a `tool_radius` (m) above 0 touches earlier. `model` and `surface` must outlive this object.
   PatchContact(Model& model, const TouchSurface& surface, double tool_radius, Side side,
                std::unique_ptr<Friction> friction = {});
 

@@ -15,8 +15,7 @@ namespace {
 constexpr int kAround = 2;  // points outside the box
 constexpr double kRoundingOfWay = 1e-6;
 
-/// Cubic B-splines with two derivatives.
-struct Splines {
+struct Splines {  // cubic B-splines
   std::array<double, 4> value, slope, bend;
 
   explicit Splines(double t) {  // 0 ≤ t ≤ 1

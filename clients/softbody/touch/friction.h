@@ -12,18 +12,11 @@ namespace tendon::softbody {
 using Vec2 = Eigen::Vector2d;
 
 /// Coulomb friction between a tool and a patch, with a small elastic range (Hayward & Armstrong 2000). A tangential
-/// spring connects the tool to an anchor. The anchor is dragged so that the force of the spring is limited:
-///
-///     |f| ≤ µ F
-///
-/// F is the normal force. The stiffness of the spring is constant, and dragging only loses energy, so friction takes
-/// energy on every closed path. The force does not deform the body.
-///
-/// Thread-safe: no.
+/// spring of constant stiffness connects the tool to an anchor, dragged so that |f| ≤ µ F for a normal force F.
+/// Dragging only loses energy, and so does every closed path. The force does not deform the body. Thread-safe: no.
 class Friction {
  public:
-  /// `stiffness` is in N/m. Throws std::invalid_argument.
-  Friction(double coefficient, double stiffness);
+  Friction(double coefficient, double stiffness);  ///< `stiffness` in N/m; throws std::invalid_argument
 
   struct Drag {
     Vec2 force = Vec2::Zero();  ///< N, on the tool, tangential
@@ -42,8 +35,7 @@ class Friction {
   std::optional<Vec2> anchor_;
 };
 
-/// Returns the tangential stiffness (N/m) of a half space under a disc with `radius` a (m) that does not slip: 8 G a/(2
-/// − ν) (Mindlin 1949).
+/// Tangential stiffness (N/m) of a half space under a disc of `radius` a (m), no slip: 8 G a/(2 − ν) (Mindlin 1949).
 double sideways_stiffness(const Material& material, double radius);
 
 }  // namespace tendon::softbody

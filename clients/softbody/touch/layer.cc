@@ -16,8 +16,7 @@ constexpr int kLeastPieces = 4;
 constexpr int kMostPieces = 32;
 constexpr int kBunch = 4;  // points along each side of a bunch
 
-/// A facet may be larger than at rest by this factor.
-constexpr double kGrown = 1.5;
+constexpr double kGrown = 1.5;  ///< facet may be larger than at rest by this factor
 
 Mat3 cross(const Vec3& v) { return (Mat3() << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0).finished(); }
 
@@ -266,8 +265,7 @@ Layer::Press Layer::press(const Near& near, std::span<const Placed> tools, const
       }
     }
     if (order == Order::kCurve) return;
-    // The tool translates by δt and rotates by δθ about the handle. Relative to it x moves by w = δx − δt + r̂ δθ;
-    // rotations add second-order terms.
+    // The tool moves by δt and δθ about the handle: relative to it x moves by w = δx − δt + r̂ δθ, to first order.
     Felt& felt = all.felt[site.tool];
     const Vec3 r = x - placed.handle->position;
     const Mat3 lever = cross(r);

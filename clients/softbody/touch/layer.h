@@ -12,14 +12,12 @@
 
 namespace tendon::softbody {
 
-/// A rigid tool in a handle.
-struct HeldTool {
+struct HeldTool {  // a rigid tool in a handle
   RigidShape shape;
   Vec3 offset = Vec3::Zero();  ///< m, from the handle to the center of the tool, handle frame
 
   Vec3 middle(const Pose& handle) const { return handle.position + handle.turn * offset; }
-  /// Returns the distance of a point x from the surface of the tool.
-  Distance distance(const Pose& handle, const Vec3& x) const;
+  Distance distance(const Pose& handle, const Vec3& x) const;  ///< distance of a point x from the surface of the tool
   double value(const Pose& handle, const Vec3& x) const { return shape.value(in_tool(handle, x)); }
   Vec3 in_tool(const Pose& handle, const Vec3& x) const {
     return handle.turn.transpose() * (x - handle.position) - offset;
@@ -34,16 +32,14 @@ struct HeldTool {
 /// Where the tool would be ℓ below the surface, the pressure is about Young's modulus. There are many points on each
 /// facet, so that the force has no steps if the facets are wider than the contact.
 ///
-/// The distance between points must be smaller than the thickness of the tool. Otherwise an edge of the tool slips off
-/// a row of points, and energy is lost. A blade of 2.6 mm (spoon.off end on, B1 with cells of 10 mm, 3 mm deep and 3 mm
-/// across) lost 81 to 88 % of the work with a distance of 1.4 mm, 3 to 4 % with 0.8 mm, and less than 0.1 % with 0.6
-/// mm. Body uses a quarter of the thickness of the tool. This is not possible if a facet is wider than 32 such
-/// distances.
+/// The distance between points must be smaller than the thickness of the tool; otherwise its edge slips off a row of
+/// points, and energy is lost. A blade of 2.6 mm (spoon.off end on, B1 with cells of 10 mm, 3 mm deep and 3 mm across)
+/// lost 81 to 88 % of the work with a distance of 1.4 mm, 3 to 4 % with 0.8 mm, and less than 0.1 % with 0.6 mm. Body
+/// uses a quarter of the thickness, which is not possible if a facet is wider than 32 such distances.
 ///
 /// With friction, points in contact are tied to the tool at the end of an answer. A tie is a tangential spring with the
-/// shear modulus divided by ℓ. Its force is at most µ times the pressure. If it is larger, the tie slides and loses
-/// energy. During a solution, the pressure and the normal of a tie are those of the last iteration (hold()), so
-/// friction has an energy too.
+/// shear modulus divided by ℓ; above µ times the pressure it slides and loses energy. During a solution, the pressure
+/// and the normal of a tie are those of the last iteration (hold()), so friction has an energy too.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class Layer {
@@ -79,7 +75,6 @@ class Layer {
 
   using Vec6 = Eigen::Matrix<double, 6, 1>;
   using Mat6 = Eigen::Matrix<double, 6, 6>;
-  /// The derivatives of Ψ with respect to the pose of a tool.
   struct Felt {
     Vec6 slope = Vec6::Zero();   ///< ∂Ψ/∂p: minus force and torque
     Mat6 curve = Mat6::Zero();   ///< ∂²Ψ/∂p²
@@ -98,8 +93,7 @@ class Layer {
   /// `places` are the positions (m) of the nodes of `near`.
   Press press(const Near& near, std::span<const Placed> tools, const Eigen::Matrix3Xd& places, Order order) const;
 
-  /// Returns the positions of the nodes for the displacements u.
-  Eigen::Matrix3Xd places(const Near& near, const VectorXd& u) const;
+  Eigen::Matrix3Xd places(const Near& near, const VectorXd& u) const;  ///< of the nodes for the displacements u
 
   /// Sets the pressures and normals for friction.
   void hold(const Near& near, std::span<const Placed> tools, const Eigen::Matrix3Xd& places);
@@ -141,10 +135,8 @@ class Layer {
     std::size_t first;
     std::size_t count;
     Shares middle;
-    /// An upper bound of the distance of its points from the center, divided by FacetOfPoints::reach of any shape.
-    double spread;
+    double spread;  ///< upper bound of the points' distance from the center / FacetOfPoints::reach, in any shape
   };
-  /// Connects a point to a tool.
   struct Tie {
     bool tied = false;
     Vec3 at = Vec3::Zero();      ///< m, handle frame

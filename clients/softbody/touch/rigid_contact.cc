@@ -13,45 +13,35 @@
 namespace tendon::softbody {
 namespace {
 
-/// The relative tolerance and the maximum number of steps at intermediate positions.
-constexpr double kOnTheWay = 0.03;
+constexpr double kOnTheWay = 0.03;  ///< relative tolerance and the maximum number of steps at intermediate positions
 constexpr int kMostOnTheWay = 4;
 
-/// Relative to the size of a facet.
-constexpr double kMargin = 0.25;
+constexpr double kMargin = 0.25;  ///< relative to the size of a facet
 
-/// Armijo's parameter, the shortest step, and the rounding error of the energy.
-constexpr double kToolDecrease = 1e-4;
+constexpr double kToolDecrease = 1e-4;  ///< Armijo's parameter, the shortest step, and the rounding error of the energy
 constexpr double kToolShortest = 1.0 / 64;
 constexpr double kContactRounding = 1e-13;
 
-/// The number of steps until a new factor.
-constexpr int kToolPatience = 16;
+constexpr int kToolPatience = 16;  ///< number of steps until a new factor
 constexpr int kMostMeets = 60;
 /// The remaining energy there, relative to that of an answer.
 constexpr double kMet = 1e-3;
 constexpr double kNoDrop = 1e-24;  // smaller relative changes are rounding errors
 
-/// An error that corresponds to a smaller motion (m) is ignored.
-constexpr double kToolUnseen = 1e-12;
+constexpr double kToolUnseen = 1e-12;  ///< an error that corresponds to a smaller motion (m) is ignored
 /// The same without contact.
 constexpr double kUnfelt = 1e-10;
 
-/// Smaller relative changes are rounding errors.
-constexpr double kToolHeard = 1e-8;
+constexpr double kToolHeard = 1e-8;  ///< smaller relative changes are rounding errors
 
-/// The accepted relative error of the stiffness, and the maximum number of rounds.
-constexpr double kCurveError = 2e-3;
+constexpr double kCurveError = 2e-3;  ///< accepted relative error of the stiffness, and the maximum number of rounds
 constexpr int kCurveRounds = 12;
 
-/// The step of finite differences, m.
-constexpr double kToolNudge = 1e-7;
+constexpr double kToolNudge = 1e-7;  ///< step of finite differences, m
 
-/// The minimum number of columns.
-constexpr int kKept = 600;
+constexpr int kKept = 600;  ///< minimum number of columns
 
-/// The maximum number of steps back.
-constexpr int kFarthest = 400;
+constexpr int kFarthest = 400;  ///< maximum number of steps back
 
 bool finite(const Pose& pose) { return pose.position.allFinite() && pose.turn.allFinite(); }
 

@@ -12,26 +12,21 @@
 
 namespace tendon::softbody {
 
-/// One or several rigid tools (RigidShape) on a nonlinear body at rest. W is the elastic energy, Ψ is the energy of the
-/// layer (layer.h), and p are the poses of the tools. The body minimizes
-///
-///     Π(u, p) = W(u) + Ψ(u, p)
-///
-/// Each hand receives the derivatives with respect to its own pose:
+/// One or several rigid tools (RigidShape) on a nonlinear body at rest. The body minimizes Π(u, p) = W(u) + Ψ(u, p),
+/// with the elastic energy W, the energy Ψ of the layer (layer.h) and the poses p of the tools. Each hand receives the
+/// derivatives with respect to its own pose:
 ///
 ///     force and torque = −∂Π/∂p,   K = Π_pp − Π_pu Π_uu⁻¹ Π_up
 ///
-/// If there is no friction, a closed path of all tools gives no energy. K includes the curvatures of the tools and of
-/// the surface.
-///
-/// In each step, the contact is solved exactly. The compliance of the nodes near the tools is computed with the factor
-/// of the model, one solve for each new unknown, and is corrected by the last steps (Pairs). Newton's method finds the
-/// minimum for these unknowns, and one solve moves the other nodes. A line search reduces Π. K is computed by conjugate
-/// gradients and finite differences, with an error of 0.2 %.
+/// Without friction, a closed path of all tools gives no energy. K includes the curvatures of the tools and of the
+/// surface. In each step, the contact is solved exactly. The compliance of the nodes near the tools is computed with
+/// the factor of the model, one solve for each new unknown, and is corrected by the last steps (Pairs). Newton's method
+/// finds the minimum for these unknowns, and one solve moves the other nodes. A line search reduces Π. K is computed by
+/// conjugate gradients and finite differences, with an error of 0.2 %.
 ///
 /// Between two answers, the tools move in steps of at most half a facet and an eighth of the thickness of the thinnest
-/// tool, so that no tool passes through the body. If a tool would need more than kMostSteps steps, it is moved out of
-/// the body and approaches again.
+/// tool, so that no tool passes through the body. A tool that would need more than kMostSteps steps is moved out of the
+/// body and approaches again.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class RigidContact {
@@ -47,9 +42,8 @@ class RigidContact {
   RigidContact(QuasiStaticModel& body, const Elastic& elastic, const TouchSurface& surface, std::vector<HeldTool> tools,
                const Config& config);
 
-  /// Returns an answer for each hand (body frame). An empty pose means that the hand is absent. If a pose is not
-  /// finite, there is no force and the tool does not move. Throws std::invalid_argument if the number of poses is
-  /// wrong.
+  /// Returns an answer for each hand (body frame); an empty pose is an absent hand. A pose that is not finite gives no
+  /// force and does not move the tool. Throws std::invalid_argument if the number of poses is wrong.
   std::vector<Feel> press(std::span<const std::optional<Pose>> handles);
 
   int iterations() const noexcept { return iterations_; }

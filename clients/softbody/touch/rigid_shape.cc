@@ -26,8 +26,7 @@ Triangles in_metres(const Triangles& surface, double scale) {
   return made;
 }
 
-/// Relative to the rounding.
-constexpr double kCoreShare = 1e-9;
+constexpr double kCoreShare = 1e-9;  ///< relative to the rounding
 
 /// Returns the minimum thickness (m) behind the centers of the facets.
 double thickness_of(const Triangles& surface, const SurfaceDistance& distance, double cell, std::string_view name) {

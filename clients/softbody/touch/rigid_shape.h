@@ -11,8 +11,7 @@
 
 namespace tendon::softbody {
 
-/// Returns the shortest rotation from one direction to another. For opposite directions, the axis is close to z, or to
-/// x if `from` is close to z.
+/// Returns the shortest rotation. For opposite directions, the axis is close to z, or to x if `from` is close to z.
 Mat3 shortest_rotation(const Vec3& from, const Vec3& to);
 
 /// The shape of a rigid tool, as the signed distance from all points within `rounding` of a box, the core. A core
@@ -22,9 +21,8 @@ Mat3 shortest_rotation(const Vec3& from, const Vec3& to);
 ///     φ = |w| − rounding outside the core,   max q − rounding inside it
 ///
 /// φ is exact outside the core, and its gradient is continuous there. Its second derivative has a step between flat and
-/// round sides. Inside the core, the gradient has a step halfway between two sides.
-///
-/// The shape can also be the inside of a closed surface, with distances on a grid (DistanceGrid).
+/// round sides. Inside the core, the gradient has a step halfway between two sides. The shape can also be the inside of
+/// a closed surface, with distances on a grid (DistanceGrid).
 ///
 /// Stateless. Thread-safe: yes. Realtime-safe: yes, after construction.
 class RigidShape {
@@ -33,25 +31,20 @@ class RigidShape {
   static RigidShape sphere(double radius);
   /// `half_length` is the distance from the center to the center of an end. `axis` is a unit vector.
   static RigidShape capsule(double radius, double half_length, const Vec3& axis);
-  /// `edge` is the radius of the edges and corners, at most half of the smallest size.
-  static RigidShape box(const Vec3& size, double edge);
+  static RigidShape box(const Vec3& size, double edge);  ///< `edge` rounds edges and corners, ≤ half of the least size
   /// The inside of `surface`. `scale` is the number of units per metre, and `around` is the margin of the grid (m).
   /// Throws std::invalid_argument with `name` if the surface does not pass check(), contains parts inside each other,
   /// or is thinner than two cells.
   static RigidShape mesh(const Triangles& surface, double scale, double cell, double around, std::string_view name);
 
-  /// `x` is in the frame of the tool. value() is faster.
-  Distance distance(const Vec3& x) const;
+  Distance distance(const Vec3& x) const;  ///< `x` in the tool frame; value() is faster
   double value(const Vec3& x) const;
 
-  /// The distance (m) from the center to the farthest point.
-  double reach() const noexcept { return reach_; }
+  double reach() const noexcept { return reach_; }  ///< distance (m) from the center to the farthest point
 
-  /// A lower bound of the thickness (m).
-  double thinnest() const noexcept { return thinnest_; }
+  double thinnest() const noexcept { return thinnest_; }  ///< lower bound of the thickness (m)
 
-  /// Returns the farthest point (m) along `direction`, a unit vector in the tool frame.
-  Vec3 farthest(const Vec3& direction) const;
+  Vec3 farthest(const Vec3& direction) const;  ///< m, point along `direction`, a unit vector; tool frame
 
   struct MeshFacts {
     std::size_t facets;

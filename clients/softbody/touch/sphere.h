@@ -13,9 +13,8 @@ namespace tendon::softbody {
 ///
 ///     dᵢ = heightᵢ − q·n + √(R² − |rᵢ|²),   |rᵢ| < R
 ///
-/// The forces λ ≥ 0 of the nodes minimize ½ λᵀGλ − dᵀλ, so that a pushed node is on the sphere. The active set starts
-/// with that of the last answer (`pushes.h`). The force is the derivative of this energy, so a closed path gives no
-/// energy:
+/// The forces λ ≥ 0 minimize ½ λᵀGλ − dᵀλ, so that a pushed node is on the sphere. The active set starts with that of
+/// the last answer (`pushes.h`). The force is the derivative of this energy, so a closed path gives no energy:
 ///
 ///     force = Σ λᵢ vᵢ,   vᵢ = n − rᵢ/√(R² − |rᵢ|²),      K = V G_AA⁻¹ Vᵀ   (second derivatives of d left out)
 ///
@@ -24,12 +23,10 @@ namespace tendon::softbody {
 /// Thread-safe: no. Realtime-safe: no.
 class SphereContact {
  public:
-  /// `body` and `surface` must remain valid for the lifetime of this object. Throws std::invalid_argument if the radius
-  /// is not positive.
+  /// `body` and `surface` must outlive this object. Throws std::invalid_argument if the radius is not positive.
   SphereContact(const CondensedModel& body, const TouchSurface& surface, double radius);
 
-  /// There is no force if q is not finite. Throws std::out_of_range if the sphere touches the body outside the table.
-  Feel at(const Vec3& q);
+  Feel at(const Vec3& q);  ///< no force if q is not finite; throws std::out_of_range if it touches outside of the table
 
   /// The tangential distance (m) from q to the farthest node that was pushed, or 0.
   double contact_radius() const noexcept { return contact_radius_; }

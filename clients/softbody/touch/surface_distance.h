@@ -9,18 +9,14 @@
 
 namespace tendon::softbody {
 
-/// The exact signed distance from a closed surface of triangles. It is negative inside. The sign follows from the
-/// normal at the nearest point. This is the normal of a facet, the mean of two facets, or the mean of all facets at a
-/// corner weighted by their angles (Bærentzen & Aanæs, Signed distance computation using the angle weighted
-/// pseudonormal, 2005).
-///
-/// The facets are in a tree of boxes. If the number of facets is doubled, a query needs some hundred instructions more.
-///
+/// The exact signed distance from a closed surface of triangles, negative inside. The sign follows from the normal at
+/// the nearest point: of a facet, the mean of two, or the mean of all facets at a corner weighted by their angles
+/// (Bærentzen & Aanæs, Signed distance computation using the angle weighted pseudonormal, 2005). The facets are in a
+/// tree of boxes: a query of twice as many needs some hundred instructions more.
 /// Stateless. Thread-safe: yes. Realtime-safe: yes, after construction.
 class SurfaceDistance {
  public:
-  /// `surface` must have passed check().
-  explicit SurfaceDistance(const Triangles& surface);
+  explicit SurfaceDistance(const Triangles& surface);  ///< `surface` must have passed check()
 
   /// The distance of `x` must not be larger than `at_most`, which limits the search.
   double at(const Vec3& x, double at_most = std::numeric_limits<double>::infinity()) const;
@@ -32,7 +28,6 @@ class SurfaceDistance {
     std::array<Vec3, 3> edges;
     std::array<Vec3, 3> of_corners;
   };
-  /// A box around some facets.
   struct BoxOfFacets {
     Vec3 low, high;
     int first = 0;
