@@ -15,8 +15,7 @@
 namespace tendon::bridge {
 namespace {
 
-/// A signal that arrives immediately before a sleep does not interrupt it.
-constexpr Duration kLongestWait = std::chrono::milliseconds(100);
+constexpr Duration kLongestWait = std::chrono::milliseconds(100);  ///< signals before a sleep do not interrupt it
 constexpr Duration kLineEvery = std::chrono::seconds(1);
 
 BridgedDevice::Config config_of(const BridgeConfig& config, const std::string& device, const std::string& found) {

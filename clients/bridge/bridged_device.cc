@@ -11,7 +11,7 @@ namespace {
 
 using Phase = ForceClient::Phase;
 
-/// The sessions' states may arrive out of order. One that is this many ticks older comes from a restarted server.
+/// States may arrive out of order. A state that is older by more than this number of ticks is from a restarted server.
 constexpr std::uint64_t kReordered = 1000;
 
 constexpr std::size_t kMaxSentences = 16;

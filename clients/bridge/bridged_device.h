@@ -21,9 +21,9 @@ namespace tendon::bridge {
 /// * **Observer first.** It starts as an observer, so that a program that only reads does not exclude an engine. The
 ///   first requested force makes it a controller of the channel, which takes two round trips. After Config::idle
 ///   without a force it becomes an observer again.
-/// * **One owner.** The first program that requests a force owns the device, until it leaves or requests nothing for
-///   Config::idle. Forces of other programs are dropped, and they are informed.
-/// * **Freshness.** A single force is sent once; a field answers states until it expires. Then nothing is sent, and the
+/// * **One owner.** The first program that requests a force owns the device, until it leaves or makes no request for
+///   Config::idle. The forces of other programs are dropped, and the programs are informed.
+/// * **Freshness.** A single force is sent once; a field answers states until it expires. If there is no force, the
 ///   server holds, fades and stops the last force (protocol/SESSION.md). An old force is never sent as a new one.
 /// * **Latency.** A requested force is sent in the next turn as an answer to the newest state.
 ///
@@ -39,7 +39,7 @@ class BridgedDevice {
     Duration idle = std::chrono::seconds(1);  ///< the owner and the channel are released after this time
   };
 
-  struct Route {  // of one of the two sessions; each has its own socket
+  struct Route {  // each of the two sessions has its own socket
     Link& link;
     Address server;
   };
@@ -56,31 +56,31 @@ class BridgedDevice {
   /// Performs the work due at `now`. Returns the time of the next call; call earlier after a datagram or a request.
   LocalTime turn(LocalTime now);
 
-  /// The newest state, with buttons pressed since the last turn. Empty before the first state and without a session.
+  /// The newest state, with buttons pressed since the last turn. Empty if there is no state or no session.
   const std::optional<DeviceState>& state() const noexcept { return state_; }
   LocalTime arrived() const noexcept { return arrived_; }
   /// Sampling time of the state in the local clock, computed with the estimate of the server's clock, at most
   /// arrived(). Equals arrived() before the first round trip of a session.
   LocalTime sampled() const noexcept { return sampled_; }
   std::uint64_t states() const noexcept { return states_; }  ///< received; if it has increased, state() is new
-  /// Descriptions received from the server; empty before they arrive.
+  /// The descriptions from the server. Empty until they arrive.
   const std::optional<Welcome>& welcome() const noexcept { return welcome_; }
   const std::optional<DeviceDescription>& description() const noexcept { return description_; }
   const std::optional<HandleDescription>& handle() const noexcept { return handle_; }
 
   /// Requests one force on the hand, in the device base frame. It answers the newest state and is sent once. If the
-  /// channel is not available yet, it waits for it until `until`.
+  /// channel is not available yet, the force waits until `until`.
   Answer push(Program program, LocalTime now, LocalTime until, const Touch& touch);
   /// Requests a force field that answers each state until `until`. push() and ask() replace the program's last request.
   Answer ask(Program program, LocalTime now, LocalTime until, Physics physics);
-  void release(Program program);  ///< ends its requests; nothing happens if it is not the owner
+  void release(Program program);  ///< ends its requests; does nothing if it is not the owner
   Program owner() const noexcept { return owner_; }
 
   bool pushes() const noexcept { return controller_ && controller_->holds(); }  ///< the server accepts forces from here
   std::uint64_t forces() const noexcept;                                        ///< in all sessions
   std::uint64_t forces_dropped() const noexcept { return dropped_; }  ///< requested by programs other than the owner
   std::uint64_t forces_unusable() const noexcept;
-  LinkStats link() const;  ///< of the session that receives the states
+  LinkStats link() const;  ///< statistics of the session that receives the states
   /// Newest reports of the server in the current sessions: on the forces, while a channel is held; and on the loop of
   /// the device, with ForceClient::Config::diagnostics and only while no force is requested.
   std::optional<LinkReport> report() const { return controller_ ? controller_->report() : std::nullopt; }
@@ -90,7 +90,7 @@ class BridgedDevice {
   /// gained or lost, force not sent. Empty: none. Only the newest 16 messages are kept.
   std::optional<std::string> next_sentence();
 
-  ForceClient::Phase phase() const noexcept;  ///< of the session that receives the states; kStopped after stop()
+  ForceClient::Phase phase() const noexcept;  ///< phase of the session that receives the states; kStopped after stop()
   bool lost() const noexcept { return phase() != ForceClient::Phase::kOpen; }  ///< whether no session is open
   /// Sets the server addresses for the next attempts. Must be called while lost().
   void move_to(const Address& watcher, const Address& controller);
@@ -126,7 +126,7 @@ class BridgedDevice {
   std::optional<HandleDescription> handle_;
 
   Program owner_ = 0;
-  Physics physics_;    ///< of the owner; empty: nothing to send
+  Physics physics_;    ///< the request of the owner; empty if there is nothing to send
   bool once_ = false;  ///< physics_ is a single force
   LocalTime asked_{};
   LocalTime until_{};

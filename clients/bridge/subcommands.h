@@ -11,7 +11,7 @@ class App;
 
 namespace tendon::bridge {
 
-/// Runs the subcommand after parsing; returns its exit code. An exception is printed to stderr and gives exit code 1.
+/// Runs the subcommand after parsing. Returns the exit code, which is 1 if it throws (the error is printed to stderr).
 using Chosen = std::function<int()>;
 
 /// Adds the options of all bridges: --server, --key, --device, --channel, --take-lease, --observe, --json. The client

@@ -67,7 +67,7 @@ class ForceClient {
     /// Names of the device and its channel. Empty: the first one of the server.
     std::string device{};
     std::string channel{};
-    /// If another controller holds the channel, ask again whenever the server reports that its lease may have ended.
+    /// Keeps asking if another controller holds the channel, whenever the server reports that its lease may have ended.
     bool take_lease = false;
     double rate_hz = 0;          ///< calls per second, kMinRateHz … kMaxRateHz; 0: one call for each new state
     std::uint32_t state_hz = 0;  ///< states per second to request, 0 … limits::kMaxLoopHz; 0: the default of the server
@@ -105,10 +105,10 @@ class ForceClient {
     std::optional<Key> key{};
     Suites suites = suites_of_this_machine();  ///< offered for an encrypted session; the server selects one
     Seed seed{};  ///< for the handshakes; must be 32 new bytes from the operating system for each object
-    /// How long an attempt waits: 20 Hellos at intervals of 100 ms, enough for a round trip of 1 s at 50 % loss.
+    /// The timeout of an attempt: 20 Hellos at intervals of 100 ms, enough for a round trip of 1 s at 50 % loss.
     Duration patience = std::chrono::seconds(2);
     Duration retry_min = std::chrono::milliseconds(100);  ///< wait before the first retry; > 0
-    /// Longest wait between attempts. Bounds the time to find a restarted server, and the load on one that refuses.
+    /// The maximum wait. It bounds the time to find a restarted server and the load on a server that refuses.
     Duration retry_max = std::chrono::seconds(2);
     /// The maximum number of datagrams read in one turn, so that a flood cannot prevent sending. A server at 1 kHz
     /// sends 256 datagrams in a quarter of a second, the longest silence before it stops the device.
@@ -160,8 +160,8 @@ class ForceClient {
   /// and waiting for the next state would take too long. Does nothing if no state has arrived.
   void answer_again() { unseen_ = newest_.has_value(); }
 
-  /// Sends a force computed after the callback returned Touch::unknown, in the next turn, which is due immediately.
-  /// Returns false, unsent, if the session has ended, another client has the channel, or a newer state was answered.
+  /// Sends a force that was computed after the callback returned Touch::unknown. The next turn, which sends it, is due
+  /// now. Returns false if the session has ended, another client has the channel, or a newer state was answered.
   bool answer(LocalTime now, const Reply& reply);
 
   /// Asks the server to clear a latched fault and undo a disarm; with a safety layer, to arm. Only for controllers; the
@@ -218,8 +218,8 @@ class ForceClient {
   /// while forces arrive. Empty before the first report of this session.
   const std::optional<LinkReport>& report() const noexcept { return report_; }
 
-  /// Newest reports on the loop of the device and on each channel's engine, in the order of their first reports; kept
-  /// when the engine leaves. Empty before the first report of this session. Requires Config::diagnostics.
+  /// The newest reports on the loop of the device and on the engine of each channel, in the order of their first
+  /// reports. They are kept when the engine leaves. Empty before the first report. Requires Config::diagnostics.
   const std::optional<DeviceReport>& device_report() const noexcept { return device_report_; }
   const std::vector<PeerReport>& peer_reports() const noexcept { return peer_reports_; }
 

@@ -10,7 +10,7 @@
 
 namespace tendon {
 
-/// The command line of all clients (--server, --rate-hz, --duration-s, --json, --help …) and the program's options.
+/// The command line of all clients (--server, --rate-hz, --duration-s, --json, --help …) and the options of a program.
 class CommandLine {
  public:
   /// `purpose` is the first line of --help. `options` contains the defaults and receives the values. All references

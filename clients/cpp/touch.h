@@ -40,6 +40,6 @@ struct Touch {
 /// `channel`. The angular stiffness is omitted if `hand` has no Turning.
 ForceCommand to_command(const Touch& touch, const DeviceState& hand);
 
-Touch to_touch(const ForceCommand& command);  ///< answers the state for which `command` was made
+Touch to_touch(const ForceCommand& command);  ///< the result answers the state of `command`
 
 }  // namespace tendon

@@ -26,9 +26,9 @@ class UdpTransport : public Link {
   const Address& server() const noexcept { return server_; }
   const std::string& device() const noexcept { return device_; }  ///< device name found by DNS-SD; empty: none
 
-  /// Resolves the name again, which may block. Only while no session is open. Keeps the address if the name still
-  /// resolves to it; with `another`, selects the next one. Reopens a Unix socket, since its path may belong to a new
-  /// server. Throws as the constructor does, and then keeps the address.
+  /// Resolves the name again, which may block. This must only be called while no session is open. Keeps the address if
+  /// the name still resolves to it, or selects the next one if `another` is true. Reopens a Unix socket, because its
+  /// path may belong to a new server. Throws the same exceptions as the constructor and then keeps the address.
   void look_up_again(bool another);
 
   /// `to` must be server(). Datagrams to other addresses, and those that the system rejects, are dropped.
@@ -41,7 +41,7 @@ class UdpTransport : public Link {
 
   int descriptor() const noexcept { return fd_; }  ///< of the socket, for poll(); changes in look_up_again()
 
-  /// Sleeps until a datagram is available or `timeout` elapses; a signal handler may end it earlier. No sleep if ≤ 0.
+  /// Waits for a datagram or until `timeout` has elapsed. A signal may end the wait. Returns at once if `timeout` ≤ 0.
   void wait(Duration timeout);
   /// Sleeps until one of `transports` or the descriptor `also` (−1: none) is readable, or until the timeout. Returns
   /// whether one of them is readable.

@@ -7,7 +7,7 @@
 namespace tendon::dash {
 namespace {
 
-/// Reports on the device until a silent engine is removed. Both are sent once per second, and one may be lost.
+/// A silent engine is removed after this number of reports. Both are sent once per second, and one may be lost.
 constexpr std::uint64_t kForgetAfter = 3;
 
 /// Ignores counters that always increase.
@@ -152,7 +152,7 @@ std::optional<double> pair_account(const Board::Ports& ports) {
   if (leader.need <= 0 || follower.need <= 0) return std::nullopt;
   if (leader.answers_epoch != follower.epoch || follower.answers_epoch != leader.epoch) return std::nullopt;
   const double worth = leader.force_scale / leader.position_scale;
-  // Both ends report payments in joules of the payer. The receiver's state may be newer than that of the payer.
+  // Payments are reported in joules of the payer by both ends. The receiver's state may be newer.
   const double to_follower = std::max(0.0, leader.given - follower.taken);
   const double to_leader = std::max(0.0, follower.given - leader.taken);
   return leader.account + to_follower + worth * (follower.account + to_leader);

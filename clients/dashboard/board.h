@@ -51,10 +51,10 @@ class Board {
     std::uint64_t late_engine = 0;
     std::uint64_t late_unknown = 0;
     RefusedForces refused{};
-    std::uint64_t silent_for = 0;  ///< reports on the device since the last on this engine; none come after it has left
+    std::uint64_t silent_for = 0;  ///< device reports since the engine's last one; no more come after it has left
   };
 
-  /// The states of both ends of a coupling.
+  /// The states of the two ends of a coupling.
   struct Ports {
     PeerTime at;  ///< newest sampling time of the device when `own` arrived, because the port's own time uses an
                   ///< unrelated clock
@@ -122,7 +122,7 @@ class Board {
   std::map<std::uint32_t, Device> devices_;
 };
 
-std::optional<PortRole> role_of(const Board::Ports& ports);  ///< whether the device leads or follows, if known
+std::optional<PortRole> role_of(const Board::Ports& ports);  ///< the role of the device, if it is known
 
 /// Returns the energy that both ends of a coupling may still output, in J of the leader: both accounts plus payments
 /// in transit. One joule of the follower is s_f/s_x joules of the leader. Returns nullopt if the scales are unknown,

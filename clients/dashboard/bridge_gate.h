@@ -32,11 +32,11 @@ struct BridgeCounts {
 class BridgeGate {
  public:
   struct Config {
-    double max_rate_hz = 4000;            ///< datagrams per second from one page; enough for four engines at 1 kHz
-    std::size_t max_waiting = 16 * 1024;  ///< bytes for a page: about 60 ms of states at 1 kHz; more are dropped
+    double max_rate_hz = 4000;            ///< maximum datagrams per second from one page, for four engines at 1 kHz
+    std::size_t max_waiting = 16 * 1024;  ///< bytes for a page, about 60 ms of states at 1 kHz; the rest is dropped
   };
 
-  /// `local`: the page is on this machine and not behind a local proxy. `counts` must outlive the gate.
+  /// `local` is true if the page is on this machine and not behind a local proxy. `counts` must outlive the gate.
   BridgeGate(const Config& config, bool local, BridgeCounts& counts, LocalTime now)
       : config_(config), local_(local), counts_(counts), rate_(config.max_rate_hz, now) {}
 

@@ -23,8 +23,8 @@ namespace tendon::dash {
 class Feed {
  public:
   using PageId = std::uint64_t;
-  static constexpr Duration kTick = std::chrono::microseconds(16'667);  ///< between ticks: a screen's refresh period
-  static constexpr double kMaxLinesHz = 20;                             ///< lines per second that a page may send
+  static constexpr Duration kTick = std::chrono::microseconds(16'667);  ///< the refresh period of a screen
+  static constexpr double kMaxLinesHz = 20;  ///< maximum number of lines per second from a page
 
   /// `board` and `counts` must outlive the feed.
   Feed(Board& board, Abilities abilities, WebCounts& counts, LocalTime now)

@@ -54,7 +54,7 @@ class FoxgloveFeed {
   /// Handles a text message. Returns false if messages are too frequent or too many texts are waiting; the client
   /// should then be closed. Invalid messages are answered with a status.
   bool receive(LocalTime now, ClientId client, std::string_view text);
-  /// Collects changes from the board. Call it after each turn of the Observer, before Feed::tick removes the states.
+  /// Takes the new states. Must be called after each turn of the Observer and before Feed::tick, which removes them.
   void take(LocalTime now);
   void tick(LocalTime now);                                       ///< sends the messages for drawing
   std::optional<FoxgloveSession::Message> next(ClientId client);  ///< next message for a client, if any

@@ -99,7 +99,7 @@ struct Shade {
   double b = 0;
   double a = 1;
 };
-// The wanted force is thicker and transparent, because both arrows often coincide.
+// The wanted force is drawn thicker and transparent because the two arrows often coincide.
 constexpr Shade kWantedShade{0.55, 0.6, 0.65, 0.4};
 constexpr Shade kAppliedShade{0.9, 0.45, 0.1};
 constexpr Shade kHandleShade{0.2, 0.45, 0.8};

@@ -15,8 +15,8 @@ using UnixTime = std::int64_t;  ///< nanoseconds since 1970-01-01
 /// Content of a channel. Every payload is one protobuf message.
 enum class FoxgloveKind : std::uint8_t {
   kStep,        ///< tendon.recording.v1.Step, as in recordings
-  kDevice,      ///< tendon.v1.DeviceReport, as on the wire
-  kPeer,        ///< tendon.v1.PeerReport, as on the wire
+  kDevice,      ///< tendon.v1.DeviceReport (the wire format)
+  kPeer,        ///< tendon.v1.PeerReport (the wire format)
   kTransforms,  ///< foxglove.FrameTransforms
   kScene,       ///< foxglove.SceneUpdate
 };

@@ -13,7 +13,7 @@ struct WebCounts {
   std::uint64_t pages = 0;  ///< currently open
   std::uint64_t requests = 0;
   std::uint64_t refused = 0;         ///< requests refused because of Host, Origin, load or syntax
-  std::uint64_t states_skipped = 0;  ///< not sent to a page that was too slow
+  std::uint64_t states_skipped = 0;  ///< states that were not sent because the page was too slow
 };
 
 /// Returns all metrics in the Prometheus text format 0.0.4. Names have base units (seconds, meters, newtons, joules),

@@ -23,8 +23,8 @@ namespace tendon::dash {
 ///     for (;;) wait for a datagram, at most until observer.turn(now);
 ///
 /// A client can only see the devices that it has claimed by name. It finds their names by requesting the descriptions
-/// of devices 0, 1, 2 … until there is none. On a server with several devices, a first session therefore requests the
-/// names, and a second one claims all devices.
+/// of devices 0, 1, 2 … until there is none. If a server has several devices, the first session therefore requests the
+/// names and the second session claims all devices.
 ///
 /// * **Reconnection.** It reconnects indefinitely (see Connection).
 /// * **Handles.** It requests each HandleDescription once per session if the server supports kFeatureHandle.

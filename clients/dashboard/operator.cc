@@ -9,8 +9,7 @@
 namespace tendon::dash {
 namespace {
 
-/// States per second. A low rate is enough for a session of a few round trips.
-constexpr std::uint32_t kStateHz = 20;
+constexpr std::uint32_t kStateHz = 20;  ///< a low rate is enough for a few round trips
 
 const ChannelDescription* channel_of(const Board::Device& device, const std::string& name) {
   if (!device.about) return nullptr;

@@ -12,7 +12,7 @@
 
 namespace tendon::dash {
 
-/// Arms and disarms devices, and engages and disengages couplings, for the page. Without sockets, clocks or threads.
+/// Arms and disarms devices, and engages and disengages couplings, for the page. It uses no sockets, clocks or threads.
 ///
 /// Each button press opens a session separate from that of the Observer: a controller with the operator's key that
 /// claims and holds one channel of the device, sends the order but no force, and leaves after the answer. The result on
@@ -33,11 +33,11 @@ class Operator {
     std::string channel;                          ///< channel reserved for the operator at each device
     Key key;                                      ///< of a controller
     Seed seed{};                                  ///< 32 random bytes from the operating system
-    Duration patience = std::chrono::seconds(5);  ///< session and answer: enough for a round trip of 1 s at 50 % loss
+    Duration patience = std::chrono::seconds(5);  ///< for the session and the answer (round trip of 1 s, 50 % loss)
     Duration granted_within = std::chrono::seconds(4);  ///< reaction after the answer: safety layer ≤ 1 s, report ≤ 1 s
   };
 
-  /// Not the Observer's `link`: the server identifies clients by address. `link` and `board` must outlive this object.
+  /// `link` must not be the Observer's, because the server identifies clients by address. Both must outlive this.
   Operator(Link& link, const Address& server, const Config& config, Board& board);
 
   std::string objection(std::uint32_t device) const;  ///< why the device cannot be controlled; empty if it can

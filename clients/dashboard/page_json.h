@@ -50,7 +50,6 @@ std::string_view name(Safety safety) noexcept;  ///< "armed", "fault" …
 std::string_view name(Contact contact) noexcept;
 std::string_view name(PortPhase phase) noexcept;  ///< "engaged", "clutched" …
 std::string_view name(Order order) noexcept;
-/// Name of a bit in core/base/reason.h: "energy", "max_force" …; "bit_20" for bits without a name.
-std::string reason_name(std::size_t bit);
+std::string reason_name(std::size_t bit);  ///< "energy", "max_force" …; "bit_20" for bits without a name
 
 }  // namespace tendon::dash

@@ -12,7 +12,7 @@
 
 namespace tendon::dash {
 
-/// Messages waiting for one page; the newest win: at most one text of each kind and kMaxBatches batches of states.
+/// Messages for one page. Only the newest text of each kind and kMaxBatches batches of states are kept.
 /// Thread-safe: no. Realtime-safe: no.
 class PagePost {
  public:

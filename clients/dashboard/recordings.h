@@ -21,7 +21,7 @@ class OpenFile {
   ~OpenFile();
 
   std::uint64_t size() const noexcept { return size_; }
-  /// Reads at most `most` bytes at `offset`. Returns fewer at the end of the file, and none after an error.
+  /// Reads at most `most` bytes at `offset`. Returns fewer bytes at the end of the file and none after an error.
   std::string read(std::uint64_t offset, std::size_t most) const;
 
  private:

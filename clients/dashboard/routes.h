@@ -88,7 +88,7 @@ class Routes {
  public:
   struct Config {
     std::vector<std::string> hosts{};    ///< other names of this machine, with or without ":PORT"
-    std::vector<std::string> origins{};  ///< of pages that may use /bridge and /foxglove: "https://lab.example"
+    std::vector<std::string> origins{};  ///< origins that may use /bridge and /foxglove: "https://lab.example"
   };
   /// Sources of the replies. All must outlive the routes; `recordings` may be null.
   struct Sources {

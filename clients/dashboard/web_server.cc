@@ -40,17 +40,15 @@ using asio::ip::tcp;
 /// Datagrams are read in batches. Otherwise tendon-dash would wake up 1000 times per second on the processors of the
 /// haptic loop. The measured round trip includes this delay, but is not used in computations.
 constexpr Duration kGather = std::chrono::milliseconds(3);
-/// The maximum number of datagrams read from one bridge socket before other sockets are served.
-constexpr int kMaxDrained = 64;
+constexpr int kMaxDrained = 64;  ///< maximum number of datagrams read from one bridge socket in a row
 constexpr std::size_t kPiece = 64 * 1024;
 /// The maximum number of connections that are being refused. Further connections are closed without a reply.
 constexpr std::size_t kMaxRefusals = 64;
 /// A refused connection is read for this time and number of bytes, because a reset would discard the reply.
 constexpr Duration kLinger = std::chrono::seconds(1);
 constexpr std::size_t kMaxLingered = 64 * 1024;
-constexpr std::size_t kMaxLine = 64;  ///< longest message of a page: "watch 15"
-/// Longest message of a viewer, which may subscribe to all channels of 16 devices at once.
-constexpr std::size_t kMaxOrder = 16 * 1024;
+constexpr std::size_t kMaxLine = 64;          ///< longest message of a page: "watch 15"
+constexpr std::size_t kMaxOrder = 16 * 1024;  ///< longest message of a viewer: it subscribes to all of 16 devices
 /// Kernel buffer for a viewer that does not read, in addition to FoxgloveSession::kMaxBytes. Linux doubles this
 /// value.
 constexpr int kViewerSendBuffer = 128 * 1024;
@@ -85,7 +83,7 @@ struct Shared {
   const ServerSocket* link = nullptr;  ///< of the Observer
 };
 
-/// One browser connection from its first request until it is closed: HTTP requests or a WebSocket.
+/// A browser connection for HTTP requests or a WebSocket.
 ///
 /// Deleted only after it is closed and has no pending operations (`pending_`), so that handlers can use `this`.
 class Connection {

@@ -14,7 +14,7 @@
 
 namespace tendon::dash {
 
-/// The sockets of tendon-dash, on one thread: HTTP and WebSockets for pages, one UDP socket for the Observer, and one
+/// All sockets of tendon-dash on one thread: HTTP and WebSockets for pages, one UDP socket for the Observer, and one
 /// for each page on the bridge. The content comes from Routes, Feed, FoxgloveFeed and BridgeGate.
 ///
 /// * Connections without a complete request after `request_patience`, or that do not read a reply for `patience`, are
@@ -29,14 +29,14 @@ namespace tendon::dash {
 class WebServer {
  public:
   struct Config {
-    Address listen = parse_address("127.0.0.1:8080");     ///< port 0: chosen by the system
-    Address server = parse_address("127.0.0.1:47100");    ///< initial address of tendond; link() can change it
-    std::size_t max_connections = 256;                    ///< in total
-    std::size_t max_per_address = 64;                     ///< pages, bridges and requests of one machine
-    std::size_t max_pages = 16;                           ///< pages on /live; each costs 150 kB/s of JSON
-    std::size_t max_viewers = 8;                          ///< clients of /foxglove; each costs 200 kB/s per device
-    std::size_t max_bridges = 32;                         ///< the limit of observers of a server
-    std::size_t max_request = 16 * 1024;                  ///< bytes of request headers
+    Address listen = parse_address("127.0.0.1:8080");   ///< port 0: chosen by the system
+    Address server = parse_address("127.0.0.1:47100");  ///< initial address of tendond; link() can change it
+    std::size_t max_connections = 256;                  ///< in total
+    std::size_t max_per_address = 64;                   ///< pages, bridges and requests of one machine
+    std::size_t max_pages = 16;                         ///< pages on /live; each page needs 150 kB/s of JSON
+    std::size_t max_viewers = 8;                        ///< clients of /foxglove; each client needs 200 kB/s per device
+    std::size_t max_bridges = 32;                       ///< the limit of observers of a server
+    std::size_t max_request = 16 * 1024;                ///< bytes of request headers
     Duration request_patience = std::chrono::seconds(5);  ///< timeout of a request
     Duration patience = std::chrono::seconds(30);         ///< timeout for reading replies, and for WebSockets
     BridgeGate::Config bridge{};

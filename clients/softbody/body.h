@@ -191,8 +191,7 @@ class Body {
   /// The handle is in the body frame. If turns_the_hand() is true, the answer contains the torque about the handle.
   Feel touch(const Pose& handle);
 
-  /// Returns one answer for each hand. An empty pose means that the hand is absent.
-  std::vector<Feel> touch(std::span<const std::optional<Pose>> handles);
+  std::vector<Feel> touch(std::span<const std::optional<Pose>> handles);  ///< an empty pose: the hand is absent
 
   /// `background` prepares cuts and near fields, so that no answer waits for them; without this call, answers wait for
   /// cuts and build fields in pieces. Until a cut is ready, the uncut body answers, and the error is at least the
@@ -214,9 +213,8 @@ class Body {
 
   double step() const noexcept;  ///< s; 0: the body is always at rest
 
-  /// The surface point at `middle`, and the unit normal towards the tool. Body frame.
-  Vec3 touch_point() const;
-  const Vec3& normal() const;
+  Vec3 touch_point() const;    ///< the surface point at `middle`, body frame
+  const Vec3& normal() const;  ///< unit vector towards the tool, body frame
 
   struct Size {
     std::size_t nodes;
@@ -226,8 +224,8 @@ class Body {
     std::size_t bytes;
   };
   Size size() const;
-  std::optional<NearModel::Size> near_field() const;  ///< empty if the model is not kNear
-  std::vector<FallbackModel::Step> fallbacks() const;
+  std::optional<NearModel::Size> near_field() const;   ///< empty if the model is not kNear
+  std::vector<FallbackModel::Step> fallbacks() const;  ///< likewise
   /// `under_patch` is the number of nodes below the patch at `middle`. Throws the errors of the constructor.
   static Size size_of(const BodyConfig& config, int& under_patch);
 

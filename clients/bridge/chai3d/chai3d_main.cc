@@ -41,7 +41,7 @@ namespace {
 using chai3d::Host;
 using chai3d::SharedHands;
 
-/// A CHAI3D program counts its devices only at its start, so it is started after all have answered, or this time.
+/// A CHAI3D program counts its devices only at its start, so it is started when all have answered or after this time.
 constexpr Duration kBeforeTheProgram = std::chrono::seconds(1);
 constexpr int kMaxWakes = 64;  ///< wake-ups read in one turn; the program sends one for each force
 
@@ -86,7 +86,7 @@ class Waker {
   Waker() : socket_(::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0)) {
     sockaddr_un address{};
     address.sun_family = AF_UNIX;
-    socklen_t size = sizeof address.sun_family;  // no name: the kernel chooses one
+    socklen_t size = sizeof address.sun_family;  // the kernel chooses the name
     if (socket_ < 0 || ::bind(socket_, reinterpret_cast<sockaddr*>(&address), size) != 0)
       fail("cannot create a socket");
     size = sizeof address;

@@ -1,2 +1,2 @@
 // SPDX-License-Identifier: Apache-2.0
-// libHD.so: CHAI3D loads it before libhdPhantom.so but uses no symbols from it.
+// libHD.so: CHAI3D loads this library before libhdPhantom.so but does not use its symbols.

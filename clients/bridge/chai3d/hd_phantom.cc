@@ -33,8 +33,7 @@ namespace {
 
 constexpr std::int64_t kMillisecond = 1'000'000;
 constexpr std::int64_t kLongestCount = 400 * kMillisecond;  ///< CHAI3D counts its devices only once, at the start
-/// Older states are not used, because the bridge or the server has stopped.
-constexpr std::int64_t kOldestState = 500 * kMillisecond;
+constexpr std::int64_t kOldestState = 500 * kMillisecond;   ///< older states: the bridge or the server has stopped
 constexpr std::int64_t kLongestPace = 2 * kMillisecond;
 constexpr int kFailure = 0;
 constexpr int kSuccess = 1;
@@ -47,7 +46,7 @@ std::int64_t now_ns() noexcept {
   return time.tv_sec * 1'000'000'000 + time.tv_nsec;
 }
 
-/// A spin lock for writers, held for about 30 stores. Acquiring it fails after some attempts, if its holder was killed.
+/// A spin lock for writers that is held for about 30 stores. Acquiring it fails if the holding thread was killed.
 class Turnstile {
  public:
   explicit Turnstile(std::atomic_flag& flag) noexcept : flag_(flag) {
@@ -220,7 +219,7 @@ extern "C" {
 int hdPhantomGetNumDevices() {
   SharedHands* const hands = attached().hands();
   if (hands == nullptr) return 0;
-  // Later calls do not wait again: CHAI3D counts once more for every device that it looks at.
+  // Later calls do not wait again, because CHAI3D counts the devices again for each of them.
   static const std::int64_t end = now_ns() + kLongestCount;
   for (;;) {
     const std::uint32_t seen = hands->news.load();

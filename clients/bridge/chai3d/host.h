@@ -20,7 +20,7 @@ class Host {
  public:
   struct Config {
     Duration stale = std::chrono::milliseconds(50);
-    std::string model{};  ///< device model, from which CHAI3D derives limits; at most 254 bytes
+    std::string model{};  ///< CHAI3D derives limits from this device model; at most 254 bytes
   };
   static constexpr double kWorkspaceRadius = 0.1;  ///< m, reported to CHAI3D if the device describes no workspace
 

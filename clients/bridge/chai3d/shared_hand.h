@@ -11,8 +11,8 @@
 namespace tendon::bridge::chai3d {
 
 // Memory shared between tendon-bridge, which creates it, and libhdPhantom.so in the program. Neither side blocks the
-// other. Values are in the frame of CHAI3D, x to the user, y right, z up, in SI units. Times are CLOCK_MONOTONIC in
-// ns.
+// other. Values are in the frame of CHAI3D, x to the user, y right, z up, in SI units. Times are in ns and use
+// CLOCK_MONOTONIC.
 
 /// A value under a sequence lock, shared between processes. If a writer dies in put(), get() fails but does not block.
 /// Thread-safe: one writer at a time, any number of readers. Realtime-safe: yes.
@@ -49,7 +49,7 @@ class Box {
   }
 
  private:
-  static constexpr int kTries = 1000;  ///< some µs; a write takes 30 stores
+  static constexpr int kTries = 1000;  ///< this takes some µs, and a write has 30 stores
   static_assert(std::atomic<std::uint64_t>::is_always_lock_free);
 
   std::atomic<std::uint64_t> turn_{0};  ///< odd during a write, 0 before the first
@@ -70,7 +70,7 @@ struct HandNow {
 struct Asked {
   std::int64_t at_ns = 0;   ///< time of the request
   std::uint64_t count = 0;  ///< number of requests so far; a new value marks a new request
-  std::uint64_t open = 0;   ///< 0: the program has closed the device
+  std::uint64_t open = 0;   ///< 0 if the program has closed the device
   std::array<double, 3> force{};
   std::array<double, 3> torque{};
 };
@@ -90,7 +90,7 @@ struct SharedHands {
   std::uint32_t version = kVersion;
   std::uint32_t devices = 0;
   std::uint32_t paced = 1;                ///< whether the force functions wait for the next state
-  std::atomic<std::uint32_t> ready{0};    ///< 1 once every device has sent a state
+  std::atomic<std::uint32_t> ready{0};    ///< 1 if all devices have sent a state
   std::atomic<std::uint32_t> news{0};     ///< futex; incremented with every state
   std::atomic<std::uint32_t> waiting{0};  ///< number of threads waiting on `news`
   std::array<SharedDevice, kMaxDevices> device;

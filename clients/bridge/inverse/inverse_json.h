@@ -65,7 +65,7 @@ struct DeviceWish {
 };
 
 struct Wish {
-  bool read = false;                       ///< false: invalid, for the reason in `refused`
+  bool read = false;                       ///< false if the message is invalid; `refused` contains the reason
   std::optional<std::string> permutation;  ///< of the session
   bool full_state = false;
   std::vector<DeviceWish> devices;
@@ -73,7 +73,7 @@ struct Wish {
   std::uint64_t ignored = 0;
 };
 
-inline constexpr std::size_t kLongestMessage = 64 * 1024;  ///< bytes; 16 devices with every command need 6 kB
+inline constexpr std::size_t kLongestMessage = 64 * 1024;  ///< bytes; all commands for 16 devices need 6 kB
 inline constexpr int kDeepest = 16;                        ///< nesting depth; valid messages have 5
 inline constexpr std::size_t kMostRefusals = 8;            ///< per reply
 

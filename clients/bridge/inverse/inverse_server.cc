@@ -45,14 +45,13 @@ using boost::system::error_code;
 
 constexpr std::size_t kMostInOneTurn = 256;
 constexpr int kMostHostTurns = 4;
-/// Upper limit of a sleep, so that timeouts are noticed.
-constexpr Duration kLongestSleep = std::chrono::milliseconds(100);
+constexpr Duration kLongestSleep = std::chrono::milliseconds(100);  ///< maximum sleep, to notice timeouts
 /// A WebSocket that is silent for this time gets a ping, and is closed if it does not answer.
 constexpr Duration kSilence = std::chrono::seconds(30);
 /// The maximum number of connections without a complete request. Further connections are closed immediately.
 constexpr std::size_t kMostWaiting = 16;
 constexpr std::uint32_t kLongestRequest = 16 * 1024;
-/// After a plain HTTP response, the connection is read for this time and size, because a reset would discard it.
+/// After a plain HTTP response, the connection is read up to these limits, because a reset would discard the response.
 constexpr Duration kLinger = std::chrono::seconds(1);
 constexpr std::size_t kMostLingered = 64 * 1024;
 
@@ -102,7 +101,7 @@ struct InverseShared {
   std::function<void()> read_one{};  ///< called after a message was read
 };
 
-/// One connection, deleted only when it is closed without pending operations, so that handlers can use `this`.
+/// One connection. It is only deleted when it is closed and has no pending operations, so handlers can use `this`.
 class InverseConnection {
  public:
   InverseConnection(InverseShared& shared, tcp::socket socket) : shared_(shared), stream_(std::move(socket)) {
@@ -294,7 +293,7 @@ class InverseConnection {
   std::optional<websocket::stream<beast::tcp_stream>> web_socket_;
   beast::flat_buffer message_;
   std::vector<std::string> inbox_;  ///< read, to be answered in the next turn
-  std::deque<std::string> outbox_;  ///< the first one is being written
+  std::deque<std::string> outbox_;  ///< the first reply is being written
   std::size_t unread_ = 0;          ///< bytes in outbox_
   std::optional<LocalTime> stuck_since_;
   std::string why_;

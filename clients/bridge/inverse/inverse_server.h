@@ -13,14 +13,15 @@
 
 namespace tendon::bridge {
 
-/// The WebSocket server of the bridge, on one thread. Each client has an InverseSession; all share one BridgeHost.
+/// The WebSocket server of the bridge. It uses one thread. Each client has an InverseSession; all share one BridgeHost.
 ///
-/// * **Turns.** A turn reads at most kMostMessages of each client and 256 in total. Their forces are sent before the
-///   replies are written, and the replies contain the newest states.
+/// * **Turns.** In each turn, at most kMostMessages of each client are read, and 256 in total. Their forces are sent
+///   before the replies are written, and the replies contain the newest states.
 /// * **Messages** may be text or binary, because some clients send JSON as bytes. Replies are text.
-/// * **Limits.** Clients beyond `max_clients` receive status 503. A message above 64 kB closes the connection (1009). A
-///   client with more than `max_unread` bytes of unread replies is not read, and is closed if it reads nothing for
-///   `patience`. Connections without a complete request after `request_patience` are closed; at most 16 may be waiting.
+/// * **Limits.** Clients beyond `max_clients` receive status 503. The connection is closed (1009) if a message is
+///   larger than 64 kB. A client with more than `max_unread` bytes of unread replies is not read, and is closed if it
+///   reads nothing for `patience`. Connections without a complete request after `request_patience` are closed; at most
+///   16 may be waiting.
 /// * **Browsers.** Requests with an Origin must pass may_come_from() or receive status 403. Other programs send none.
 /// * **Plain HTTP** requests receive status 404 with an explanation.
 ///
@@ -35,7 +36,7 @@ class InverseServer {
     Duration patience = std::chrono::seconds(1);
     Duration request_patience = std::chrono::seconds(5);
   };
-  static constexpr std::size_t kMostMessages = 64;  ///< of one client in one turn; 64 kB of replies for one device
+  static constexpr std::size_t kMostMessages = 64;  ///< maximum for one client in one turn; this is 64 kB of replies
   using Clock = LocalTime (*)();
 
   /// Starts to listen. The BridgeHost must outlive the server. Throws std::runtime_error: "cannot listen on

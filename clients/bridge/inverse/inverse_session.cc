@@ -11,8 +11,7 @@
 namespace tendon::bridge {
 namespace {
 
-/// Limit of the older messages that may be read at once.
-constexpr double kMostAtOnce = InverseSession::kMostPerSecond / 10;
+constexpr double kMostAtOnce = InverseSession::kMostPerSecond / 10;  ///< maximum of older messages to read
 
 double milliseconds_of(Duration d) { return std::chrono::duration<double, std::milli>(d).count(); }
 

@@ -26,21 +26,21 @@ std::vector<InverseDevice> inverse_devices(std::span<const std::pair<std::string
 struct InverseCounts {  // of all clients
   std::uint64_t clients = 0;
   std::uint64_t messages = 0;
-  std::uint64_t skipped = 0;  ///< messages not read, because one client sent too many and a newer one was available
+  std::uint64_t skipped = 0;  ///< messages that were not read because a client sent too many and there was a newer one
   std::uint64_t unread = 0;   ///< messages that are not JSON, too long or too deep
   std::uint64_t refused = 0;
   std::uint64_t ignored = 0;
 };
 
-/// The conversation with one client, without sockets or clocks: a first message, then one reply for each message.
+/// The conversation with one client: a first message, then one reply for each message. It uses no sockets or clocks.
 ///
 /// * A force is sent once with the validity kFresh, which must be `client.valid_for` of the bridged devices. After a
 ///   client falls silent or leaves, the server holds, fades and stops the last force (protocol/SESSION.md).
 /// * At most one force is sent for each state, or every kPace while no state arrives, because clients send as fast as
 ///   they receive replies. The newest force waits for the next state and replaces an older waiting one.
 /// * A message is the complete request for a device: set_cursor_force without `tendon` requests no torque.
-/// * A zero force counts only from the owner: other clients send it to obtain replies.
-/// * Of a batch, the newest message is always read, others up to kMostPerSecond; the rest is answered and counted.
+/// * A zero force only counts if the client is the owner, because other clients send it to obtain replies.
+/// * The newest message of a batch is always read. Older messages are read up to kMostPerSecond, then only answered.
 /// * Replies contain the newest state. A button pressed in any state since the previous reply counts as pressed.
 ///
 /// Thread-safe: no. Realtime-safe: no.

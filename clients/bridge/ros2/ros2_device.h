@@ -17,8 +17,8 @@
 
 namespace tendon::bridge {
 
-/// Validity of the newest force of a program: three times the median of its last 8 intervals, within 20 … 200 ms; 200
-/// ms until three intervals are known. For a program at 1 kHz this is 20 ms, at 20 Hz 150 ms.
+/// The newest force of a program is valid for three times the median of its last 8 intervals, within 20 … 200 ms. It is
+/// valid for 200 ms until three intervals are known. For a program at 1 kHz this is 20 ms, at 20 Hz 150 ms.
 class Freshness {
  public:
   void came(LocalTime now);

@@ -67,8 +67,7 @@ RosTime ros_time(Duration since_1970);  ///< requires `since_1970` ≥ 0
 /// by "_", and inserts "_" before a leading digit.
 std::string ros_name(std::string_view device);
 
-/// Returns at most 64 bytes of `text`, with "?" in place of bytes that are not printable ASCII.
-std::string printable(std::string_view text);
+std::string printable(std::string_view text);  ///< at most 64 bytes, with "?" for bytes that are not printable ASCII
 
 /// Transforms one device to the frames of ROS. Thread-safe, realtime-safe: no.
 class RosView {

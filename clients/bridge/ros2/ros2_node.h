@@ -37,8 +37,7 @@ class Ros2Node {
   };
   static constexpr std::uint32_t kMaxDomain = 232;  ///< ports of higher domains would exceed 65535
 
-  /// Throws std::runtime_error with the reason of DDS if the participant cannot be created.
-  explicit Ros2Node(const Config& config);
+  explicit Ros2Node(const Config& config);  ///< throws std::runtime_error with the reason of DDS if it fails
   ~Ros2Node();
   Ros2Node(const Ros2Node&) = delete;
   Ros2Node& operator=(const Ros2Node&) = delete;

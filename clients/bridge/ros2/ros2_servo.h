@@ -42,7 +42,7 @@ class RosServo {
   Kind kind_;
   double scale_;
   std::string frame_id_;
-  std::optional<Hand> hand_;  ///< pose at the press; empty: not pressed
+  std::optional<Hand> hand_;  ///< pose of the hand when the button was pressed; empty if it is not pressed
   Vec3 start_ = Vec3::Zero();
   Mat3 start_turn_ = Mat3::Identity();
   Vec3 target_ = Vec3::Zero();

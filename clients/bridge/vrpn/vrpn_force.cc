@@ -13,7 +13,7 @@ constexpr Duration kLeastStale = std::chrono::milliseconds(100);
 constexpr Duration kMostStale = std::chrono::seconds(2);
 constexpr std::size_t kLeastGaps = 2;  // between three
 constexpr int kStaleGaps = 10;
-constexpr double kRounding = 1e-9;  ///< a hand that stands still goes on slipping
+constexpr double kRounding = 1e-9;  ///< the hand can slip while it does not move
 
 }  // namespace
 
@@ -31,7 +31,7 @@ bool Drawing::draw(const Plane& plane) {
     return true;
   }
   if (!surface) surface.emplace();
-  surface->plane = plane;  // a bristle stays bent when its plane moves
+  surface->plane = plane;  // the bristle keeps its deflection when the plane moves
   surface->plane.normal /= length;
   surface->plane.offset /= length;
   surface->plane.spring = std::clamp(plane.spring, 0.0, 1.0);

@@ -43,7 +43,8 @@ class Drawing {
   static constexpr std::size_t kPlanes = 4;
   static constexpr double kLeastDamping = 0.1;
   static constexpr double kBristle = 0.2e-3;  ///< m
-  /// Least ratio of dynamic to static friction: without deflection a bristle has no slip direction, and sticks again.
+  /// The minimum ratio of dynamic to static friction. A bristle with no deflection would have no slip direction and
+  /// would stick again immediately.
   static constexpr double kLeastSlip = 0.1;
 
   void draw(const ForceField& field);  ///< replaces the field; one without force and jacobian removes it

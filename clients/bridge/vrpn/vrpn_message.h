@@ -25,7 +25,7 @@ inline constexpr std::size_t kCookieSize = 24;
 inline constexpr std::size_t kHeaderSize = 24;
 inline constexpr std::size_t kLongestPayload = 64000;  ///< padded, VRPN's TCP buffer; longer ones close the connection
 inline constexpr std::size_t kLongestDatagram = 1472;  ///< VRPN's UDP buffer: an Ethernet frame without headers
-inline constexpr std::size_t kLongestName = 99;        ///< maximum length of a sender or type name, without its zero
+inline constexpr std::size_t kLongestName = 99;        ///< maximum length of a name without the terminating zero
 inline constexpr std::int32_t kMostNumbers = 2000;     ///< limit of sender and type numbers, assigned by each side
 
 inline constexpr int kLowestPort = 1024;  ///< lower ports are reserved for the system
@@ -148,7 +148,6 @@ struct Plane {
 };
 std::optional<Plane> read_plane(Bytes payload);
 
-/// Returns whether adhesion, texture or buzz is nonzero, or nullopt if the payload is invalid.
-std::optional<bool> read_effects(Bytes payload);
+std::optional<bool> read_effects(Bytes payload);  ///< whether adhesion, texture or buzz is nonzero; empty if invalid
 
 }  // namespace tendon::bridge::vrpn

@@ -81,9 +81,8 @@ class Peer {
   const Freshness& freshness(std::size_t station) const { return wishes_[station].freshness; }
   bool take_change(std::size_t station) { return std::exchange(wishes_[station].changed, false); }
 
-  /// Whether it has exceeded its message rate; reading it may be delayed.
-  bool is_above_its_share() const { return allowance_ < 1; }
-  bool open() const { return open_; }              ///< a valid cookie was received
+  bool is_above_its_share() const { return allowance_ < 1; }  ///< above its message rate; reading may be delayed
+  bool open() const { return open_; }                         ///< a valid cookie was received
   const std::string& end() const { return end_; }  ///< reason for the end of the connection; empty while it is open
   std::optional<std::string> next_sentence();
   const Counts& counts() const { return counts_; }

@@ -26,9 +26,8 @@ constexpr int kPortTries = 16;
 /// Delay before reading a program that exceeds its rate, so that its messages are handled in batches.
 constexpr Duration kRest = std::chrono::microseconds(500);
 constexpr std::size_t kEach = 2;  ///< sockets per client
-/// Keep-alive settings (s, count), which detect a machine that disappeared.
-constexpr int kKeepAliveS = 2;
-constexpr int kKeepAlives = 3;
+constexpr int kKeepAliveS = 2;    ///< s, keep-alive, which detects a machine that disappeared
+constexpr int kKeepAlives = 3;    ///< number of attempts
 
 std::string words_of(int error) { return std::generic_category().message(error); }
 
@@ -118,7 +117,7 @@ Server::Server(BridgeHost& host, Config config, LocalTime now)
   seen_.resize(stations_.size());
   buffer_.resize(kMaxRead);
   int error = 0;
-  for (int i = 0; i < kPortTries && !udp_; ++i) {  // a port that is free for TCP may be in use for UDP
+  for (int i = 0; i < kPortTries && !udp_; ++i) {  // the port may be in use for UDP even if it is free for TCP
     tcp_ = new_socket(SOCK_STREAM);
     set(tcp_.number(), SOL_SOCKET, SO_REUSEADDR, 1);
     if (!bind_to(tcp_.number(), config_.listen) || ::listen(tcp_.number(), kBacklog) != 0) {
@@ -280,7 +279,7 @@ void Server::read(const Moment& now, Client& client, short ready, short datagram
       const ssize_t got =
           ::recvfrom(client.udp.number(), buffer_.data(), buffer_.size(), 0, reinterpret_cast<sockaddr*>(&from), &size);
       if (got < 0) break;
-      if (address_of(from).ip != client.address.ip) continue;  // datagrams of a program may come from any of its ports
+      if (address_of(from).ip != client.address.ip) continue;  // a program may send datagrams from any of its ports
       client.peer.take_datagram(now, std::span(buffer_).first(static_cast<std::size_t>(got)));
     }
   }

@@ -11,8 +11,8 @@ namespace tendon::bridge::vrpn {
 namespace {
 
 constexpr Duration kAskAgain = std::chrono::milliseconds(500);
-/// Minimum interval between requests, since each is a datagram. A changed drawing waits at most for the next state.
-/// VRPN's ff_client sends 60 000 fields per second, as fast as it can.
+/// Minimum interval between requests, since each is a datagram. A changed drawing waits at most for the next state. For
+/// example, VRPN's ff_client sends 60 000 fields per second.
 constexpr Duration kShortest = std::chrono::microseconds(250);
 /// Validity of a request. It must cover a late turn, but must end so that a program that hangs does not push.
 constexpr Duration kAskedFor = std::chrono::seconds(1);

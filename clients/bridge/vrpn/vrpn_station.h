@@ -35,14 +35,14 @@ class Peer;
 
 /// Requests from a BridgedDevice what a program has drawn at its station: after each change, at most 4000 times per
 /// second, and twice per second while it is fresh (Freshness) to keep the ownership. When the drawing is removed, it
-/// requests a zero force, after which the BridgedDevice releases the program. A program whose force is not applied
-/// because another one owns the device is informed. Thread-safe: no. Realtime-safe: no.
+/// requests a zero force, after which the BridgedDevice releases the program. If another program owns the device, the
+/// program is informed that its force is not applied. Thread-safe: no. Realtime-safe: no.
 class Asker {
  public:
   /// `number` identifies the program at every BridgedDevice, `who` in messages. `i` is the index of the station.
   Asker(BridgedDevice::Program number, std::string who, std::size_t i) : number_(number), who_(std::move(who)), i_(i) {}
 
-  /// `peer` and `station` must outlive the request, until BridgedDevice::release. Returns true to send it at once.
+  /// `peer` and `station` must outlive the request, until BridgedDevice::release. Returns true if it is due now.
   bool turn(LocalTime now, Duration since_1970, BridgedDevice& bridged, const Station& station, Peer& peer);
 
   std::optional<std::string> next_sentence() { return std::exchange(sentence_, {}); }

@@ -36,8 +36,7 @@ constexpr std::uint64_t kQuiet = 1'000'000;
 /// Wait after the first address, because a host with IPv4 and IPv6 answers over both immediately.
 constexpr std::uint64_t kOtherAddress = 200'000;
 
-/// Upper bound, because any host on the link can announce services without limit.
-constexpr std::size_t kMaxFound = 4096;
+constexpr std::size_t kMaxFound = 4096;  ///< limit, because any host on the link can announce services
 
 struct Release {
   void operator()(sd_event* loop) const { sd_event_unref(loop); }

@@ -25,8 +25,7 @@ namespace {
 using Verdict = SelfTest::Verdict;
 using Finding = SelfTest::Finding;
 
-/// J. With less work than this, the hand has not touched anything.
-constexpr double kNothingJ = 1e-12;
+constexpr double kNothingJ = 1e-12;  ///< J; with less work, the hand has not touched anything
 /// Relative force difference between two answers at the same place, for engines that use single precision.
 constexpr double kSameForce = 1e-6;
 /// Relative kink above which a surface is near: the one-sided stiffnesses differ by more than 20 %.

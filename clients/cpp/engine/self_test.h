@@ -66,7 +66,7 @@ struct SelfTestScript {
 ///
 /// Unless stated otherwise, each state follows the previous one by one tick and 1/rate_hz s. The test covers half a
 /// minute of simulated time and ends at `start`. Throws std::invalid_argument "FIELD = VALUE: expected …" if `script`
-/// is invalid. Exceptions of `engine` are reported as findings. `tell` gets each finding as soon as it is available.
+/// is invalid. Exceptions of `engine` are reported as findings. `tell` is called with each finding.
 SelfTest self_test(const Physics& engine, const SelfTestScript& script = {},
                    const std::function<void(const SelfTest::Finding&)>& tell = {});
 

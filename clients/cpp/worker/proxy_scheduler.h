@@ -33,8 +33,7 @@ class ProxyScheduler {
  public:
   struct Config {
     Duration deadline{};  ///< 0: three times the median of the newest answers with a force, at least kMinDeadline
-    /// 0: ten times that median, at least kMinDead; kDeadAtFirst before the first answer with a force.
-    Duration dead{};
+    Duration dead{};      ///< 0: ten times that median, at least kMinDead; kDeadAtFirst before the first force
     Duration start = std::chrono::minutes(2);  ///< timeout from the launch to the opening of the stream; > 0
     Duration retry_min = std::chrono::milliseconds(500);
     Duration retry_max = std::chrono::seconds(30);

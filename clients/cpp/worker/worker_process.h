@@ -29,24 +29,22 @@ class WorkerProcess {
     std::string listen{};  ///< "HOST:PORT" for TCP; port 0: any free port
   };
 
-  /// Throws std::system_error or std::runtime_error if it cannot listen at the address.
-  explicit WorkerProcess(const Config& config);
-  ~WorkerProcess();  ///< kills the running program
+  explicit WorkerProcess(const Config& config);  ///< throws std::system_error or std::runtime_error if it cannot listen
+  ~WorkerProcess();                              ///< kills the running program
   WorkerProcess(const WorkerProcess&) = delete;
   WorkerProcess& operator=(const WorkerProcess&) = delete;
 
   /// Starts the program. `secret` must consist of kSecretDigits hexadecimal digits. Throws std::system_error.
   void launch(const std::string& secret);
   void kill();  ///< sends SIGKILL and closes the stream; remaining processes are killed again in each turn
-  void send(const Record& record);  ///< ends the stream if the worker does not read it
+  void send(const Record& record);  ///< ends the stream if the worker does not read
 
   struct Opened {};
   struct Ended {
     std::string why;
   };
   using Event = std::variant<Opened, Record, Ended>;
-  /// Returns the next event; call until it returns empty. There is one Ended event for each program.
-  std::optional<Event> next();
+  std::optional<Event> next();      ///< call until it returns empty; there is one Ended event for each program
   int descriptor() const noexcept;  ///< for poll(); readable if next() has an event
 
   const std::string& address() const noexcept { return address_; }  ///< "unix:PATH" or "tcp:HOST:PORT"

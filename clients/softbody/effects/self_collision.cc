@@ -18,16 +18,14 @@ namespace {
 
 using Box = Eigen::AlignedBox3d;
 
-/// The range of the search behind and in front of a facet, relative to its size.
-constexpr double kBehind = 0.5;
-constexpr double kBefore = 1;
+constexpr double kBehind = 0.5;  ///< range of the search behind a facet, relative to its size
+constexpr double kBefore = 1;    ///< in front of it
 
 /// The tolerance in barycentric coordinates. With a smaller value, nodes at an edge would alternate between two states.
 constexpr double kBeside = 0.15;
 
-/// The maximum number of Gauss–Seidel iterations, and the relative change at which they end.
-constexpr int kMostRounds = 2000;
-constexpr double kSettled = 1e-8;
+constexpr int kMostRounds = 2000;  ///< maximum number of Gauss–Seidel iterations
+constexpr double kSettled = 1e-8;  ///< they end at this relative change
 
 template <class Visit>
 struct Around {

@@ -42,8 +42,7 @@ class Elastic {
   VectorXd to_free(const VectorXd& all) const;
   void add_free(const VectorXd& free, VectorXd& all) const;  ///< all += free
 
-  /// Returns the initial displacements of a solver (m).
-  virtual VectorXd beginning() const { return VectorXd::Zero(size()); }
+  virtual VectorXd beginning() const { return VectorXd::Zero(size()); }  ///< initial displacements of a solver (m)
 
   virtual double energy(const VectorXd& u) const = 0;
   struct Forces {  // force = ∂energy/∂u, N: the external forces that hold the nodes at u
@@ -60,8 +59,7 @@ class Elastic {
   virtual std::size_t bytes() const noexcept = 0;
 
  protected:
-  /// Throws std::invalid_argument if the mesh is invalid or no displacement is fixed.
-  Elastic(Mesh mesh, const Fixed& fixed);
+  Elastic(Mesh mesh, const Fixed& fixed);  ///< throws std::invalid_argument if the mesh is invalid or nothing is fixed
   struct Together {  // additional unknowns that move the nodes of `rim`, whose components are fixed
     int count = 0;
     std::vector<int> rim = {};

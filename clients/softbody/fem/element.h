@@ -16,8 +16,7 @@ using Mat3 = Eigen::Matrix3d;
 /// Converts an index for the standard containers.
 inline std::size_t at(int index) noexcept { return static_cast<std::size_t>(index); }
 
-/// Element geometry and node positions, in gmsh's node order.
-enum class Shape : std::uint8_t { kTet4, kHex8, kHex20, kHex27 };
+enum class Shape : std::uint8_t { kTet4, kHex8, kHex20, kHex27 };  ///< the node order is that of gmsh
 
 enum class Element : std::uint8_t { kTet4, kHex8, kHex8Sri, kHex20, kHex27, kHex27Sri };
 

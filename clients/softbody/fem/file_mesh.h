@@ -21,7 +21,7 @@ struct FileMesh {
 
 /// Joins the elements of a file into one body. Each repair is added to `notes`.
 ///
-/// - Of elements with the same nodes, in any order, the first is used: gmsh 2.2 writes one per physical group.
+/// - If elements have the same nodes, in any order, only the first is used (gmsh 2.2 writes one per physical group).
 /// - Nodes at the same place (kSamePlace) are merged. If `slits` is true, they are not merged, because the mesh may
 ///   contain a slit or a crack. The note gives the number of places in both cases.
 ///

@@ -33,8 +33,7 @@ class Kernel {
 
   int elements() const noexcept { return elements_; }
 
-  /// Adds ∂energy/∂u at u (m, all nodes) to `force` (N). Returns the energy, J.
-  double add_forces(const VectorXd& u, VectorXd& force) const;
+  double add_forces(const VectorXd& u, VectorXd& force) const;  ///< adds ∂energy/∂u (N) at u (m); returns J
 
   std::size_t bytes() const noexcept;
 

@@ -8,7 +8,7 @@
 
 namespace tendon::softbody {
 
-/// A value that is computed at its first use. Thread-safe: get() is. Realtime-safe: no.
+/// A value that is computed on first use. Thread-safe: get() is. Realtime-safe: no.
 template <class T>
 class Lazy {
  public:

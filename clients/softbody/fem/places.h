@@ -25,8 +25,7 @@ struct HashOfCell {
 };
 Cell cell_of(const Vec3& point, const Vec3& origin, double size);  ///< `point` within 10¹⁸ `size` of `origin`
 
-/// For each point, the index of the first point that coincides with it.
-std::vector<int> first_at_place(std::span<const Vec3> points);
+std::vector<int> first_at_place(std::span<const Vec3> points);  ///< index of the first point that coincides
 
 std::string in_words(const Vec3& place);  ///< formats the coordinates with four digits: "(1, 2, 3)"
 

@@ -33,8 +33,7 @@ class Factor {
   Factor(Factor&&) noexcept;
   Factor& operator=(Factor&&) noexcept;
 
-  /// Returns false if the matrix is not positive definite; the factor then has no values.
-  [[nodiscard]] bool factorize(const SymmetricMatrix& matrix);
+  [[nodiscard]] bool factorize(const SymmetricMatrix& matrix);  ///< false, without values: not positive definite
 
   /// Changes the factor to that of `grown`, in which some unknowns have twins. The twins follow the old unknowns, and
   /// `twin_of` contains their originals. If the twins are tied to their originals, `grown` is equal to the old matrix.

@@ -14,8 +14,8 @@ namespace tendon::softbody {
 /// the whole body change K and f, and an answer is then two solves.
 class LinearModel : public Model {
  public:
-  /// Starts at rest with gravity. `solid` must outlive it. With `glides`, an answer at rest has Reaction::glide. Throws
-  /// std::invalid_argument if the law is not linear, and std::runtime_error if the solid is not held.
+  /// Starts at rest with gravity. If `glides` is true, answers at rest contain Reaction::glide. `solid` must outlive
+  /// this object. Throws std::invalid_argument if its law is not linear, and std::runtime_error if it is not held.
   LinearModel(const Solid& solid, const TouchSurface& surface, const EffectsConfig& effects = {}, bool glides = false);
 
   Reaction press(const Patch& patch, Prescribed given, double value) override;
@@ -78,8 +78,7 @@ class Solver {
 };
 using SolverOf = std::function<std::unique_ptr<Solver>(const Solid&)>;
 
-/// Uses a Cholesky factor. Throws std::runtime_error if the solid is not held.
-std::unique_ptr<Solver> with_factor(const Solid& solid);
+std::unique_ptr<Solver> with_factor(const Solid& solid);  ///< throws std::runtime_error if the solid is not held
 
 /// Returns the table G of CondensedModel (m/N) with one solve for each node.
 MatrixXd surface_compliance(const Solid& solid, const Vec3& normal, const std::vector<int>& nodes,

@@ -14,9 +14,8 @@
 namespace tendon::softbody {
 namespace {
 
-/// Armijo's parameter and the shortest step.
-constexpr double kDecrease = 1e-4;
-constexpr double kShortest = 1.0 / 64;
+constexpr double kDecrease = 1e-4;      ///< Armijo's parameter
+constexpr double kShortest = 1.0 / 64;  ///< the shortest step
 
 /// The factor is computed again after kPatience steps without an accurate answer. If sides of the body are in contact,
 /// it is computed again if a step leaves more than kSlow of the remaining energy, because the contact changes.
@@ -29,17 +28,14 @@ constexpr double kSlow = 1.0 / 16;
 constexpr double kOfTangentForGlide = 0.5;
 constexpr int kTangentRounds = 5;
 
-/// If the relative error of the force is larger, the body is not at rest, and there is no glide.
-constexpr double kAtRest = 0.1;
+constexpr double kAtRest = 0.1;  ///< larger relative errors of the force: not at rest, and no glide
 
 constexpr double kGlidesAlike = 0.04;  ///< relative change of the load and the force for which the glide is used again
 
-/// The step (m) of finite differences. In a body of some mm its relative error is 1e-4.
-constexpr double kNudge = 1e-7;
+constexpr double kNudge = 1e-7;  ///< m, step of finite differences; in a body of some mm its relative error is 1e-4
 
-/// The maximum number of searches for neighbors, and the relative change of forces at which they end.
-constexpr int kLooks = 10;
-constexpr double kParted = 1e-3;
+constexpr int kLooks = 10;        ///< maximum number of searches for neighbors
+constexpr double kParted = 1e-3;  ///< they end at this relative change of forces
 
 constexpr double kHeard = 1e-8;  ///< smaller relative changes are rounding errors
 

@@ -26,8 +26,7 @@ void check(const StiffnessOverTime& law);  ///< throws std::invalid_argument wit
 /// limiter of the server protects the hand.
 class StiffeningModel : public Model {
  public:
-  /// Starts with the factor at time 0. Throws the errors of check().
-  StiffeningModel(std::unique_ptr<Model> model, StiffnessOverTime law);
+  StiffeningModel(std::unique_ptr<Model> model, StiffnessOverTime law);  ///< factor at time 0; throws as check() does
 
   void tick(double time) { factor_ = law_.factor_at(time); }  ///< s
 

@@ -29,8 +29,7 @@ enum class Method : std::uint8_t {
   kMultigrid,
 };
 inline constexpr int kMostForFactor = 100'000;
-/// Multigrid needs hundreds of iterations for nearly incompressible materials.
-inline constexpr double kMostPoisson = 0.49;
+inline constexpr double kMostPoisson = 0.49;  ///< above this, multigrid needs hundreds of iterations
 
 /// Linear elasticity, K u = f, by PETSc on all ranks. Each rank assembles its own rows; their bits do not depend on the
 /// number of ranks. The environment variable PETSC_OPTIONS overrides the solver ("-ksp_type cg -pc_type gamg -ksp_rtol

@@ -28,13 +28,13 @@ struct LearnConfig {
   std::filesystem::path folder{};
 };
 
-/// Reads stored results, or computes them. Never overwrites a file. A damaged file gives a warning, and its data are
-/// computed again. The format is little-endian; the first column is the number of bytes:
+/// Reads stored results, or computes them. Never overwrites a file. If a file is damaged, adds a warning and computes
+/// the data again. The format is little-endian; the first column is the number of bytes:
 ///
 ///     8   "TENDONSH" or "TENDONAN"                  4   version, 3; then 4 zeros
 ///     8   digest of the input
-///     n   the fields of LearnedShapes or TabulatedAnswers without the grid, in order: numbers of 8 bytes, and lists and
-///         matrices after their size
+///     n   the fields of LearnedShapes or TabulatedAnswers without the grid, in order: numbers of 8 bytes, and lists
+///         and matrices after their size
 ///     8   XXH3 (64 bits) of everything before
 ///
 /// Throws the errors of solve_presses(), and std::runtime_error if a file cannot be written.

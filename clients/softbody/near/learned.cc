@@ -22,33 +22,27 @@ namespace {
 /// The maximum numbers of shapes, and the part of the energy (square root) that may be neglected.
 constexpr std::array<int, 2> kMostLearned{45, 60};
 constexpr double kShapesLeft = 3e-4;
-/// The second number is used if the relative error with the first one is larger than this.
-constexpr double kGoodEnough = 0.015;
+constexpr double kGoodEnough = 0.015;  ///< the second number is used above this relative error with the first
 
-/// The accepted error of the chosen elements, and their maximum number.
-constexpr double kElementsLeft = 5e-3;
-constexpr int kMostElements = 240;
+constexpr double kElementsLeft = 5e-3;      ///< accepted error of the chosen elements
+constexpr int kMostElements = 240;          ///< their maximum number
 constexpr Eigen::Index kCandidates = 1500;  ///< only the elements with the largest nonlinear parts are considered
 
-/// The step of finite differences, relative to |q|, and its minimum (√J).
-constexpr double kNudged = 1e-6;
-constexpr double kLeastNudge = 1e-9;
+constexpr double kNudged = 1e-6;      ///< step of finite differences, relative to |q|
+constexpr double kLeastNudge = 1e-9;  ///< √J, its minimum
 
-/// Newton's method: the maximum number of steps, the shortest step, and Armijo's parameter.
-constexpr int kMostSteps = 8;
-constexpr double kShortestShare = 1.0 / 64;
-constexpr double kShareOfDecrease = 1e-4;
-constexpr double kLeastCurved = 1e-8;  ///< minimum cosine between a step and its change of forces
+constexpr int kMostSteps = 8;                ///< maximum number of steps of Newton's method
+constexpr double kShortestShare = 1.0 / 64;  ///< the shortest step
+constexpr double kShareOfDecrease = 1e-4;    ///< Armijo's parameter
+constexpr double kLeastCurved = 1e-8;        ///< minimum cosine between a step and its change of forces
 
 constexpr double kForNewton = 0.25;  ///< fraction of the tolerance for Newton's method
 
-/// Relative tolerances for knots and for validation. The error of the force is quadratic.
-constexpr double kExactly = 1e-6;
-constexpr double kJudged = 1e-4;
+constexpr double kExactly = 1e-6;  ///< relative tolerance for knots; the error of the force is quadratic
+constexpr double kJudged = 1e-4;   ///< for validation
 
-/// Rayleigh quotient: the maximum number of rounds, and the accepted relative error.
-constexpr int kStiffnessRounds = 5;
-constexpr double kStiffnessAlike = 0.02;
+constexpr int kStiffnessRounds = 5;       ///< maximum number of rounds of the Rayleigh quotient
+constexpr double kStiffnessAlike = 0.02;  ///< its accepted relative error
 
 /// Elements do not share corners here, so their forces are separate.
 Kernel apart(const Solid& solid, Law law, const std::vector<int>& elements, const std::vector<int>& node_of,

@@ -11,9 +11,8 @@
 namespace tendon::softbody {
 namespace {
 
-/// The number of random loads for each mode, and the part of the motion of Γ (RMS) that may be neglected.
-constexpr int kLoadsPerMode = 2;
-constexpr double kLeft = 1e-3;
+constexpr int kLoadsPerMode = 2;  ///< number of random loads for each mode
+constexpr double kLeft = 1e-3;    ///< part of the motion of Γ (RMS) that may be neglected
 
 constexpr Eigen::Index kLoadsAtOnce = 8;
 

@@ -36,8 +36,8 @@ class NearBody : public Elastic {
     double about_depth = 0;  ///< m, depth of the tool in u*
   };
 
-  /// Builds the body in pieces, most of which are solves for a few loads. The last piece sets `made`, null if all
-  /// elements are near. `factor` is that of the stiffness at u*. `whole` and `factor` must outlive the pieces.
+  /// Builds the body in pieces, most of which are solves for a few loads. The last piece sets `made`, which is null if
+  /// all elements are near. `factor` is the factor at u*. `whole` and `factor` must outlive the pieces.
   static Pieces make(const Solid& whole, const Factor& factor, Config config, std::unique_ptr<NearBody>& made);
 
   VectorXd beginning() const override { return beginning_; }
@@ -53,7 +53,7 @@ class NearBody : public Elastic {
   int interface() const noexcept { return static_cast<int>(rim_.size()); }
 
   /// Estimates the force (N) at `depth` (m) that the linear far field misses: z·(f(v) − f(u*) − K (v − u*)), v its
-  /// shape, z the shape per depth. Evaluates only some elements next to Γ, and scales their result.
+  /// shape, z the shape per depth. Only some elements next to Γ are evaluated, and the result is scaled.
   double left_out(const VectorXd& u, double depth) const;
 
  private:

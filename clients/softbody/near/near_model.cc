@@ -32,10 +32,9 @@ constexpr double kPiecesOnTheWay = 30;
 
 constexpr double kRoomLeft = 0.3;  ///< value of `room` at which a field must be complete
 
-/// Iterations for each piece, pieces that press the new field, and the piece that computes the factor.
-constexpr int kIterationsAtOnce = 6;
-constexpr int kPresses = 4;
-constexpr int kFactorAt = 1;
+constexpr int kIterationsAtOnce = 6;  ///< iterations for each piece
+constexpr int kPresses = 4;           ///< pieces that press the new field
+constexpr int kFactorAt = 1;          ///< the piece that computes the factor
 
 /// Safety factors of the estimated errors.
 constexpr double kFarSafety = 3;
@@ -45,7 +44,7 @@ constexpr double kReach = 0.45;  ///< maximum distance between a patch and the c
 
 constexpr double kDeeper = 0.1;  ///< a new field is requested if the depth has changed by this, in patch radii
 
-/// The accepted relative error of the shape of the whole body, unused above ten times this, and the most solves.
+/// The accepted relative error of the shape of the whole body (it is not used above ten times this), and the solves.
 constexpr double kShape = 1e-3;
 constexpr int kShapePresses = 6;
 

@@ -27,7 +27,7 @@ constexpr int kSmallSteps = 4;  ///< if a press does not converge, it is repeate
 
 constexpr int kStepsOfFactor = 30;  ///< cost of a factor, in steps
 
-/// Accepted relative difference of a force from its extrapolation; above it, the body is on another branch.
+/// If a force differs from its extrapolation by more than this fraction, the body is on another branch.
 constexpr double kGoesOn = 0.05;
 
 constexpr double kUnseenBetween = 2;  ///< safety factor for points between knots and centers

@@ -15,11 +15,10 @@ struct Shell {  // a closed part of a surface
   int within = -1;    ///< innermost of these, or −1
 };
 
-/// Returns the shells. If the surface is not closed, `depth` and `within` are undefined.
-std::vector<Shell> shells(const Triangles& surface);
+std::vector<Shell> shells(const Triangles& surface);  ///< if not closed, `depth` and `within` are undefined
 
 /// A shell inside an even number of others is a body and must point outwards; inside an odd number, a cavity and
-/// inwards. Otherwise, or above kMostShells, throws std::invalid_argument "`name`: …" with a facet and its place.
+/// inwards. If not, or if there are too many, throws std::invalid_argument "`name`: …" with a facet and its place.
 void check_shells(const Triangles& surface, std::string_view name);
 
 std::vector<Triangles> bodies(const Triangles& surface);  ///< separates the bodies with their cavities

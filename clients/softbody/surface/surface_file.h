@@ -23,9 +23,8 @@ struct Facets {
   }
 };
 
-/// Sizes of the header and of a facet in a binary STL file, in bytes.
-inline constexpr std::size_t kStlHead = 84;
-inline constexpr std::size_t kStlFacet = 50;
+inline constexpr std::size_t kStlHead = 84;   ///< bytes, header of a binary STL file
+inline constexpr std::size_t kStlFacet = 50;  ///< bytes, facet of a binary STL file
 
 /// Reads a surface. `ending` is the file extension (".stl"), and `name` is used in error messages. The formats are:
 ///

@@ -26,8 +26,8 @@ namespace tendon::softbody {
 /// is convex, so the energy never increases. The search ends if the directions of the forces change by less than
 /// kEnough; Feel::error contains the rest.
 ///
-/// The stiffnesses are derivatives for a constant set of pushed nodes. They include the changes of the forces, of the
-/// normals and of the levers, and are 0 if E has a negative curvature, as for a long handle that stands on its end. The
+/// The stiffnesses are derivatives for a constant set of pushed nodes. They include the changes of the forces, the
+/// normals and the levers. They are 0 if E has a negative curvature, as for a long handle that stands on its end. The
 /// contact must be many nodes wide, and the strains must be small.
 ///
 /// Thread-safe: no. Realtime-safe: no.

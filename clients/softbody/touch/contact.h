@@ -27,10 +27,9 @@ Mat3 not_negative(const Mat3& stiffness);  ///< nearest positive semidefinite ma
 struct Feel {
   Vec3 force = Vec3::Zero();      ///< N, on the hand
   Mat3 stiffness = Mat3::Zero();  ///< N/m, −∂force/∂position, symmetric; can be indefinite
-  double gap = 0;  ///< m, from the tool to the surface at rest along the normal; negative: the tool is inside
-  /// The tool may move by this distance (m) before `force` and `stiffness` are invalid. It does not consider `gap`.
-  double valid_radius = 0;
-  double error = 0;  ///< N, estimated by the solver
+  double gap = 0;           ///< m, from the tool to the surface at rest along the normal; negative: the tool is inside
+  double valid_radius = 0;  ///< m, motion until `force` and `stiffness` are invalid; does not consider `gap`
+  double error = 0;         ///< N, estimated by the solver
   SolverPath way = SolverPath::kOnly;
   bool touching = false;
   std::optional<Vec3> normal{};        ///< unit vector; empty: the scene's direction to the tool

@@ -52,8 +52,7 @@ class Layer {
     double piece = 0;         ///< m, distance between points
     std::size_t tools = 1;
   };
-  /// `elastic` must outlive this object. Throws std::invalid_argument.
-  Layer(const Elastic& elastic, const Config& config);
+  Layer(const Elastic& elastic, const Config& config);  ///< must outlive this; throws std::invalid_argument
 
   /// A tool with its pose. The pose is empty if the hand is absent.
   struct Placed {

@@ -13,29 +13,27 @@
 namespace tendon::softbody {
 namespace {
 
-constexpr double kOnTheWay = 0.03;  ///< relative tolerance and the maximum number of steps at intermediate positions
-constexpr int kMostOnTheWay = 4;
+constexpr double kOnTheWay = 0.03;  ///< relative tolerance at intermediate positions
+constexpr int kMostOnTheWay = 4;    ///< maximum number of steps there
 
 constexpr double kMargin = 0.25;  ///< relative to the size of a facet
 
-constexpr double kToolDecrease = 1e-4;  ///< Armijo's parameter, the shortest step, and the rounding error of the energy
-constexpr double kToolShortest = 1.0 / 64;
-constexpr double kContactRounding = 1e-13;
+constexpr double kToolDecrease = 1e-4;      ///< Armijo's parameter
+constexpr double kToolShortest = 1.0 / 64;  ///< the shortest step
+constexpr double kContactRounding = 1e-13;  ///< rounding error of the energy
 
 constexpr int kToolPatience = 16;  ///< number of steps until a new factor
 constexpr int kMostMeets = 60;
-/// The remaining energy there, relative to that of an answer.
-constexpr double kMet = 1e-3;
+constexpr double kMet = 1e-3;      ///< the remaining energy there, relative to that of an answer
 constexpr double kNoDrop = 1e-24;  // smaller relative changes are rounding errors
 
 constexpr double kToolUnseen = 1e-12;  ///< an error that corresponds to a smaller motion (m) is ignored
-/// The same without contact.
-constexpr double kUnfelt = 1e-10;
+constexpr double kUnfelt = 1e-10;      ///< the same without contact
 
 constexpr double kToolHeard = 1e-8;  ///< smaller relative changes are rounding errors
 
-constexpr double kCurveError = 2e-3;  ///< accepted relative error of the stiffness, and the maximum number of rounds
-constexpr int kCurveRounds = 12;
+constexpr double kCurveError = 2e-3;  ///< accepted relative error of the stiffness
+constexpr int kCurveRounds = 12;      ///< maximum number of rounds
 
 constexpr double kToolNudge = 1e-7;  ///< step of finite differences, m
 

@@ -42,8 +42,8 @@ class RigidContact {
   RigidContact(QuasiStaticModel& body, const Elastic& elastic, const TouchSurface& surface, std::vector<HeldTool> tools,
                const Config& config);
 
-  /// Returns an answer for each hand (body frame); an empty pose is an absent hand. A pose that is not finite gives no
-  /// force and does not move the tool. Throws std::invalid_argument if the number of poses is wrong.
+  /// Returns an answer for each hand (body frame); an empty pose is an absent hand. If a pose is not finite, there is
+  /// no force and the tool does not move. Throws std::invalid_argument if the number of poses is wrong.
   std::vector<Feel> press(std::span<const std::optional<Pose>> handles);
 
   int iterations() const noexcept { return iterations_; }

@@ -16,9 +16,8 @@
 namespace tendon::softbody {
 namespace {
 
-/// The minimum thickness, and the maximum that is measured, in cells.
-constexpr int kThinnestInCells = 2;
-constexpr int kThickInCells = 6;
+constexpr int kThinnestInCells = 2;  ///< minimum thickness
+constexpr int kThickInCells = 6;     ///< maximum thickness that is measured
 
 Triangles in_metres(const Triangles& surface, double scale) {
   Triangles made = surface;

@@ -27,8 +27,7 @@ Mat3 shortest_rotation(const Vec3& from, const Vec3& to);
 /// Stateless. Thread-safe: yes. Realtime-safe: yes, after construction.
 class RigidShape {
  public:
-  /// All lengths are in m. Throws std::invalid_argument with the name of the field.
-  static RigidShape sphere(double radius);
+  static RigidShape sphere(double radius);  ///< lengths in m; throws std::invalid_argument with the field's name
   /// `half_length` is the distance from the center to the center of an end. `axis` is a unit vector.
   static RigidShape capsule(double radius, double half_length, const Vec3& axis);
   static RigidShape box(const Vec3& size, double edge);  ///< `edge` rounds edges and corners, ≤ half of the least size
