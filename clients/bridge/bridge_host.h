@@ -35,8 +35,8 @@ struct BridgeConfig {
 ///       host.wait(sockets_of_the_programs, now, next);
 ///     }
 ///
-/// It resolves the name of the server again between two attempts, and prints each change to stderr: "tendon-bridge:
-/// right: connected to …". With `json`, it prints one line per second for each device:
+/// The name of the server is resolved again between two attempts. The host prints each change to stderr:
+/// "tendon-bridge: right: connected to …". With `json`, it prints one line per second for each device:
 ///
 ///     {"device":"right","states":1000,"forces":998,"dropped":0,"unusable":0,"owner":1,"pushes":true,
 ///      "round_trip_ms":0.4, …}                     totals since the start, followed by the counts of the bridge
@@ -46,7 +46,7 @@ class BridgeHost {
  public:
   using Count = std::pair<std::string_view, std::uint64_t>;  ///< name and value, for the JSON lines
 
-  BridgeHost(BridgeConfig config, LocalTime now);  ///< throws as UdpTransport does
+  BridgeHost(BridgeConfig config, LocalTime now);  ///< throws std::runtime_error as UdpTransport does
 
   std::size_t size() const noexcept { return served_.size(); }
   BridgedDevice& device(std::size_t i) { return served_[i].bridged; }

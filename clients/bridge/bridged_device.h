@@ -73,7 +73,7 @@ class BridgedDevice {
   Answer push(Program program, LocalTime now, LocalTime until, const Touch& touch);
   /// Requests a force field that answers each state until `until`. push() and ask() replace the program's last request.
   Answer ask(Program program, LocalTime now, LocalTime until, Physics physics);
-  void release(Program program);  ///< ends its requests; does nothing if it is not the owner
+  void release(Program program);  ///< does nothing if the program is not the owner
   Program owner() const noexcept { return owner_; }
 
   bool pushes() const noexcept { return controller_ && controller_->holds(); }  ///< the server accepts forces from here

@@ -11,7 +11,7 @@
 namespace tendon::bridge::chai3d {
 
 // Memory shared between tendon-bridge, which creates it, and libhdPhantom.so in the program. Neither side blocks the
-// other. Values are in the frame of CHAI3D, x to the user, y right, z up, in SI units. Times are in ns and use
+// other. All values are in SI units and in the frame of CHAI3D (x to the user, y right, z up). Times are in ns and use
 // CLOCK_MONOTONIC.
 
 /// A value under a sequence lock, shared between processes. If a writer dies in put(), get() fails but does not block.

@@ -12,8 +12,8 @@
 #include "protocol/messages.h"
 
 /// Messages of Haply's Inverse service, version 3.5, as structs. Sources: its documentation, pages "WebSocket
-/// Protocol", "Simulation Channel" and "Basis Permutation", and Isaac Lab's device class for the client side. SI
-/// units: positions in m, velocities in m/s, forces on the hand in N, quaternions as w x y z.
+/// Protocol", "Simulation Channel" and "Basis Permutation", and Isaac Lab's device class for the client side. SI units:
+/// positions in m, velocities in m/s, forces on the hand in N, quaternions as w x y z.
 ///
 /// Input; all fields are optional, and unknown fields are ignored and counted:
 ///
@@ -24,8 +24,7 @@
 ///                                 "probe_position": {},
 ///                                 "tendon": {"torque_nm": {"x": 0, "y": 0, "z": 0.01}, "grip_force_n": 0.5}}}]}
 ///
-/// Output for each device. "session_id" and "config" are only in the first message and after
-/// "force_render_full_state":
+/// Output for each device. "session_id" and "config" are only in the first message and after "force_render_full_state":
 ///
 ///     {"session_id": 3,
 ///      "inverse3": [{"device_id": "8C4A51F0",
@@ -42,8 +41,8 @@
 ///                              "energy_j", "permitted_force_n" (null: no bound), "force_age_ms",
 ///                              "angular_velocity_radps" {…}, "torque_nm" {…}, "grip_rad", "grip_force_n"}]}}
 ///
-/// If the server of a device does not answer, "state" is missing and "ready" and "connected" are false. Quantities in
-/// the last line that a device does not measure are missing.
+/// If the server of a device does not answer, "state" is missing and "ready" and "connected" are false. If a device
+/// does not measure a quantity in the last line, this quantity is missing.
 ///
 /// Thread-safe: yes (stateless). Realtime-safe: no.
 namespace tendon::bridge {

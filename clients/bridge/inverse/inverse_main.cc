@@ -71,7 +71,7 @@ void add_inverse(CLI::App& app, Chosen& chosen) {
                                                "Serve the JSON protocol of Haply's Inverse service over a WebSocket, "
                                                "for Isaac Lab, web pages and all languages");
   command->footer("Example: tendon-bridge inverse --server lab:47100 --device right");
-  static InverseOptions options;  // the parser writes to it until `chosen` is called
+  static InverseOptions options;  // the parser writes to this until it calls `chosen`
   add_common(*command, options.bridge);
   command
       ->add_option("--listen", options.listen,

@@ -413,7 +413,7 @@ struct InverseServer::State {
     }
   }
 
-  /// The sockets of the BridgeHost change after a name lookup, which happens only while a device has no session.
+  /// The sockets of the BridgeHost may change after a name lookup. This only happens while a device has no session.
   void watch() {
     bool lost = false;
     for (std::size_t i = 0; i < shared.host.size(); ++i) lost = lost || shared.host.device(i).lost();

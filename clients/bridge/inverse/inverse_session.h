@@ -53,7 +53,7 @@ class InverseSession {
   /// `devices` and `counts` must outlive the session. `program` identifies this client at the bridged devices.
   InverseSession(BridgedDevice::Program program, std::span<const InverseDevice> devices, InverseCounts& counts,
                  LocalTime now);
-  ~InverseSession();  ///< releases the devices that it owns
+  ~InverseSession();  ///< releases its devices
   InverseSession(const InverseSession&) = delete;
   InverseSession& operator=(const InverseSession&) = delete;
 

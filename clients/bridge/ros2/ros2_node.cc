@@ -22,7 +22,7 @@
 namespace tendon::bridge {
 namespace {
 
-/// Participants of one machine use the first free index. ROS 2 creates one for each process.
+/// The participants of a machine use the first free index. ROS 2 creates a participant for each process.
 constexpr int kMostParticipants = 100;
 
 std::string configuration(const Ros2Node::Config& config) {

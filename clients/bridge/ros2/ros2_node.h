@@ -59,7 +59,7 @@ class Ros2Node {
 
   std::uint64_t published() const noexcept;
   std::uint64_t unsent() const noexcept;      ///< messages that DDS did not accept immediately
-  std::uint64_t superseded() const noexcept;  ///< commands replaced by a newer one before take()
+  std::uint64_t superseded() const noexcept;  ///< commands that were replaced by a newer command before take()
 
  private:
   struct State;

@@ -14,9 +14,9 @@ namespace tendon::bridge {
 ///     pose:   p = p₀ + scale · (p_hand − p_hand,₀),  R = R_hand R_hand,₀ᵀ R₀
 ///
 /// where ₀ denotes the time of the press. p₀ and R₀ are the pose at the end of the previous press, initially zero and
-/// identity. The pose is therefore relative to a frame at the pose of the tool at the first press, with the axes of
-/// REP 103 as seen by the operator; the user must publish this frame to tf. If the session is lost, the press ends,
-/// and the hand pose is taken again afterwards to avoid jumps.
+/// identity. The pose is therefore relative to a frame at the pose of the tool at the first press, with the axes of REP
+/// 103 as seen by the operator; the user must publish this frame to tf. If the session is lost, the press ends and the
+/// hand pose is read again afterwards to avoid jumps.
 ///
 /// Thread-safe, realtime-safe: no.
 class RosServo {

@@ -23,7 +23,7 @@ using Buffer = std::vector<std::byte>;
 
 inline constexpr std::size_t kCookieSize = 24;
 inline constexpr std::size_t kHeaderSize = 24;
-inline constexpr std::size_t kLongestPayload = 64000;  ///< padded, VRPN's TCP buffer; longer ones close the connection
+inline constexpr std::size_t kLongestPayload = 64000;  ///< the size of VRPN's TCP buffer, including the padding
 inline constexpr std::size_t kLongestDatagram = 1472;  ///< VRPN's UDP buffer: an Ethernet frame without headers
 inline constexpr std::size_t kLongestName = 99;        ///< maximum length of a name without the terminating zero
 inline constexpr std::int32_t kMostNumbers = 2000;     ///< limit of sender and type numbers, assigned by each side
@@ -105,7 +105,7 @@ struct First {
 };
 First first_message(Bytes bytes);
 
-void append(Buffer& out, const Message& message, std::uint32_t sequence);  ///< appends a message with its padding
+void append(Buffer& out, const Message& message, std::uint32_t sequence);  ///< adds the padding
 
 void append_description(Buffer& out, std::string_view name);
 std::optional<std::string_view> read_description(Bytes payload);  ///< name, which points into `payload`

@@ -54,7 +54,7 @@ class Peer {
 
   struct Counts {
     std::uint64_t messages = 0;      ///< received, without descriptions
-    std::uint64_t skipped = 0;       ///< messages skipped because of the rate limit
+    std::uint64_t skipped = 0;       ///< messages that were skipped because of the rate limit
     std::uint64_t nonsense = 0;      ///< unknown messages or invalid values
     std::uint64_t not_rendered = 0;  ///< meshes, effects and other unsupported requests
     std::uint64_t reports = 0;       ///< poses sent

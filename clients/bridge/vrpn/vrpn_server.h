@@ -46,8 +46,8 @@ class Descriptor {
 ///   connection per port, and is given up after kPatience.
 /// * **Limits.** At most kMaxClients, including those being connected. Further connections are closed, and a message is
 ///   printed for the first of them. A client that sends no cookie within kPatience is closed.
-/// * **Forces.** Each program has an Asker for each station. When its connection ends, it releases the devices, and the
-///   server fades the last force.
+/// * **Forces.** Each program has an Asker for each station. At the end of the connection, the Asker releases the
+///   devices, and the server fades the last force.
 ///
 /// Thread-safe: no. Realtime-safe: no (system calls).
 class Server {

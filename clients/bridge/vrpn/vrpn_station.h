@@ -17,7 +17,7 @@ namespace tendon::bridge::vrpn {
 struct Station {
   std::string name;
   View view{*find_frame("openhaptics"), {}};  ///< VRPN uses the frame of its Phantom server
-  double stiffest = 1000;                     ///< N/m, of a plane with spring 1; from the device description if known
+  double stiffest = 1000;  ///< N/m, stiffness of a plane with spring 1; from the device description if it is known
   std::optional<DeviceDescription::Box> workspace{};  ///< in the device base frame
   int buttons = 0;
   std::uint32_t loop_hz = 1000;
@@ -39,7 +39,7 @@ class Peer;
 /// program is informed that its force is not applied. Thread-safe: no. Realtime-safe: no.
 class Asker {
  public:
-  /// `number` identifies the program at every BridgedDevice, `who` in messages. `i` is the index of the station.
+  /// `number` identifies the program for each BridgedDevice, and `who` in messages. `i` is the index of the station.
   Asker(BridgedDevice::Program number, std::string who, std::size_t i) : number_(number), who_(std::move(who)), i_(i) {}
 
   /// `peer` and `station` must outlive the request, until BridgedDevice::release. Returns true if it is due now.

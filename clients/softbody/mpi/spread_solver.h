@@ -45,8 +45,8 @@ inline constexpr double kMostPoisson = 0.49;  ///< above this, multigrid needs h
 /// Results are byte-identical for the same number of ranks; for others they agree to about 1e-12 of the largest value
 /// (factor) or to the tolerance. The mesh is replicated on every rank, which limits it to about 10⁶ unknowns.
 ///
-/// Treats the law as linear. Does not keep the solid. Throws std::runtime_error with PETSc's message on failure or
-/// divergence.
+/// Treats the law as linear. Does not keep the solid. Throws std::runtime_error with PETSc's message on failure or if a
+/// solver does not converge.
 std::unique_ptr<Solver> on_ranks(const Solid& solid, Method method = Method::kChosen);
 inline constexpr double kRough = 1e-3;
 
