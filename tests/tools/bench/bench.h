@@ -19,10 +19,9 @@ struct BenchOptions {
   std::optional<std::filesystem::path> write{};  ///< Markdown page
   std::optional<std::filesystem::path> plot{};   ///< file name without extension of the chart of section 512
   bool json = false;
-  bool quick = false;     ///< smoke test: the numbers are meaningless
+  bool quick = false;     ///< for smoke tests only
   bool progress = false;  ///< prints to standard error
-  /// SCHED_FIFO priority of the measured threads, which keeps other work from preempting them; 0: default scheduling.
-  /// Haptic threads set their own priority, as in tendond.
+  /// SCHED_FIFO priority of the measured threads; 0: default scheduling. Haptic threads set their own, as in tendond.
   int priority = 0;
   std::uint64_t seed = 1;
 };
@@ -51,7 +50,7 @@ struct Section {
   void (*measure)(Run& run);
 };
 
-// In the order of the table. Each function may fork and start threads; it starts and returns with a single thread.
+// In the order of the table. Each function may fork, and starts and returns with a single thread.
 void measure_steps(Run& run);       ///< steps.cc
 void measure_datagrams(Run& run);   ///< datagrams.cc
 void measure_round_trip(Run& run);  ///< round_trip.cc
@@ -66,7 +65,7 @@ const std::vector<Section>& sections();
 /// Call in a child right after fork(): the kernel kills it when its parent dies.
 void end_with_parent();
 
-/// Sets the calling thread's real-time priority and removes its timer slack during its lifetime. 0: does nothing.
+/// Sets the calling thread's real-time priority and removes its timer slack. 0: does nothing.
 class AtPriority {
  public:
   /// Throws std::system_error if the kernel refuses.

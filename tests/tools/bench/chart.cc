@@ -22,7 +22,6 @@ double figure(const Row& row, std::string_view name) {
   return found == row.figures.end() ? 0 : found->second;
 }
 
-/// Returns true if every device of the row has a session with states and forces at 1 kHz.
 bool is_of_devices(const Row& row) {
   return figure(row, "devices") > 0 && row.what.find("states and forces at 1 kHz") != std::string::npos;
 }

@@ -77,7 +77,6 @@ ForceCommand handle_force() {
 
 const OutgoingEcho kEcho{PeerTime(std::chrono::seconds(5)), LocalTime(std::chrono::seconds(6)), 99, 0xffffffff};
 
-/// Writes up to `messages` messages into one datagram, as many as fit.
 template <class Message>
 std::size_t write(DataWriter& writer, Buffer& buffer, Message message, std::size_t messages) {
   writer.begin(std::span(buffer).first(kMaxDatagram - crypto::kTagSize), {.connection_id = 7, .packet_number = 1},

@@ -33,7 +33,6 @@ class CircleDevice final : public Device {
   }
   const DeviceInfo& info() const noexcept override { return info_; }
   std::optional<PositionSample> read(LocalTime now) noexcept override {
-    // A rotation by 3 mrad per millisecond, about half a turn per second.
     const Vec3 before = arm_;
     arm_ = {before.x() - 3e-3 * before.y(), before.y() + 3e-3 * before.x(), 0};
     arm_ *= 0.015 / arm_.norm();
@@ -73,8 +72,7 @@ struct Lane {
 
   void step(LocalTime now) { haptic.step(now); }
 
-  /// Simulates the other threads. It removes the records, and it posts a force every tenth step, as the network thread
-  /// does.
+  /// Stands for the other threads: removes the records, and posts a force every tenth step.
   void be_the_others(std::uint64_t step, LocalTime now) {
     while (mail.steps.front() != nullptr) mail.steps.pop();
     const DeviceState* state = mail.state.take();
@@ -154,7 +152,6 @@ Paced at_1_khz(std::size_t count, Duration length) {
   return result;
 }
 
-/// `ten`: the median with ten devices, set by the call for ten.
 Row row_of(const Paced& paced, std::size_t count, const std::string& what, std::optional<double>& ten) {
   std::vector<double> each;
   for (const double round : paced.rounds) each.push_back(1e3 * round / static_cast<double>(count));
@@ -185,10 +182,8 @@ Row row_of(const Paced& paced, std::size_t count, const std::string& what, std::
   return row;
 }
 
-/// Measures increasing numbers of devices until they no longer fit into a millisecond.
 template <class AnyLane>
 void measure_lanes(Run& run, const std::string& what, const std::vector<std::size_t>& counts) {
-  // A single device pays for a processor that wakes from idle; with ten, this cost is shared.
   std::optional<double> ten;
   for (const std::size_t count : counts) {
     const Paced paced = at_1_khz<AnyLane>(count, std::chrono::milliseconds(run.options.quick ? 50 : 3000));

@@ -132,7 +132,6 @@ class Trial {
         static_cast<std::uint64_t>(result_.seconds / seconds(kPeriod) * static_cast<double>(fleet_.devices));
   }
 
-  /// `stopped`: the server's last line of output.
   void take_totals(const std::string& stopped) {
     const auto line = nlohmann::json::parse(stopped);
     result_.steps = line.at("steps");

@@ -9,20 +9,16 @@
 
 namespace tendon::bench {
 
-/// Measures `tendond` with many simulated devices and clients in another process, over UDP on the loopback.
+/// Measures the real `tendond` with many simulated devices and clients in another process, over UDP on the loopback.
+/// The devices use one substep per step, to keep their cost out of the measurement.
 ///
-/// The server is the real program. Its simulated devices stand for hardware and use one substep per step, to keep their
-/// cost out of the measurement.
-///
-/// The clients are one thread with the client side of the protocol. They answer states with forces and load the cores
-/// about as much as the server does.
+/// The clients are one thread. They answer states with forces, and load the cores about as much as the server does.
 struct Fleet {
   std::size_t devices = 16;
   std::size_t channels = 1;  ///< per device
   /// If this is true, one session controls all devices of a bank. Otherwise, each channel has its own session.
   bool one_session_for_16 = false;
-  /// The number of sessions. If there are more sessions than channels, the others observe one device each. If this is
-  /// 0, all devices or channels have their session.
+  /// 0: one session for each device or channel. Sessions beyond the number of channels observe one device each.
   std::size_t sessions = 0;
   std::uint32_t state_hz = 1000;
   std::uint32_t force_hz = 1000;
@@ -30,8 +26,7 @@ struct Fleet {
   Duration settle = std::chrono::milliseconds(300);  ///< time to wait after the last session has been opened
   Duration length = std::chrono::seconds(2);         ///< measurement; extended until a state arrives
   std::uint64_t seed = 1;
-  /// The SCHED_FIFO priority of the clients and of all threads of the server except the haptic threads. If it is 0, the
-  /// default scheduling is used.
+  /// SCHED_FIFO priority of the clients and of the server's threads except the haptic ones; 0: default scheduling.
   int priority = 0;
 };
 
@@ -41,7 +36,6 @@ struct FleetResult {
   bool all_came = false;  ///< true if all sessions were open at the start
   double seconds = 0;     ///< measured duration
 
-  // Over the whole run:
   Duration started{};          ///< from exec to listening
   std::uint64_t resident = 0;  ///< resident memory of the server, bytes
   std::uint64_t steps = 0;     ///< of all devices
@@ -50,13 +44,11 @@ struct FleetResult {
   std::uint64_t forces_taken = 0;  ///< handed to the haptic loops
   std::uint64_t lost_steps = 0;    ///< steps missing in a recording
 
-  // During the measurement:
   injector::DurationHistogram loop_age;   ///< age of the motion that the force in use answers, per state
   injector::DurationHistogram state_age;  ///< receive time in the client's kernel − sample time
   std::uint64_t states_owed = 0;
   std::uint64_t states_received = 0;
-  /// Steps whose force answers the motion of the previous step, less than 1.5 periods old, as reported to the client.
-  /// This requires that the state reached the client and the force returned within a period.
+  /// Steps whose force answers the motion of the previous step: it is less than 1.5 periods old.
   std::uint64_t answered_in_time = 0;
   std::uint64_t steps_owed = 0;
   std::uint64_t out_datagrams = 0;  ///< server → clients
@@ -65,7 +57,6 @@ struct FleetResult {
   std::uint64_t in_bytes = 0;
   std::uint64_t lost = 0;  ///< lost in transit, both directions
 
-  // Processor time:
   Duration haptic{};
   Duration network{};
   Duration log{};  ///< rest of the server

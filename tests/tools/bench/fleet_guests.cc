@@ -158,8 +158,7 @@ class Guest {
     }
   }
 
-  /// The sequence number of a force is the tick of the state that it answers. A state contains the number of the force
-  /// in use.
+  /// The sequence number of a force is the tick of the state that it answers, and a state contains it.
   void judge(const DeviceState& state) {
     if (state.mode != Mode::kActive) return;
     shared_.loop_age.observe(kPeriod * static_cast<Duration::rep>(state.tick - state.force_sequence));

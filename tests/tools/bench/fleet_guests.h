@@ -29,7 +29,6 @@ struct Plan {
 
 std::vector<Plan> plans_of(const Fleet& fleet, Ratchet& secrets);
 
-/// Memory that is shared by both processes.
 struct Shared {
   enum Phase : int { kOpening, kMeasuring, kReporting, kQuit };
   std::atomic<int> phase{kOpening};
@@ -50,7 +49,6 @@ struct Shared {
   std::uint64_t forces_sent = 0;  ///< since the first force, including after the measurement
 };
 
-/// Opens a session for each plan and answers states until the phase in `shared` is kQuit.
 void serve_guests(const std::vector<Plan>& plans, const Address& server, const Fleet& fleet, Shared& shared);
 
 }  // namespace tendon::bench

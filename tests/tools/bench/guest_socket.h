@@ -16,11 +16,10 @@
 
 namespace tendon::bench {
 
-/// Clients per source address. The server accepts up to 20 handshakes per second from an address, and up to 40 at the
-/// same time.
+/// The server accepts up to 20 handshakes per second from an address, and up to 40 at the same time.
 inline constexpr std::size_t kGuestsPerAddress = 16;
 
-/// Connected socket of a client, whose source address depends on its number. Reports kernel receive times.
+/// A client's connected socket, whose source address depends on its number. Reports kernel receive times.
 class GuestSocket {
  public:
   GuestSocket(const Address& server, std::size_t number)

@@ -19,7 +19,6 @@ void keep(T& value) {
   asm volatile("" : : "g"(&value) : "memory");
 }
 
-/// Returns the q-quantile of `values`, or 0 if there are no values.
 inline double quantile(std::vector<double> values, double q) {
   if (values.empty()) return 0;
   const auto nth = values.begin() + static_cast<std::ptrdiff_t>(q * static_cast<double>(values.size() - 1));
@@ -27,16 +26,16 @@ inline double quantile(std::vector<double> values, double q) {
   return *nth;
 }
 
-/// Times of two alternating calls, so that other load affects both equally.
+/// Times of two calls that alternate, so that other load affects both equally.
 struct Turns {
   std::size_t n = 0;          ///< calls of each
-  std::vector<double> times;  ///< ns per call, for each block
+  std::vector<double> times;  ///< the time per call in ns for each block
   std::vector<double> floor_times;
   std::vector<double> ratios;
   std::optional<double> instructions{};  ///< of one call, median, if available
 };
 
-/// Runs both in `blocks` alternating blocks of `calls` calls. Discards the first pair, which runs with cold caches.
+/// Discards the first pair of blocks, which runs with cold caches.
 template <class Subject, class Floor>
 Turns in_turns(std::size_t blocks, std::size_t calls, Subject subject, Floor floor) {
   const lab::Meter meter;

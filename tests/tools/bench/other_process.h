@@ -43,7 +43,6 @@ class SharedMemory {
   T* value_;
 };
 
-/// A child process that runs `work`. The destructor waits for the process to exit.
 class OtherProcess {
  public:
   template <class Work>

@@ -32,7 +32,7 @@ using namespace injector;
 using namespace std::chrono_literals;
 
 constexpr std::size_t kBytes = 200;
-/// If it takes longer to forward a datagram, the machine is too slow to be measured.
+/// If forwarding a datagram takes longer, the machine is too slow to be measured.
 constexpr Duration kPatience = 10s;
 
 void pin_to(unsigned core) {
@@ -118,8 +118,7 @@ struct Load {
   std::uint64_t lost = 0;
 };
 
-/// Both ends in one thread. At most `window` datagrams are in flight, so no buffer overflows and every loss is the
-/// forwarder's.
+/// At most `window` datagrams are in flight, so no buffer overflows and every loss is the forwarder's.
 Load saturate(UdpBatch& server, const Address& forwarder, std::uint64_t window, Duration length) {
   pin_to(kLoadCore);
   UdpBatch client = UdpBatch::connected(forwarder);
@@ -143,7 +142,6 @@ Load saturate(UdpBatch& server, const Address& forwarder, std::uint64_t window, 
       sent += room - client.send(std::span(batch).first(room)).count();
     } else {
       pollfd readable{server.fd(), POLLIN, 0};
-      // If the whole window was lost, ends this round.
       if (::poll(&readable, 1, 200) == 0 && got > 0) break;
     }
     receive();
@@ -200,8 +198,7 @@ void compare_throughput(Run& run, const std::string& name, const std::string& pr
   run.add(row);
 }
 
-/// Sends 1 kHz in each direction through 20 ± 5 ms with an echo at the other end. Alternates with the baseline every
-/// second.
+/// Sends 1 kHz in each direction through 20 ± 5 ms to an echo, alternating with the baseline every second.
 void compare_punctuality(Run& run, Duration spin, int rounds, Duration length) {
   UdpBatch server = UdpBatch::listening(loopback());
   RunningProxy proxy(server.local_address(), "delay=uniform(15ms,25ms)", spin);
@@ -246,8 +243,7 @@ void compare_punctuality(Run& run, Duration spin, int rounds, Duration length) {
   line("down", status.of(Direction::kDown).release_error);
 }
 
-/// Runs `work` in a thread with this priority. Threads that are started by `work` have the same priority and core. The
-/// priority and the core of the caller are not changed.
+/// Runs `work` in a thread with this priority and core, without changing those of the caller.
 class Apart {
  public:
   template <class Work>

@@ -46,7 +46,6 @@ namespace {
 using std::chrono::microseconds;
 using std::chrono::milliseconds;
 
-/// The run fails if an exchange on the loopback takes longer than this.
 constexpr Duration kGiveUp = std::chrono::seconds(10);
 
 struct Options {
@@ -93,7 +92,6 @@ class BarePair {
   const Name& client_name() const noexcept { return client_name_; }
 
  private:
-  /// The kernel chooses the address.
   static int named(Way way) {
     Name any;
     if (way == Way::kUdp) {
@@ -120,8 +118,7 @@ class BarePair {
   Name client_name_;
 };
 
-/// An end of the ping-pong that is used as the baseline. With a `suite`, libsodium seals and opens all but the first 16
-/// bytes.
+/// An end of the baseline's ping-pong. With a `suite`, libsodium seals and opens all but the first 16 bytes.
 class BareSocket {
  public:
   /// `peer`: the address that a server's socket answers; null for a client's connected socket.
@@ -137,7 +134,6 @@ class BareSocket {
     const sockaddr* const to = to_ != nullptr ? to_->get() : nullptr;
     if (::sendto(fd_, buffer_.data(), size, 0, to, to_ != nullptr ? to_->size : 0) < 0) fail("send");
   }
-  /// Returns true when a datagram was received; waits as `wait` allows.
   bool receive() {
     if (wait_ == Wait::kBlocking) {
       pollfd readable{fd_, POLLIN, 0};
@@ -188,7 +184,6 @@ class WatchedLink : public Link {
   Mailboxes& mail_;
 };
 
-/// Body of the other process: a wall at x = 0, or the echo.
 void serve(Orders& orders, const ServerName& server, int echo, int udp_echo, Wait wait, const std::optional<Key>& key,
            std::optional<Suite> suite) {
   UdpTransport transport(server);
@@ -359,7 +354,6 @@ class RoundTrip {
         return watched_.seen - began;
       }
       check(began);
-      // The client has not joined yet, or the datagram was lost.
       if (now - put > milliseconds(200)) {
         put = now;
         state.tick = ++tick_;
@@ -368,7 +362,6 @@ class RoundTrip {
     }
   }
 
-  /// The log thread's task in production.
   void see_sizes() {
     while (const DatagramRecord* record = mail_.datagrams.front()) {
       (record->direction == DatagramRecord::Direction::kOut ? state_bytes_ : force_bytes_) = record->size;
@@ -381,7 +374,6 @@ class RoundTrip {
   Way way_;
   std::optional<Suite> suite_;
   Key key_;
-  /// This file is removed by the server.
   std::optional<std::filesystem::path> file_ =
       way_ == Way::kUnix ? std::optional(std::filesystem::temp_directory_path() /
                                          ("tendon-bench-" + std::to_string(::getpid()) + ".sock"))
@@ -425,7 +417,7 @@ void measure_round_trip(Run& run) {
     }
   }
   for (const auto& [wait, way, suite, goal, words] : kinds) {
-    RoundTrip round_trip(options, wait, way, suite);  // forks before the priority is raised
+    RoundTrip round_trip(options, wait, way, suite);  // must fork before the priority is changed
     const AtPriority high(options.priority);
     const Result r = round_trip.run();
     const double ratio = quantile(r.tendon, 0.5) / quantile(r.bare, 0.5);

@@ -30,7 +30,6 @@ std::string times(const std::optional<double>& ratio) {
   return text.data();
 }
 
-/// Pads to `width` displayed characters: UTF-8 continuation bytes do not count.
 std::string pad(const std::string& text, std::size_t width, bool left = true) {
   std::size_t places = 0;
   for (const char c : text) places += (static_cast<unsigned char>(c) & 0xC0U) == 0x80U ? 0 : 1;

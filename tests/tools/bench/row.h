@@ -10,8 +10,7 @@
 
 namespace tendon::bench {
 
-/// A row of the table: the cost of a part of Tendon and the machine's minimum for the same work (the baseline),
-/// measured alternately in the same run.
+/// The cost of a part of Tendon and the machine's minimum for the same work (the baseline), measured alternately.
 struct Row {
   std::string section;
   std::string what;
@@ -61,7 +60,6 @@ inline constexpr std::string_view kPageBegins = "# What things cost";
 std::string heading();
 std::string to_text(const Row& row);
 std::string to_text(const Circumstances& circumstances);
-/// Returns a line of JSON without line end.
 std::string to_json(const Row& row);
 std::string to_json(const Circumstances& circumstances);
 std::string to_markdown(const Circumstances& circumstances, const std::vector<Row>& rows);

@@ -17,9 +17,8 @@ namespace tendon::bench {
 /// Runs the `tendond` next to this program in a child process, which ends with this object.
 class ServerProcess {
  public:
-  /// Runs the server with the scene file. The output is written to files in the same folder. `priority`: SCHED_FIFO
-  /// priority of all threads except the haptic ones; 0: default scheduling. Throws std::runtime_error if it does not
-  /// listen within 20 s.
+  /// Writes the output to files in the folder of the scene. `priority`: SCHED_FIFO priority of all threads except the
+  /// haptic ones; 0: default scheduling. Throws std::runtime_error if the server does not listen within 20 s.
   ServerProcess(const std::filesystem::path& scene, int priority);
   ~ServerProcess();
   ServerProcess(const ServerProcess&) = delete;
@@ -37,7 +36,6 @@ class ServerProcess {
   };
   Spent spent() const;  ///< processor time so far, by thread
 
-  /// Stops the server and returns its last line of output.
   std::string stop();
 
  private:

@@ -22,7 +22,6 @@ double percent(std::uint64_t part, std::uint64_t whole) {
   return whole == 0 ? 0 : 100 * static_cast<double>(part) / static_cast<double>(whole);
 }
 
-/// Baseline with the fleet's number and sizes of datagrams.
 BareResult floor_of(const Fleet& fleet, const FleetResult& result) {
   BareTraffic bare;
   bare.sessions = result.sessions;

@@ -66,7 +66,6 @@ HapticController::Config controller_config(Law law, const AolPlus<1, 3>::Parts& 
   return config;
 }
 
-/// A controller with an engine at 100 Hz, for a point or for a handle whose rotation and gripper follow the point.
 class Heart {
  public:
   Heart(const HapticController::Config& config, bool whole)

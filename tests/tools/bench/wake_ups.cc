@@ -52,7 +52,6 @@ namespace {
 
 using std::chrono::milliseconds;
 
-/// Wait at the start of each block, after clients have joined or left.
 constexpr Duration kSettle = milliseconds(200);
 
 struct Options {
@@ -61,8 +60,7 @@ struct Options {
   int block_ms = 1000;
 };
 
-/// All clients in one process: a wall, and observers that join on command. It wakes once per millisecond and reads for
-/// all of them; 32 separate wake-ups would cost more than the server.
+/// Wakes once per millisecond and reads for all clients, because 32 wake-ups would cost more than the server.
 class Guests {
  public:
   Guests(const Address& server, std::size_t observers) {
@@ -91,7 +89,6 @@ class Guests {
   Guests(const Guests&) = delete;
   Guests& operator=(const Guests&) = delete;
 
-  /// Returns when all observers have joined or left.
   void let_observers_in(bool in) {
     const char order = in ? 'i' : 'o';
     if (::write(orders_, &order, 1) != 1) throw std::runtime_error("the guest processes have ended");
@@ -179,7 +176,6 @@ class Page {
   Page(const Page&) = delete;
   Page& operator=(const Page&) = delete;
 
-  /// Returns the number of bytes received since the last call.
   std::size_t read() {
     std::array<char, 65536> bytes{};
     std::size_t all = 0;
@@ -240,7 +236,6 @@ class Recording {
   Recorder recorder_;
 };
 
-/// Returns the program next to this one; empty if it was not built.
 std::optional<std::filesystem::path> dashboard_program() {
   const auto program = std::filesystem::read_symlink("/proc/self/exe").parent_path() / "tendon-dash";
   return std::filesystem::exists(program) ? std::optional(program) : std::nullopt;

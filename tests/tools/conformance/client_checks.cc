@@ -117,8 +117,6 @@ void ClientJudge::start() {
   guest_.start();
 }
 
-// ---- Opening ----
-
 std::optional<Greeting> ClientJudge::first_hello() {
   for (const LocalTime end = wire_.now() + kStart; wire_.now() < end && guest_.running();) {
     if (auto greeting = next_hello(milliseconds(200))) return greeting;
@@ -126,7 +124,6 @@ std::optional<Greeting> ClientJudge::first_hello() {
   return std::nullopt;
 }
 
-/// Returns false if no client connects.
 bool ClientJudge::check_hellos() {
   const auto first = first_hello();
   if (!first) {
@@ -183,7 +180,6 @@ bool ClientJudge::check_hellos() {
   return true;
 }
 
-/// Returns a Hello with one of the issued cookies.
 std::optional<Greeting> ClientJudge::invite() {
   for (const LocalTime end = wire_.now() + kStart; wire_.now() < end && guest_.running();) {
     auto greeting = first_hello();
@@ -288,8 +284,6 @@ std::optional<ClientJudge::Session> ClientJudge::open() {
   session->talk.say();
   return session;
 }
-
-// ---- The conversation ----
 
 Evidence ClientJudge::evidence_of(Session& session) {
   Evidence out;
@@ -437,8 +431,6 @@ void ClientJudge::check_forces(const Session& session, const std::set<std::uint6
     report_.judge("forces", count > 0, "no force", "forces");
   }
 }
-
-// ---- The end ----
 
 bool ClientJudge::comes_back() { return next_hello(kComeBack).has_value(); }
 

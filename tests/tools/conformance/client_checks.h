@@ -7,8 +7,8 @@
 
 namespace tendon::conformance {
 
-/// Acts as the server of the client `guest` on `wire`, and judges it with Report(Side::kClient). A controller must
-/// compute one force from each state that it receives.
+/// Acts as the server of `guest` and judges it with Report(Side::kClient). A controller must compute one force from
+/// each state that it receives.
 void judge_client(Wire& wire, Guest& guest, const Options& options, Report& report);
 
 }  // namespace tendon::conformance

@@ -33,8 +33,6 @@ Conversation::Conversation(Wire& wire, Report& report, const Setup& setup)
   if (setup.suite == 0) report.not_applicable("data-opens", "suite 0 is not encrypted");
 }
 
-// ---- Saying ----
-
 Head Conversation::head(std::uint64_t number) const {
   return {.version = setup_.version,
           .type = kDataType,
@@ -122,8 +120,6 @@ void Conversation::return_to_old_key() {
   --epoch_;
   skip_to(next_ + 40);  // packets sent under the new key are beyond the reach of the ack vector
 }
-
-// ---- Hearing ----
 
 bool Conversation::listen_until(Duration patience, const std::function<bool()>& enough, bool keep_alive) {
   const LocalTime end = wire_.now() + patience;

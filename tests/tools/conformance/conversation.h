@@ -23,10 +23,8 @@ inline constexpr Duration kPatience = std::chrono::seconds(3);
 /// A correct peer repeats a Hello or a request at this interval.
 inline constexpr Duration kRepeat = std::chrono::milliseconds(100);
 
-/// The kit's side of an open session. It behaves like a correct peer, records every datagram in both directions, and
-/// can send invalid datagrams on request.
-///
-/// Judges each received datagram immediately: header, seal, packet numbers, times, and each echo against the record.
+/// The kit's side of an open session: a correct peer that can also send invalid datagrams. It records both directions
+/// and judges each datagram on receipt: header, seal, packet numbers, times, and each echo against the record.
 class Conversation {
  public:
   struct Setup {
@@ -43,35 +41,29 @@ class Conversation {
     pb::Datagram body;
   };
 
-  /// `wire` and `report` must outlive this object.
   Conversation(Wire& wire, Report& report, const Setup& setup);
 
-  /// Sends `body` with the next packet number, the time and the echo. Returns the packet number.
+  /// Sends `body` with the next packet number, the time and the echo.
   std::uint64_t say(pb::Datagram body = {});
   void say_at(std::uint64_t number, pb::Datagram body);
   Bytes compose(std::uint64_t number, pb::Datagram body);
-  /// Sends bytes that the peer must drop. If an echo of the peer contains `number` before a valid datagram used it, the
-  /// peer violates the rule `check`. `wrong` describes the error for the report, for example "magic 0x55".
+  /// Sends bytes that the peer must drop. If the peer's echo contains `number` before a valid datagram used it, the
+  /// peer violates the rule `check`. `wrong`: the error for the report, for example "magic 0x55".
   void say_bad(std::string_view check, std::uint64_t number, Span datagram, std::string_view wrong);
-  /// Seals `body` under the header `head`, with the key that is `epochs` later.
   Bytes seal(Head head, Span body, int epochs = 0) const;
   void say_bytes(Span datagram);
   Head head(std::uint64_t number) const;
   std::uint64_t next_number() const noexcept { return next_; }
-  /// Continues with packet number `number`, which leaves a gap.
   void skip_to(std::uint64_t number) noexcept { next_ = number; }
   /// If the peer's echo omits `number`, which is valid, reports a violation of `check` instead of "echo-mask".
   void attribute(std::uint64_t number, std::string_view check) { owners_[number] = check; }
-  /// Sends a keep-alive under the previous key.
   void say_old(std::uint64_t number);
   void renew_key();
-  /// Returns to the previous key, because the peer did not follow.
   void return_to_old_key();
   void move_to(int port) noexcept {
     setup_.port = port;
     moved_ = true;
   }
-  /// Writes the time and echo of the next datagram into `body`.
   void stamp(pb::Datagram& body) const;
 
   // Receives for `duration` and sends a keep-alive every 40 ms.
@@ -80,7 +72,6 @@ class Conversation {
   }
   /// Receives until `enough` returns true; returns false if `patience` elapses first.
   bool listen_until(Duration patience, const std::function<bool()>& enough, bool keep_alive = true);
-  /// Receives without sending.
   void overhear(Duration duration) {
     listen_until(
         duration, [] { return false; }, false);
@@ -95,7 +86,6 @@ class Conversation {
   const std::vector<Heard>& heard() const noexcept { return heard_; }
   /// Announces that the datagram `number` will be sent again unchanged.
   void will_repeat(std::uint64_t number) { repeated_.insert(number); }
-  /// Calls `use` for the frames received from index `since` on.
   template <class Use>
   void for_each_frame(std::size_t since, Use use) const {
     for (std::size_t i = since; i < heard_.size(); ++i) {

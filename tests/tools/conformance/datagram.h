@@ -31,7 +31,6 @@ inline constexpr std::uint8_t kRetryType = 2;
 inline constexpr std::uint8_t kDataType = 3;
 inline constexpr std::uint8_t kAnswerType = 4;
 
-/// The 16 unencrypted header bytes.
 struct Head {
   std::uint8_t magic = 0x54;
   std::uint8_t version = 1;
@@ -56,13 +55,12 @@ Sixteen sixteen(Span datagram, std::size_t at);
 Bytes operator+(Bytes a, Span b);
 Bytes bytes_of(std::string_view text);
 Bytes bytes_of(const google::protobuf::MessageLite& message);
-/// Parses `message`; returns false for malformed bytes.
 bool read(Span bytes, google::protobuf::MessageLite& message);
 
 /// Returns true for |x| > 10¹² and NaN, which are invalid for every quantity.
 bool far(double value);
 bool far(const pb::Vec3& vector);
-/// Checks the bounds of a ForceCommand in WIRE.md, except its sequence, device and channel.
+/// The bounds of WIRE.md, except sequence, device and channel.
 bool within_bounds(const pb::ForceCommand& force);
 
 /// For example "54 11 00 …", truncated after `most` bytes.

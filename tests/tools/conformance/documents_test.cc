@@ -15,7 +15,7 @@
 namespace tendon::conformance::documents_test {
 namespace {
 
-/// Returns the text of a page such as "WIRE.md", or the comments of "stream.h".
+/// A page such as "WIRE.md", or the comments of "stream.h".
 std::string text_of_file(const std::string& name) {
   const std::filesystem::path source(TENDON_SOURCE);
   const bool is_header = name.ends_with(".h");
@@ -28,7 +28,6 @@ std::string text_of_file(const std::string& name) {
   return text;
 }
 
-/// Removes emphasis, code marks and line breaks.
 std::string words(std::string_view text) {
   std::string out;
   for (const char c : text) {
@@ -40,8 +39,7 @@ std::string words(std::string_view text) {
   return out;
 }
 
-/// Returns the text from this heading to the next one of the same or a higher rank, or an empty string. Without a
-/// title, returns the whole text.
+/// From this heading to the next one of the same or a higher rank, or empty. Without a title, the whole text.
 std::string section(const std::string& text, std::string_view title) {
   if (title.empty()) return text;
   std::string heading = "\n## ";

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Parts of the golden datagrams (protocol/vectors/golden.md) that the kit sends unchanged.
-// tests/tools/conformance/documents_test.cc compares them with protocol/vectors/plain.json.
+// Parts of protocol/vectors/golden.md that the kit sends unchanged. documents_test.cc compares them with plain.json.
 
 namespace tendon::conformance::golden {
 

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// Tests the kit itself. A toy peer that obeys all rules passes. A toy that violates one rule fails the check for that
-// rule only.
+// A toy that obeys all rules passes. A toy that violates one rule fails the check for that rule only.
 #include <gtest/gtest.h>
 
 #include <fstream>

@@ -11,7 +11,6 @@ constexpr std::size_t kLengthAt = 48;
 constexpr std::size_t kBodyAt = 50;
 constexpr std::size_t kAnswerAt = 32;
 
-/// Describes the field of a Hello that is out of bounds; empty if none is.
 std::string out_of_bounds(const pb::Hello& hello) {
   if (hello.version_min() < 1 || hello.version_min() > hello.version_max()) return "the versions";
   if (hello.role() != pb::ROLE_OBSERVER && hello.role() != pb::ROLE_CONTROLLER) return "the role";
@@ -27,7 +26,6 @@ std::string out_of_bounds(const pb::Hello& hello) {
   return {};
 }
 
-/// Uses suite 2 if the Answer names it.
 void take_keys(const NoiseSplit& split, Answered& out) {
   const bool aes = out.body.has_welcome() && names_aes(out.body.welcome());
   const auto key_of = [&](const Key& key) {

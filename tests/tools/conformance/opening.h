@@ -19,13 +19,12 @@ struct Options {
   std::optional<Key> key{};  ///< suite 1 if set
   bool aes = false;          ///< with a key: offers and selects suite 2 for Data
   bool loopback = true;
-  bool long_checks = false;           ///< includes the check that waits until the peer renews its key
+  bool long_checks = false;           ///< also waits until the peer renews its key
   std::chrono::seconds key_age{600};  ///< maximum age at which the peer renews its key
   bool follower = false;  ///< device 0 of the server is a follower that matches the kit (server_coupling_checks.h)
   std::uint8_t suite() const noexcept { return key ? 1 : 0; }  ///< of the handshake
 };
 
-/// Offers and selects suite 2.
 inline constexpr std::string_view kAesGcm = "aes-256-gcm";
 template <class Words>
 bool names_aes(const Words& words) {
@@ -45,10 +44,9 @@ struct Answered {
   Key server_to_client{};
 };
 
-/// One connection attempt of a client: client random, ephemeral key, body.
 class Attempt {
  public:
-  /// Uses only `random` and `ephemeral` as random input.
+  /// All of its randomness is `random` and `ephemeral`.
   Attempt(const std::optional<Key>& key, Span hello, const Sixteen& random, const Key& ephemeral);
   Bytes hello(const Sixteen& cookie) const { return conformance::hello(suite_, random_, cookie, body_); }
   const Sixteen& random() const noexcept { return random_; }
@@ -75,10 +73,10 @@ struct Flaw {
   std::string seen;
   std::string expected;
 };
-/// Parses a datagram of type 1. Appends its errors to `flaws`.
+/// Parses a datagram of type 1 and appends its errors to `flaws`.
 std::optional<Greeting> read_greeting(Span datagram, const Options& options, std::vector<Flaw>& flaws);
 
-/// Returns an Answer to `greeting`, sealed in suite 1 with a fresh ephemeral key.
+/// Sealed in suite 1 with a fresh ephemeral key.
 Answered answer_to(const Greeting& greeting, std::uint32_t connection_id, const pb::Answer& body, const Key& ephemeral);
 
 /// `aes`: selects suite 2 if it is offered.

@@ -38,7 +38,6 @@ constexpr Side kBoth = Side::kBoth;
 constexpr Side kWorker = Side::kWorker;
 
 constexpr std::array kChecks = {
-    // Opening, as a client does it.
     Check{"hello-size", kClient, kWire, kHello, "always 1200 bytes"},
     Check{"hello-header", kClient, kWire, kHeader, "Data: 0, 1, 2 … per direction, never twice; 0 in all others"},
     Check{"hello-padding", kClient, kWire, kHello, "zeros"},
@@ -60,7 +59,6 @@ constexpr std::array kChecks = {
     Check{"bad-answer", kClient, kWire, kAnswer, "Bytes 16–31 the client random of the Hello, then to the end message"},
     Check{"plain-answer", kClient, kSession, kOpening, "A client with a key ignores a plain Answer, even a refusal"},
     Check{"refused", kClient, kWire, kAnswer, "why"},
-    // Opening, as a server does it.
     Check{"retry", kServer, kWire, kRetry, "Bytes 16–31 the client random of the Hello, 32–47 the cookie."},
     Check{"retry-once", kServer, kSession, kOpening, "never sends more bytes than it received"},
     Check{"bad-hello-silence", kServer, kSession, kOpening, "The server only answers well-formed Hellos"},
@@ -87,7 +85,6 @@ constexpr std::array kChecks = {
     Check{"hello-limit", kServer, kSession, kOpening,
           "Each source IP (IPv6: /64) may send 20 Hellos per second with a valid cookie, 40 at once; others are "
           "dropped and counted."},
-    // Data.
     Check{"first-data", kBoth, kSession, kOpening,
           "The client sends this Data immediately, and the server answers it immediately."},
     Check{"data-header", kBoth, kWire, kHeader, "Type 3 has the version that the Answer names."},
@@ -106,7 +103,6 @@ constexpr std::array kChecks = {
           "when that datagram arrived, on the clock of the sender of the echo; T2 ≤ T3"},
     Check{"echo-mask", kBoth, kWire, kData, "bit i: packet (peer_packet_number − 1 − i) has arrived too"},
     Check{"keep-alive", kBoth, kSession, kSent, "an empty datagram 50 ms after the last one"},
-    // What must be dropped, and what must not.
     Check{"foreign-header", kBoth, kSession, kDropped,
           "wrong length, header, suite or connection id, packet number ≥ 2⁶⁰"},
     Check{"malformed-body", kBoth, kSession, kDropped,
@@ -127,7 +123,6 @@ constexpr std::array kChecks = {
     Check{"old-key-over", kBoth, kSession, kDropped,
           "the key of its epoch has expired, or is more than one epoch ahead"},
     Check{"rekey-sent", kBoth, kWire, kSuite1, "The sender renews its key at the latest after 2²⁰ datagrams or 600 s."},
-    // Frames.
     Check{"states", kServer, kWire, kData, "number of the haptic step"},
     Check{"stray-data-silence", kServer, kSession, kDropped,
           "unknown_connection (Data without a session, or in suite 0 from another address)"},
@@ -149,7 +144,6 @@ constexpr std::array kChecks = {
           "If either peer does not name a feature, its fields and messages are not sent"},
     Check{"observer-sends-none", kClient, kWire, kHello,
           "An observer receives states; a controller also sends forces."},
-    // Requests.
     Check{"request-order", kServer, kSession, kRequests,
           "The responder delivers each request once, in the order of the numbers."},
     Check{"request-once", kServer, kSession, kRequests,
@@ -170,7 +164,6 @@ constexpr std::array kChecks = {
           "or the end of the session"},
     Check{"request-stops", kClient, kSession, kRequests,
           "resends each until it is answered; there is no other acknowledgment"},
-    // Devices and channels.
     Check{"claims-granted", kServer, kWire, kAnswer, "one for each claim, in the claims' order"},
     Check{"claim-refused", kServer, kSession, kOpening,
           "It is refused (CODE_INVALID) if a name does not exist (the detail lists the existing ones), if a claim "
@@ -207,11 +200,9 @@ constexpr std::array kChecks = {
           "If either peer does not name a feature, its fields and messages are not sent, and its requests get "
           "CODE_UNSUPPORTED."},
     Check{"output-unknown", kServer, kWire, kData, "answered CODE_INVALID beyond the device's last"},
-    // The end.
     Check{"bye-silence", kBoth, kSession, kStates, "A closed session does not send, accept or count anything."},
     Check{"bye-thrice", kBoth, kSession, kStates, "sends Bye three times, drops unsent data"},
     Check{"timeout", kBoth, kSession, kSent, "Replayed, malformed and foreign datagrams do not reset the timeout."},
-    // A worker's stream.
     Check{"stream-opens", kWorker, kStream, "",
           "The worker opens the stream with sequence 0 and a body of kOpeningMagic and 64 hexadecimal digits of the "
           "secret."},

@@ -12,8 +12,7 @@ namespace tendon::conformance {
 
 enum class Side : std::uint8_t { kServer = 1, kClient = 2, kBoth = 3, kWorker = 4 };
 
-/// One rule of the documents. `sentence` is a literal quotation from the section `section`, or from the comments of a
-/// header, which tests/tools/conformance/documents_test.cc verifies.
+/// `sentence` is a literal quotation from `section`, or from the comments of a header (see documents_test.cc).
 struct Check {
   std::string_view name;
   Side side;
@@ -22,11 +21,10 @@ struct Check {
   std::string_view sentence;
 };
 
-/// In the order of the report.
 std::span<const Check> checks();
 
-/// Returns the document and the anchor of the section on its web page, for example
-/// "WIRE.md#type-2-retry-server--client-48-bytes". Without a section, the result is the document: "stream.h".
+/// Returns the document and the anchor of the section, if any, for example
+/// "WIRE.md#type-2-retry-server--client-48-bytes".
 std::string anchor(const Check& check);
 
 enum class Outcome : std::uint8_t { kUnreached, kPassed, kFailed, kNotApplicable };
@@ -38,18 +36,15 @@ struct Verdict {
   std::string expected;
 };
 
-/// The results of all checks of one peer.
-///
 /// Thread-safe: no.
 class Report {
  public:
   /// Creates a report in which all checks of `side` are unreached.
   explicit Report(Side side);
 
-  /// Records one observation of the rule `name` and keeps the first failure. Throws std::logic_error if `name` is not a
-  /// check of this side.
+  /// Keeps the first failure. Throws std::logic_error if `name` is not a check of this side.
   void judge(std::string_view name, bool kept, std::string seen, std::string expected);
-  /// Calls `words` for the two texts only on failure. For rules that are checked on every datagram.
+  /// Calls `words` for the two texts only on failure.
   template <class Words>
   void judge(std::string_view name, bool kept, const Words& words) {
     if (kept) return judge(name, true, {}, {});
@@ -61,7 +56,6 @@ class Report {
   std::span<const Verdict> verdicts() const noexcept { return verdicts_; }
   std::size_t count(Outcome outcome) const noexcept;
   bool failed(std::string_view name) const noexcept;
-  /// True if no check failed and none is unreached.
   bool passed() const noexcept;
 
  private:

@@ -113,7 +113,6 @@ void set_value(Message& message, const FieldDescriptor& field, double value) {
   }
 }
 
-/// Returns true if the field exists and is out of bounds.
 bool beyond(const Message& message, std::string_view path, const Bounds& bounds) {
   const FieldDescriptor& field = field_of(message, front(path));
   const auto& reflection = *message.GetReflection();
@@ -125,7 +124,7 @@ bool beyond(const Message& message, std::string_view path, const Bounds& bounds)
   return !(value >= bounds.least && value <= bounds.most);
 }
 
-/// Calls `use` with the field and the message that contains it. The message is created if it does not exist.
+/// Creates the messages on the path if they do not exist.
 void at(Message& message, std::string_view path, const std::function<void(Message&, const FieldDescriptor&)>& use) {
   const FieldDescriptor& field = field_of(message, front(path));
   if (field.cpp_type() != FieldDescriptor::CPPTYPE_MESSAGE) return use(message, field);
@@ -145,7 +144,6 @@ std::vector<double> values_beyond(const FieldDescriptor& field, const Bounds& bo
   }
 }
 
-/// Returns a valid request with the given field.
 pb::Control sound(std::string_view path) {
   pb::Control out;
   if (path.starts_with("couple")) {

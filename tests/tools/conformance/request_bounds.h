@@ -19,7 +19,6 @@ struct BadRequest {
 /// Returns each request with each of its fields out of bounds, including unknown values of enumerations.
 std::vector<BadRequest> requests_out_of_bounds();
 
-/// Returns the name of the first field that is out of bounds, or an empty string.
 std::string field_out_of_bounds(const pb::Control& control);
 
 }  // namespace tendon::conformance

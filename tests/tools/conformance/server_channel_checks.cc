@@ -204,8 +204,7 @@ void ChannelChecks::check_deadband(Conversation& talk, const pb::Welcome& welcom
                         "CODE_INVALID for " + what);
   }
 
-  // Counts the states received from index `since` on, and those that their predecessor predicts. Uses only the states'
-  // own times.
+  // States received from index `since` on, and those that their predecessor predicts by the states' own times.
   struct Count {
     std::size_t all = 0;
     std::size_t predicted = 0;

@@ -9,18 +9,17 @@
 
 namespace tendon::conformance {
 
-/// Checks of devices, channels and leases for a server with the feature "channels". For other servers they are not
-/// applicable. Call check_claims() first, because it detects the feature.
+/// For a server with the feature "channels"; otherwise not applicable. check_claims() must be first, because it detects
+/// the feature.
 class ChannelChecks {
  public:
   explicit ChannelChecks(ServerGuest& guest) : guest_(guest) {}
 
-  /// The device must not be controlled by any client. The function does not complete the handshakes, so that the device
-  /// is still free afterwards.
+  /// No client may control the device. The handshakes are not completed, so that the device is free afterwards.
   void check_claims();
   /// The observer has not claimed the channel as a controller. `id`: its next request.
   void check_from_outside(Conversation& observer, std::uint32_t id);
-  /// Returns an open session that has claimed by name and requested the features for check_coupling(). `id`: its newest
+  /// Returns a session that has claimed by name and requested the features for check_coupling(). `id`: its newest
   /// request.
   std::optional<ServerGuest::Session> check_channels(std::uint32_t& id);
   void check_reports(const Conversation& talk);
@@ -32,7 +31,7 @@ class ChannelChecks {
   void check_deadband(Conversation& talk, const pb::Welcome& welcome, std::uint32_t& id);
 
   ServerGuest& guest_;
-  bool channels_ = false;  ///< whether the server offers the feature
+  bool channels_ = false;  ///< true if the server has the feature
   std::optional<pb::DeviceDescription> about_;
 };
 

@@ -48,7 +48,6 @@ pb::ForceTable& table(pb::ForceCommand& force) {
   return made;
 }
 
-/// Whether a column has an entry for each of `count` states, or none if it is optional.
 bool has_its_entries(const pb::DeviceStates& columns, int count) {
   const auto each = [count](const auto& column, int width) { return column.size() == width * count; };
   const auto each_or_none = [&](const auto& column) { return column.empty() || each(column, 1); };
@@ -58,10 +57,9 @@ bool has_its_entries(const pb::DeviceStates& columns, int count) {
          each_or_none(columns.force_age_ns()) && each_or_none(columns.channel()) && each_or_none(columns.buttons());
 }
 
-/// Whether entry `k` of the columns equals `whole`, the state of that device at that step.
 bool says(const pb::DeviceStates& columns, int k, const pb::DeviceState& whole) {
   const auto near = [](double single, double exact) {
-    constexpr double kLeast = std::numeric_limits<float>::min();  // single precision has fewer digits below this
+    constexpr double kLeast = std::numeric_limits<float>::min();  // below this value, single precision has fewer digits
     return single == exact || std::abs(single - exact) <= 6e-8 * std::abs(exact) + kLeast;
   };
   const auto vector = [k](const auto& column, const pb::Vec3& exact, auto same) {
@@ -82,7 +80,6 @@ bool says(const pb::DeviceStates& columns, int k, const pb::DeviceState& whole) 
          count(columns.buttons(), whole.buttons());
 }
 
-/// Compares states in columns with the ordinary states that the observer `whole` receives.
 void check_columns(ServerGuest& guest, Conversation& whole, Conversation& controller) {
   pb::Hello words = guest.hello(pb::ROLE_OBSERVER);
   words.add_features(std::string(kFeatureStateColumns));
@@ -155,7 +152,6 @@ void check_observer(ServerGuest& guest, ChannelChecks& channels, Conversation& c
   disarm.set_id(2);
   disarm.mutable_disarm();
   const auto refused = talk.ask(disarm);
-  // An older server may not support this request.
   const bool not_done = refused && (refused->code() == pb::CODE_DENIED || refused->code() == pb::CODE_UNSUPPORTED);
   guest.report.judge("disarm-by-controller", not_done, refused ? refused->ShortDebugString() : "nothing",
                      "CODE_DENIED for an observer");
@@ -345,7 +341,7 @@ void judge_server(Wire& wire, const Options& options, Report& report) {
   ChannelChecks channels(guest);
   crypto::start();
   check_retry(guest);
-  if (report.count(Outcome::kFailed) > 0) return;  // no server, or not one for this key
+  if (report.count(Outcome::kFailed) > 0) return;  // there is no server for this key
   check_bad_hellos(guest);
   check_bad_bodies(guest);
   check_cookie(guest);

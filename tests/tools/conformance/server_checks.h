@@ -7,8 +7,8 @@
 
 namespace tendon::conformance {
 
-/// Talks to the server behind `wire` as several clients, and judges it with Report(Side::kServer). The server must have
-/// no other controller. A key must be a controller's.
+/// Talks to the server as several clients, and judges it with Report(Side::kServer). The server must have no other
+/// controller. A key must be a controller's.
 void judge_server(Wire& wire, const Options& options, Report& report);
 
 }  // namespace tendon::conformance

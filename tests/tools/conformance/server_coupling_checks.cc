@@ -106,7 +106,6 @@ void check_differences(ServerGuest& guest, Asker& asker) {
   }
 }
 
-/// Judges the port states received from index `since` on.
 void judge_ports(Report& report, const Conversation& talk, std::size_t since) {
   const pb::PortState* previous = nullptr;
   talk.for_each_frame(since, [&](const pb::Frame& frame) {

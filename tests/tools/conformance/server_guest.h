@@ -13,7 +13,6 @@
 
 namespace tendon::conformance {
 
-/// Silence of this length means that no answer will come.
 inline constexpr Duration kSilence = std::chrono::milliseconds(250);
 
 /// A correct client of the server under test. Each check uses its own ports.
@@ -33,13 +32,11 @@ struct ServerGuest {
   Attempt attempt(const pb::Hello& hello) { return attempt(bytes_of(hello), options.key); }
   Attempt attempt(Span hello, const std::optional<Key>& key);
   pb::Hello hello(pb::Role role) const;
-  /// Returns the datagrams received within `patience`.
   std::vector<Bytes> replies(int port, Duration patience);
   std::optional<Sixteen> cookie(int port, const Attempt& attempt);
   std::optional<Answered> ask(int port, const Attempt& attempt, const Sixteen& cookie);
-  /// Opens a new port, sends the Hello and returns the Answer.
   std::optional<Answered> ask(const pb::Hello& words);
-  /// Opens a session. Judges "welcome" and "first-data".
+  /// Judges "welcome" and "first-data".
   std::optional<Session> enter(pb::Role role) { return enter(hello(role)); }
   std::optional<Session> enter(const pb::Hello& words);
   Conversation::Setup setup(int port, const Answered& answered) const;

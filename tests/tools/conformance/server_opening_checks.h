@@ -3,7 +3,7 @@
 
 #include "tests/tools/conformance/server_guest.h"
 
-// Checks for the handshake. The name of each function contains the name of the check.
+// The name of each function contains the name of the check.
 
 namespace tendon::conformance {
 
@@ -17,9 +17,7 @@ void check_keys(ServerGuest& guest);
 void check_half_open(ServerGuest& guest);
 void check_stray_data(ServerGuest& guest);
 void check_hello_limit(ServerGuest& guest);
-/// Repeats the Hello of an open session.
 void check_answer_again(ServerGuest& guest, ServerGuest::Session& session);
-/// A second client requests a device that a session controls.
 void check_second_controller(ServerGuest& guest);
 
 }  // namespace tendon::conformance

@@ -47,7 +47,6 @@ void check_requests(ServerGuest& guest, Conversation& talk) {
                      "more than " + std::to_string(kBetween) + " states in 600 ms",
                      "about 30, because request 2 with 50 per second was delivered last");
 
-  // Request 1 again must return the old answer without any effect.
   const auto again = talk.ask(rate(1, 500));
   guest.report.judge("answer-kept",
                      again && first && again->code() == first->code() && again->detail() == first->detail(),

@@ -5,7 +5,6 @@
 
 namespace tendon::conformance {
 
-/// Checks the order, the answers and the single execution of requests.
 void check_requests(ServerGuest& guest, Conversation& talk);
 
 }  // namespace tendon::conformance

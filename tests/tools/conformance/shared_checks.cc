@@ -15,7 +15,6 @@ namespace {
 
 using std::chrono::milliseconds;
 
-/// This is longer than the interval between keep-alives.
 constexpr Duration kMoment = milliseconds(150);
 
 pb::Datagram of(const pb::Frame& frame) {
@@ -105,8 +104,7 @@ std::vector<Bad> forgeries(Conversation& talk) {
        [&talk](std::uint64_t number, const pb::Datagram&) { return write(talk.head(number)); }}};
 }
 
-/// Sends the datagrams with different packet numbers. The peer must not accept any of them. Returns the first packet
-/// number.
+/// The peer must not accept any of them. Returns the first packet number.
 std::uint64_t say_all(Conversation& talk, Evidence& evidence, const std::vector<Bad>& all, bool numbers_stay_free) {
   const std::uint64_t first = talk.next_number();
   const std::uint64_t unseen = evidence.next;
@@ -117,7 +115,7 @@ std::uint64_t say_all(Conversation& talk, Evidence& evidence, const std::vector<
     talk.say_bad(all[i].check, first + i, all[i].make(first + i, body), all[i].wrong);
   }
   if (!numbers_stay_free) talk.overhear(kMoment);  // gives the peer time to echo the last of them
-  // If the numbers are used up, the ack vector may contain them; it reaches back 32 numbers.
+  // The ack vector contains the last 32 numbers, so it may contain numbers that are used.
   talk.skip_to(first + all.size() + (numbers_stay_free ? 0 : 40));
   const bool lives = talk.confirmed(talk.say());
   talk.listen(kMoment);

@@ -18,7 +18,6 @@ namespace tendon::conformance {
 class UdpWire : public Wire {
  public:
   static UdpWire to_server(const Address& peer);
-  /// Opens the only port, to which a client will connect.
   static UdpWire for_client(const Address& listen);
 
   LocalTime now() override;

@@ -8,10 +8,10 @@
 
 namespace tendon::conformance {
 
-/// The datagram transport and clock of the kit: UDP, or a peer in this process with virtual time.
+/// The kit's transport and clock: UDP, or a peer in this process with virtual time.
 ///
-/// A port is a local socket of the kit. Every port toward a server talks to that server. Toward a client there is one
-/// port, which talks to the sender of the last Hello.
+/// A port is a local socket of the kit. Toward a server, every port talks to it. Toward a client there is one port,
+/// which talks to the sender of the last Hello.
 class Wire {
  public:
   struct Arrival {
@@ -33,9 +33,7 @@ class Guest {
  public:
   virtual ~Guest() = default;
   virtual void start() = 0;
-  /// Sends SIGTERM.
   virtual void ask_to_end() = 0;
-  /// Sends SIGKILL.
   virtual void kill() = 0;
   virtual bool running() = 0;
 };

@@ -21,16 +21,12 @@ using std::chrono::seconds;
 using worker::Record;
 using Road = WorkerWire::Road;
 
-/// From the start of the program to its opening record. MPI and an interpreter are slow on a busy machine. A proxy
-/// waits as long.
+/// Time until the opening record. MPI and an interpreter are slow on a busy machine; a proxy waits as long.
 constexpr Duration kStart = std::chrono::minutes(2);
-/// The maximum time for an answer. The first answer may require a compilation or a factorization.
+/// The first answer may require a compilation or a factorization.
 constexpr Duration kAnswer = seconds(30);
-/// The maximum time between the end of the stream and the exit of the program.
 constexpr Duration kEnd = seconds(10);
-/// The worker must not send anything during this time.
 constexpr Duration kQuiet = milliseconds(300);
-/// The delay between two fragments of a record.
 constexpr Duration kPause = milliseconds(20);
 constexpr int kFirstStates = 3;
 constexpr int kInARow = 100;
@@ -168,8 +164,7 @@ pb::DeviceState WorkerJudge::next_state() {
   return state;
 }
 
-/// Sends a state in fragments that end at `cuts`, and judges its answer. Returns false if there was none; then `check`
-/// has failed.
+/// Sends a state in fragments that end at `cuts`, and judges its answer. Returns false without one; `check` has failed.
 bool WorkerJudge::ask(const pb::DeviceState& state, std::string_view check, std::span<const std::size_t> cuts) {
   if (!silent(wire_.now())) return false;
   pb::Datagram body;
@@ -227,7 +222,6 @@ void WorkerJudge::converse() {
   for (int i = 0; i < kFirstStates; ++i) {
     if (!ask(next_state(), "answer-comes")) return;
   }
-  // The record is split within the length, after the length, within the sequence number, and within the body.
   pb::DeviceState state = next_state();
   const std::size_t size = 12 + state.ByteSizeLong();
   const std::array<std::size_t, 5> cuts = {2, 4, 9, 30, size};

@@ -27,7 +27,6 @@ namespace {
 
 using std::chrono::milliseconds;
 
-/// Interval at which to check whether the program still runs.
 constexpr milliseconds kLook{20};
 /// Time between SIGTERM and SIGKILL, in which mpirun can end its ranks.
 constexpr Duration kPolite = std::chrono::seconds(2);

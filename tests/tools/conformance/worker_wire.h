@@ -11,12 +11,8 @@
 
 namespace tendon::conformance {
 
-/// A worker's process and the socket to which it connects. Accepts only the first connection.
-///
-/// Does not use WorkerProcess (clients/cpp/worker/worker_process.h), because a proxy never sends half a record, nor
-/// ends a stream while its program lives.
-///
-/// Thread-safe: no.
+/// Accepts only the first connection. Does not use WorkerProcess (clients/cpp/worker/worker_process.h), because a proxy
+/// never sends half a record, nor ends a stream while its program lives. Thread-safe: no.
 class WorkerProgram : public WorkerWire {
  public:
   /// `command` is looked up in PATH. Its output goes to the file `log`, or is discarded if `log` is empty. `listen`:
@@ -37,13 +33,12 @@ class WorkerProgram : public WorkerWire {
   std::uint64_t random() override;
 
  private:
-  /// Listens and returns the address in the form that the program expects.
   std::string listen(Road road);
   bool accept_one();
 
   GuestProgram program_;
   Address tcp_;
-  std::string folder_;  ///< of the Unix socket, or empty
+  std::string folder_;  ///< path of the Unix socket, or empty
   int listener_ = -1;
   int stream_ = -1;
 };

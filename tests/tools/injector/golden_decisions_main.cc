@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Writes the decisions for each profile below to a file. Together the profiles use every model. The files are identical
-// for every compiler, C library and machine. tests/golden/injector.sha256 holds their checksums, which
-// golden_decisions.sh compares. A change here invalidates every recorded run, because such a run stores only its seed.
+// Writes the decisions for profiles that together use every model. They are identical for every compiler, C library and
+// machine: golden_decisions.sh compares their checksums with tests/golden/injector.sha256. A change invalidates every
+// recorded run, because such a run stores only its seed.
 #include <array>
 #include <cstdio>
 #include <cstdlib>

@@ -28,23 +28,19 @@ struct Packet {
 
 enum class Verdict : std::uint8_t { kPass, kDrop, kDuplicate };
 
-/// The reason for a decision. If the datagram was dropped, this is the model that dropped it. Otherwise, it is the last
-/// step that determined the release time.
+/// The model that dropped the datagram, or else the last step that determined the release time.
 enum class Cause : std::uint8_t {
-  // passed
   kDelay,  ///< its own delay
   kQueue,  ///< waited at the bottleneck
-  kStall,  ///< waited for the end of a stall
+  kStall,  ///< the datagram waited for the end of a stall
   kFifo,
   kReorder,
-  // dropped
   kQueueFull,
   kOutage,
   kHandover,
   kRule,
   kRegime,  ///< the loss model of the regime
   kLoss,
-  // either
   kReplay,
 };
 
@@ -75,8 +71,6 @@ struct Decision {
   bool operator==(const Decision&) const = default;
 };
 
-/// Decides the fate of each datagram of one direction of one link. Injector uses a profile and a seed, TracePlayer
-/// replays recorded decisions.
 class Decider {
  public:
   virtual ~Decider() = default;
@@ -101,30 +95,27 @@ class Decider {
 /// Thread-safe: no.
 class Injector final : public Decider {
  public:
-  /// Throws std::invalid_argument as check(profile) does. The times in the profile are relative to `start`, or to the
-  /// first arrival if `start` is not set. Building the tables takes up to a few milliseconds; copying an injector does
-  /// not.
+  /// Throws std::invalid_argument as check(profile) does. `start`: origin of the profile's times; the first arrival if
+  /// not set. Building the tables takes up to a few milliseconds; copying an injector does not.
   Injector(const Profile& profile, std::uint64_t seed, std::uint32_t link, Direction direction,
            std::optional<LocalTime> start = std::nullopt);
 
   /// Returns an injector for another link that shares the tables of this one. Call it only before the first decision.
   Injector for_link(std::uint32_t link) const;
-  /// The times in the profile are relative to `start`.
   Injector for_link(std::uint32_t link, LocalTime start) const;
 
   /// Arrivals should not decrease; if they do, FIFO order still holds. A datagram that exceeds a route of 60 s plus its
   /// queue is not delayed further.
   Decision decide(const Packet& packet) override;
 
-  /// Changes the profile. The times of the new profile are relative to `now`. Keeps the index, draws, queue, order and
-  /// the states of correlated delay and loss. Throws like the constructor, without any effect in that case.
+  /// The times of the new profile are relative to `now`. Keeps the index, draws, queue, order and the states of
+  /// correlated delay and loss. Throws like the constructor, without any effect in that case.
   void change(const Profile& profile, LocalTime now);
   /// Uses the profile and tables of another injector. Builds no tables and does not throw.
   void change(const Injector& prepared, LocalTime now);
 
   const Profile& profile() const { return network_.profile; }
 
-  /// Hash of all quantile tables in use, which a trace records.
   std::uint64_t table_hash() const noexcept;
 
  private:

@@ -20,7 +20,6 @@ using namespace std::chrono_literals;
 
 constexpr LocalTime kStart = LocalTime(5s);
 
-/// Returns the decisions for `count` datagrams of 100 bytes. The first datagram is sent at kStart.
 std::vector<Decision> decisions(const std::string& profile, int count, Duration period, std::uint64_t seed = 7) {
   Injector injector(parse_profile(profile), seed, 0, Direction::kUp);
   std::vector<Decision> all;
@@ -98,8 +97,6 @@ TEST(Injector, ASecondCopyMayComeAfterNewerDatagrams) {
   EXPECT_GT(stale, 10);
 }
 
-// ---- Fields do not disturb each other -------------------------------------------------------------------------------
-
 constexpr const char* kPlain = "base=5ms delay=uniform(0ms,30ms) rho=0.5";
 
 TEST(Injector, AFieldThatIsAddedToAProfileMovesNoOtherRelease) {
@@ -175,9 +172,6 @@ TEST(Injector, ForAnotherLinkIsAsIfBuiltForIt) {
   }
 }
 
-// ---- What each field does -------------------------------------------------------------------------------------------
-
-/// Returns the delays in ms of `count` datagrams that are sent at intervals of `period`.
 std::vector<double> delays_ms(const std::string& profile, int count, Duration period) {
   std::vector<double> all;
   for (const Decision& d : decisions(profile, count, period)) all.push_back(seconds(delay(d)) * 1e3);
@@ -201,7 +195,6 @@ TEST(Injector, AStallHoldsAllBackAndThenReleasesThemTogether) {
   const auto all = decisions("base=1ms stall(at=2s,for=3s)", 4, 1s);
   EXPECT_EQ(all[2].cause, Cause::kStall);
   EXPECT_EQ(all[2].release, kStart + 5s);
-  // One stall ends within another.
   EXPECT_EQ(delays_ms("stall(at=1s,for=2s) stall(at=2s,for=2s)", 3, 1s), (Delays{0, 3000, 2000}));
 }
 
@@ -265,15 +258,12 @@ TEST(Injector, AJumpOvertakesAsManyDatagramsAsItSaysAndMovesNoOther) {
     }
   }
   EXPECT_NEAR(jumps, 500, four_sigma(5000, 0.1));
-  // Also if datagrams wait for their predecessors.
   const auto waiting = decisions(kPlain, 5000, 1ms);
   const auto overtaken = decisions(kPlain + std::string(" jump(10%,3)"), 5000, 1ms);
   for (std::size_t i = 0; i < waiting.size(); ++i) {
     ASSERT_TRUE(overtaken[i].cause == Cause::kReorder || overtaken[i].release == waiting[i].release) << i;
   }
-  // The predecessor has already left.
   for (const Decision& d : decisions("delay=10ms jump(100%,1)", 100, 50ms)) EXPECT_EQ(delay(d), 10ms);
-  // The release is not before arrival + base.
   for (const Decision& d : decisions("base=9.5ms delay=0.5ms jump(100%,1)", 100, 1ms)) EXPECT_GE(delay(d), 9500us);
 }
 
@@ -312,8 +302,6 @@ TEST(Injector, WaitingAtTheBottleneckComesBeforeTheDelay) {
   EXPECT_EQ(all[3].cause, Cause::kQueueFull);
   EXPECT_TRUE(lost(all[3]));
 }
-
-// ---- Time and change ------------------------------------------------------------------------------------------------
 
 TEST(Injector, TimesCountFromTheStartThatIsGivenElseFromTheFirstArrival) {
   const Profile profile = parse_profile("step(at=2s,5ms)");

@@ -7,7 +7,6 @@
 namespace tendon::replay {
 namespace {
 
-/// Maximum growth of the difference of two clocks over `time`, rounded up.
 Duration drifted(Duration time, double most_drift) {
   return Duration(static_cast<Duration::rep>(most_drift * std::abs(static_cast<double>(time.count()))) + 1);
 }

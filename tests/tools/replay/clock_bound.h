@@ -8,13 +8,11 @@
 
 namespace tendon::replay {
 
-/// Rigorous bounds on the offset between the clocks of two machines, from the messages between them.
+/// Rigorous bounds on the offset between the clocks of two machines, from the messages between them. θ(t) = second
+/// clock − first clock at the time t of the first. A message sent at s and received by r took at least zero time:
 ///
-/// θ(t) = second clock − first clock at the time t of the first. A message sent at s and received by r took at least
-/// zero time, whatever the network did:
-///
-///     first → second, sent at s, received by r:      θ ≤ r − s
-///     second → first, sent at s, received by r:      θ ≥ s − r
+///     first → second:      θ ≤ r − s
+///     second → first:      θ ≥ s − r
 ///
 /// The clocks drift by at most ρ = `most_drift` against each other, so each message bounds θ at every other time:
 ///
@@ -38,22 +36,20 @@ struct Crossing {
 /// Two quartz crystals with an error of 100 ppm each.
 inline constexpr double kMostDrift = 200e-6;
 
-/// Returns a bound for each interval `every` from the first crossing to the last. Both lists must be sorted by time.
-/// Returns an empty list if one of them is empty.
+/// One for each interval `every` from the first crossing to the last. Both lists must be sorted by time. Empty if one
+/// of them is.
 std::vector<ClockBound> clock_bounds(const std::vector<Crossing>& there, const std::vector<Crossing>& back,
                                      Duration every, double most_drift = kMostDrift);
 
-/// The mean rate of θ in s/s over all messages, and the bound of its error.
+/// Mean rate of θ in s/s over all messages, and the bound of its error.
 struct ClockDrift {
   double rate = 0;
   double error = 0;
 };
 
-/// Estimates the drift from the first and the last of `bounds`, whose `most_drift` should be well above the expected
-/// drift.
+/// From the first and the last of `bounds`, whose `most_drift` should be well above the expected drift.
 ClockDrift drift_over(const std::vector<ClockBound>& bounds);
 
-/// Whether an offset exists that satisfies all of `bounds`.
 bool is_possible(const std::vector<ClockBound>& bounds);
 
 /// Interpolates between `bounds` (at least one) and holds the first and last value outside.

@@ -14,7 +14,6 @@ namespace {
 
 using namespace std::chrono_literals;
 
-/// Two clocks with messages between them for some minutes.
 struct Clocks {
   double offset = 0;  // s
   double drift = 0;

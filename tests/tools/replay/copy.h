@@ -15,11 +15,10 @@ namespace tendon::replay {
 /// Throws std::runtime_error if the recording cannot be read.
 McapReader open_mcap(const std::filesystem::path& path);
 
-/// Creates the channels in the new file. The messages must be defined in recording.proto.
+/// The messages must be defined in recording.proto.
 class CopiedChannels {
  public:
-  /// Returns the id of the channel in `writer`. Creates the channel if it does not exist. The `prefix` is added to the
-  /// topic.
+  /// Creates the channel if it does not exist. `prefix` is added to the topic.
   std::uint16_t in(McapWriter& writer, const McapReader::Channel& from, const std::string& prefix = {});
 
  private:

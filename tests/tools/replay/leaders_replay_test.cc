@@ -41,7 +41,6 @@ struct Recorded {
   std::vector<StepRecord> steps;
 };
 
-/// A hand holds a follower with two leaders. The second leader joins later and takes over.
 Recorded recorded() {
   const std::string leading =
       std::string(testing::kTapping) + "[teleoperation]\nrole = \"leader\"\n[teleoperation.coupling]\n";

@@ -23,7 +23,6 @@
 namespace tendon::replay {
 namespace {
 
-/// One end's record of the coupling, in the time of its recording.
 struct End {
   std::map<std::pair<std::uint64_t, std::uint64_t>, LocalTime> sent;  ///< (epoch, sequence) → time
   struct Came {
@@ -51,7 +50,7 @@ End read_end(const std::filesystem::path& path) {
   return end;
 }
 
-/// 10 · kMostDrift. A higher rate means that a clock was stepped.
+/// A higher rate means that a clock was stepped.
 constexpr double kFastDrift = 10 * kMostDrift;
 
 /// For example "260 ± 12 ppm".
@@ -107,7 +106,7 @@ std::set<std::uint32_t> channels_of(const End& leader, const End& follower) {
   return channels;
 }
 
-/// Copies the messages of a recording. Ports of other channels are not copied.
+/// Ports of other channels are not copied.
 class Copy {
  public:
   Copy(const std::filesystem::path& path, std::string prefix, std::set<std::uint32_t> channels)
@@ -143,7 +142,6 @@ class Copy {
   std::optional<McapReader::Message> message_;
 };
 
-/// Returns the error messages for the damaged regions of both recordings.
 std::vector<std::string> write(const MergeOptions& options, const std::vector<ClockBound>& bounds,
                                const std::set<std::uint32_t>& channels) {
   FileSink sink(options.out);

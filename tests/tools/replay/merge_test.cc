@@ -24,8 +24,8 @@ using tendon::testing::ScratchFolder;
 
 constexpr Duration kAhead = 250ms;  // of the follower's clock
 
-/// Writes a recording of ten seconds of a coupling. `epoch`: 1 for the leader, 2 for the follower. `drift` belongs to
-/// the clock of this end, and `way` is the delay of its received datagrams.
+/// Ten seconds of a coupling. `epoch`: 1 for the leader, 2 for the follower. `drift`: of this end's clock. `way`: delay
+/// of its received datagrams.
 void record(const std::filesystem::path& file, std::uint64_t epoch, Duration ahead, double drift = 0,
             Duration way = 2980us) {
   FileSink sink(file);
@@ -131,7 +131,6 @@ TEST_F(Merge, SaysHowTheClocksDriftAndWarnsAndRefusesAboveTheBound) {
   EXPECT_FALSE(std::filesystem::exists(both_));
 }
 
-/// Records a follower with several leaders: each step has a port for each leader.
 void record_follower_of(const std::filesystem::path& file, const std::vector<std::uint64_t>& leaders, Duration ahead) {
   FileSink sink(file);
   Recorder recorder({.scene = {.text = "", .seed = 1, .version = "1", .commit = "c", .unix_offset = 1000s},

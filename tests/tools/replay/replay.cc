@@ -34,7 +34,6 @@ namespace {
 
 constexpr std::size_t kMostDrawn = lab::kMostDrawings / 2;
 
-/// Gaps that prevent a comparison of the following steps.
 struct Gaps {
   std::uint64_t lost_steps = 0;
   std::uint64_t lost_datagrams = 0;
@@ -59,7 +58,6 @@ HapticController::Config control_of(const SceneRecord& scene, const Options& opt
   return settings.empty() ? recorded : parse(settings);
 }
 
-/// The selected devices, by their number in the recording.
 struct Chosen {
   std::vector<std::string> names;
   std::vector<bool> is_chosen;
@@ -93,7 +91,7 @@ Chosen choose(const Options& options) {
 }
 
 /// Reads the parts of the recording. Calls `visit` with the number of the device, the recorded step and the replayed
-/// step for each selected device. Each part starts with a copy of the scenes. Only the first copy is used.
+/// step for each selected device. The scenes are copied to the beginning of each part. Only the first copy is used.
 template <class Visit, class VisitDatagram>
 Gaps read_run(const Options& options, const Chosen& chosen, Rerun::Held held, const Visit& visit,
               const VisitDatagram& visit_datagram) {
@@ -232,7 +230,6 @@ class Csv {
   bool started_ = false;
 };
 
-/// A progress line on a terminal, erased at the end.
 class Progress {
  public:
   explicit Progress(bool on) : on_(on) {}

@@ -9,7 +9,6 @@
 
 namespace tendon::replay {
 
-/// Options of `tendon-replay`, which runs a recording through the control law again.
 struct Options {
   std::filesystem::path recording;
   std::vector<std::filesystem::path> more_parts = {};  ///< of the same run, in order: run-2.mcap, run-3.mcap …
@@ -25,8 +24,7 @@ struct Options {
   bool progress = false;  ///< rewrites a progress line on stderr
 };
 
-/// Replays all steps of all devices in a recording. The parts of a recording are treated as a single run. The memory
-/// usage is bounded.
+/// Replays all steps of all devices, with the parts of a recording as a single run, in bounded memory.
 ///
 /// Without `law` and `settings`, runs the recorded scene. Each step uses the force that the device held then, and all
 /// results of the law must be bitwise identical: interval, account, bound, force, mode, reasons. Returns false at the
@@ -37,11 +35,11 @@ struct Options {
 /// The hand moves as recorded, so the result shows what the law would have permitted, not where the hand would have
 /// moved. Returns true.
 ///
-/// Prints a table of both runs of each device to `out` (if there are many devices, the differing ones first), or with
-/// `json` one line for the comparison and one for each run. Throws std::invalid_argument for an invalid setting (named
-/// in the message), an invalid name of the picture, or too many devices for the CSV or picture. Throws SceneError if a
-/// scene cannot be run. Throws std::runtime_error if the recording cannot be read, has no step or lacks the device, or
-/// if an output cannot be written.
+/// Prints a table of both runs of each device to `out` (if there are many, the differing ones first), or with `json`
+/// one line for the comparison and one for each run. Throws std::invalid_argument for an invalid setting, an invalid
+/// name of the picture, or too many devices for the CSV or picture; SceneError if a scene cannot be run;
+/// std::runtime_error if the recording cannot be read, has no step or lacks the device, or if an output cannot be
+/// written.
 bool replay(const Options& options, std::ostream& out);
 
 }  // namespace tendon::replay

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-// tendon-replay: runs a recording through the control law again.
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>

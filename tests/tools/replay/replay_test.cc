@@ -63,7 +63,7 @@ std::filesystem::path write(const std::filesystem::path& file, const std::vector
   return file;
 }
 
-/// Records the same run for `devices` devices; step `wrong` of the last device has a different force.
+/// Step `wrong` of the last device has a different force.
 std::filesystem::path write_fleet(const std::filesystem::path& file, std::size_t devices, std::size_t wrong) {
   const std::vector<StepRecord> steps = tapping();
   FileSink sink(file);

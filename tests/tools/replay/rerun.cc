@@ -36,7 +36,6 @@ ForceChannels::Wanted wanted_in(const StepRecord& recorded) {
   return wanted;
 }
 
-/// Empty for a device that has only a position.
 std::optional<HandleSample> handle_in(const StepRecord& recorded, const Effort& held) {
   if (!recorded.turn() && !recorded.grip()) return std::nullopt;
   HandleSample handle{.torque = held.torque, .grip_force = held.grip};

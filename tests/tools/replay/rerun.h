@@ -10,12 +10,10 @@
 
 namespace tendon::replay {
 
-/// Replays recorded steps one by one with a new controller. The motion, the sensor and the requested forces come from
-/// the record.
+/// Recorded steps with a new controller.
 ///
 ///     kRecorded   accounts each interval with the recorded force: the same law gives identical bits
-///     kOwn        accounts each interval with the force of this law, for another law. The hand still moves as
-///                 recorded, although other forces would have changed its motion
+///     kOwn        accounts each interval with the force of this law, for another law; the hand still moves as recorded
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class Rerun {
@@ -27,7 +25,7 @@ class Rerun {
       : controller_(without_coupling(control)), max_missed_(control.max_missed), held_(held) {}
 
   /// Adds the energy that a coupling's tank settles in the next step, if that has the tick of `port`. Couplings of a
-  /// step are passed in their recorded order. All other effects of a coupling are in the recorded requested force.
+  /// step are passed in their recorded order. All their other effects are in the recorded requested force.
   void settled(const PortRecord& port) {
     if (std::exchange(settled_at_, port.tick) != port.tick) settled_ = {};
     settled_.credit += port.settled.credit;
@@ -35,8 +33,7 @@ class Rerun {
     grip_settled_ = port.grip_settled;
   }
 
-  /// Returns `recorded` with the results of this controller. `applied` is its own force with kOwn, else the recorded
-  /// one.
+  /// If kOwn is set, `applied` is the force of this controller. Otherwise, it is the recorded force.
   StepRecord step(const StepRecord& recorded);
 
  private:
@@ -57,8 +54,7 @@ class Rerun {
   std::uint64_t settled_at_ = 0;         ///< tick; 0: none yet
 };
 
-/// Returns the first result of the law that is not bitwise identical, for example "energy_j: recorded 0.1, again 0.2",
-/// or an empty string.
+/// The first result that is not bitwise identical, for example "energy_j: recorded 0.1, again 0.2", or empty.
 std::string difference(const StepRecord& recorded, const StepRecord& again);
 
 }  // namespace tendon::replay

@@ -26,7 +26,6 @@ Scene scene_with(const std::vector<std::string>& settings) {
   return parse_scene(std::string(testing::kTapping), "scene", ".", settings);
 }
 
-/// A server's record of a remote wall of 2000 N/m over a bad network.
 std::vector<StepRecord> recorded(const Scene& scene) {
   SimulatedDevice device(scene.simulated());
   simulation::World::Config config;
@@ -106,7 +105,6 @@ INSTANTIATE_TEST_SUITE_P(Rerun, EveryLaw, ::testing::ValuesIn(cases()), [](const
   return name;
 });
 
-/// A device that can fail, with a swinging hand.
 class Flaky : public Device {
  public:
   const DeviceInfo& info() const noexcept override { return info_; }
@@ -125,7 +123,7 @@ class Flaky : public Device {
   std::uint64_t reads_ = 0;
 };
 
-/// Steps of a loop with a force of 3 N into a wall and faults of all kinds, each followed by a rearm.
+/// A force of 3 N into a wall and faults of all kinds, each followed by a rearm.
 std::vector<StepRecord> troubled(const HapticLoop::Config& config) {
   Flaky device;
   const auto mail = std::make_unique<Mailboxes>();

@@ -5,7 +5,7 @@
 
 namespace tendon::replay::testing {
 
-/// A scene whose hand taps through x = 0 twice a second. Settings of a limiter can be appended.
+/// Taps through x = 0 twice a second. Settings of a limiter can be appended.
 inline constexpr std::string_view kTapping = R"([device]
 kind = "simulated"
 profile = "falcon"

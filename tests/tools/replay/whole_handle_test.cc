@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// A stylus that turns and grips, with an engine 20 ms away: checks the server, and that its recording replays to the
-// last bit.
+// A stylus that turns and grips, with an engine 20 ms away. Its recording replays to the last bit.
 #include <gtest/gtest.h>
 
 #include <algorithm>

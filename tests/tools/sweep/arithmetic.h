@@ -23,7 +23,6 @@ Arithmetic arithmetic_of(std::string_view name);
 /// Returns the environment variables (NAME=value) to add for a program.
 std::vector<std::string> environment_of(Arithmetic arithmetic);
 
-/// Identifies the numerical libraries that a process uses.
 struct Fingerprint {
   std::string c_library;  ///< "glibc 2.36"
   std::string functions;  ///< hash of the results of some thousand calls of math functions

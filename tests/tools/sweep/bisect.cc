@@ -18,7 +18,7 @@ using Named = std::vector<std::uint64_t>;
 constexpr int kAlone = 3;         // runs of each unit found
 constexpr std::size_t kMost = 8;  // units that are run alone
 
-/// Runs `half` twice. Returns nullopt if the outputs are equal, otherwise the units known to differ, if any.
+/// nullopt if the outputs of two runs are equal, otherwise the units known to differ, if any.
 std::optional<Named> run_twice(const Plan& plan, const Units& half) {
   const std::string once = output_of(plan, half);
   const std::string again = output_of(plan, half);
@@ -26,7 +26,6 @@ std::optional<Named> run_twice(const Plan& plan, const Units& half) {
   return differing_units(once, again, half);
 }
 
-/// Divides `part` into halves until the units are identified. Returns an empty list if two runs are not different.
 Named by_halves(const Plan& plan, Units part, std::ostream& out) {
   while (part.count > 1) {
     const Units left{.first = part.first, .count = part.count / 2};
@@ -45,8 +44,7 @@ Named by_halves(const Plan& plan, Units part, std::ostream& out) {
   return {};
 }
 
-/// Reports the results of a unit run alone. `here` is the result of the unit when the shard was run on this node.
-/// Returns true if all are equal.
+/// `here`: the unit's result when the shard was run on this node. Returns true if all are equal.
 bool run_alone(const Plan& plan, std::uint64_t unit, const std::string& here, std::ostream& out) {
   std::set<std::string> ends;
   for (int i = 0; i < kAlone; ++i) ends.insert(output_of(plan, {.first = unit, .count = 1}));

@@ -57,7 +57,7 @@ struct Pipe {
     if (ends.at(which) >= 0) close(ends.at(which));
     ends.at(which) = -1;
   }
-  /// Appends the available bytes to `text`; closes the reading end at end of file.
+  /// The available bytes; closes the reading end at end of file.
   void take(std::string& text) {
     std::array<char, 65536> buffer;
     const ssize_t read = ::read(ends[0], buffer.data(), buffer.size());

@@ -21,8 +21,8 @@ struct ChildEnd {
   std::string text() const;
 };
 
-/// Runs the child with an empty standard input and waits until it exits. Throws std::system_error if it cannot be
-/// started. Thread-safe: yes.
+/// With an empty standard input, until the child exits. Throws std::system_error if it cannot be started. Thread-safe:
+/// yes.
 ChildEnd run(const Child& child);
 
 /// Runs the child with this process's standard output and error. Returns its exit status.

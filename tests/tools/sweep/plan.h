@@ -25,8 +25,8 @@ struct Plan {
   Units shard(std::uint64_t number) const;
 };
 
-/// Writes the plan into a new folder. Accepts a folder that already has the same plan, so two users may plan
-/// concurrently. Throws std::runtime_error if the folder has a different plan.
+/// Accepts a folder that already has the same plan, so two users may plan concurrently. Throws std::runtime_error if it
+/// has a different one.
 void write_plan(const std::filesystem::path& folder, const Plan& plan);
 
 /// Throws std::runtime_error naming the file and the error.

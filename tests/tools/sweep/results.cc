@@ -49,8 +49,7 @@ class Draft {
     if (fsync(file_) != 0) fail("cannot sync");
   }
 
-  /// Returns whether the file now has this name. Over NFS the reply to a successful link may be lost, so the link count
-  /// is checked.
+  /// Over NFS the reply to a successful link may be lost, so the link count decides.
   bool link_to(const std::filesystem::path& name) const {
     if (link(path_.c_str(), name.c_str()) == 0) return true;
     const int reason = errno;

@@ -37,21 +37,18 @@ std::string contents_of(const std::filesystem::path& file);
 /// Stores a shard's output as its result. If this returns kOther, the output was stored as .differs.
 Kept keep_result(const std::filesystem::path& folder, std::uint64_t shard, std::string_view text);
 
-/// Returns a shard's result, if any. Throws std::runtime_error if the file is not a result of this shard.
+/// Throws std::runtime_error if the file is not a result of this shard.
 std::optional<std::string> result_of(const std::filesystem::path& folder, const Plan& plan, std::uint64_t shard);
 
 std::optional<std::string> other_result_of(const std::filesystem::path& folder, const Plan& plan, std::uint64_t shard);
 
-/// Returns the lines of a unit in the output of a program. Can be empty.
 std::string lines_of(std::string_view output, std::uint64_t unit);
 
-/// Returns the units that are different in two outputs. This compares the lines. If all lines are the same, it uses the
-/// digests, which identify the unit if there is only one. Returns an empty list if there are several such units without
-/// lines, or if only the end line is different.
+/// By their lines, or by the digests if all lines are the same, which identify a single unit. Empty if several such
+/// units have no lines, or if only the end line is different.
 std::vector<std::uint64_t> differing_units(std::string_view one, std::string_view other, const Units& units);
 
-/// Describes where two outputs of the same units differ: "unit 13", "units 13, 17", "several units", "no unit, but in
-/// their ends".
+/// "unit 13", "units 13, 17", "several units", "no unit, but in their ends".
 std::string difference(std::string_view one, std::string_view other, const Units& units);
 
 /// Throws std::invalid_argument unless `output` is the complete output of a run of these units.

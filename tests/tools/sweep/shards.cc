@@ -30,7 +30,6 @@ std::string_view body_of(std::string_view result) {
   return last == std::string_view::npos ? std::string_view() : result.substr(0, last + 1);
 }
 
-/// Runs these units. `why` is empty on success, otherwise the reason of the failure.
 ChildEnd run_units(const Plan& plan, const Units& units, std::string& why) {
   ChildEnd end = run(program_of(plan, {"--units", text_of(units), "--json"}));
   why = end.status == 0 ? "" : end.text();

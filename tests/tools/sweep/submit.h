@@ -24,8 +24,7 @@ struct KubernetesOptions {
   std::string volume;           ///< claim of the volume with the sweep's folder
   std::uint64_t parallel = 64;  ///< maximum number of pods at a time
 };
-/// Returns an Indexed Job for the missing shards (YAML for kubectl apply). Requires Kubernetes 1.33
-/// (backoffLimitPerIndex).
+/// YAML for kubectl apply. Requires Kubernetes 1.33 (backoffLimitPerIndex).
 std::string kubernetes_job(const std::filesystem::path& folder, const Plan& plan, const KubernetesOptions& options);
 
 }  // namespace tendon::sweep

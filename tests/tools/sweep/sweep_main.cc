@@ -23,22 +23,17 @@ namespace {
 
 struct Arguments {
   std::filesystem::path folder;
-  // plan
   std::string units;
   std::uint64_t per_shard = 0;
   std::string arithmetic = "portable";
   std::vector<std::string> command;
-  // run
   std::optional<std::uint64_t> shard, task, of;
   bool bisect = false;
-  // here
   unsigned jobs = std::max(1U, std::thread::hardware_concurrency());
-  // submit
   std::string to;
   bool go = false;
   SlurmOptions slurm;
   KubernetesOptions kubernetes;
-  // status
   bool missing = false;
   bool json = false;
 };

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// End-to-end tests of tendon-sweep: processes, folders, killed shards.
 #include <gtest/gtest.h>
 
 #include <atomic>

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// Preloaded library that aborts the program if it link()s a file whose writes have not been synced. After a power
-// failure such a file may exist but be empty.
+// Preloaded: aborts the program if it link()s a file with unsynced writes, which may be empty after a power failure.
 #include <dlfcn.h>
 #include <sys/stat.h>
 #include <unistd.h>

@@ -14,8 +14,7 @@
 
 namespace tendon::simulation {
 
-/// The device multiplies its output by these factors. Tests require that 1.01 breaks passivity, which shows that they
-/// can detect a violation.
+/// Factors of the device's output. 1.01 must break passivity, which shows that the tests can detect a violation.
 struct Sabotage {
   double force = 1;
   double torque = 1;
@@ -24,12 +23,11 @@ struct Sabotage {
 };
 
 /// A device moved by an adversary that knows the law and the force and senses positions exactly. It mixes random motion
-/// with the worst-case motion, eq. (7) of Lee & Lee 2009:
+/// with the worst case, eq. (7) of Lee & Lee 2009:
 ///
 ///     Δx* = F/‖F‖ · T (‖F‖ − f_c)₊ / (2b)
 ///
-/// Rotation and gripper move by the same rule at the same time. The reported orientation switches sign at random (q or
-/// −q).
+/// Rotation and gripper move by the same rule. The reported orientation switches sign at random (q or −q).
 class AdversaryDevice final : public Device {
  public:
   struct Config {
@@ -109,14 +107,14 @@ class AdversaryDevice final : public Device {
   bool saw_only_finite_forces() const { return saw_only_finite_forces_; }
 
  private:
-  /// rad. This must be less than π, because a larger rotation would be measured in the other direction.
+  /// rad. Below π, because a larger rotation would be measured in the other direction.
   static constexpr double kMostTurn = 3;
 
   void move(Duration held) {
     const bool hostile = dice_.chance(config_.hostility);
     if (!hostile) {
       position_ += dice_.direction() * config_.largest_move * dice_.decades(-5, 0);
-      // Sometimes this moves back to the origin, so that walls are entered and left.
+      // Back towards the origin, so that walls are entered and left.
       if (position_.norm() > 0.05) position_ *= 0.5;
     } else if (const double size = force_.norm(); size > config_.friction.coulomb) {
       position_ += force_ / size * worst(size, config_.friction, held);

@@ -20,7 +20,7 @@ namespace {
 using std::chrono::milliseconds;
 
 constexpr std::int64_t kDriftPpb = 200'000;
-/// A client counts as served if it receives half of the data sent during this time.
+/// A client is served if it receives half of the data sent during this time.
 constexpr Duration kLook = milliseconds(400);
 constexpr std::uint32_t kHzX = 20;
 /// Each clock reading is truncated to whole nanoseconds.
@@ -173,8 +173,6 @@ class Day {
   }
   std::string name(std::size_t handle) const { return keys_[handle == kZElsewhere ? kZ : handle].name; }
 
-  // ---- What is seen of them, turn by turn ----
-
   void see_client(std::size_t handle) {
     if (!world_.alive(handle)) return;
     see_phase(handle, world_.client(handle).phase() == ForceClient::Phase::kOpen);
@@ -248,9 +246,6 @@ class Day {
     }
   }
 
-  // ---- Requests ----
-
-  /// Sends a request from Z and one from X, if there is room.
   void ask() {
     for (const std::size_t handle : {z_, kX}) {
       if (!world_.alive(handle) || !world_.client(handle).rearm()) continue;
@@ -277,8 +272,6 @@ class Day {
       broken("a request of X was not executed");
     }
   }
-
-  // ---- Weather, and other troubles ----
 
   void cause_trouble() {
     const double which = dice_.uniform();
@@ -320,7 +313,7 @@ class Day {
     }
   }
 
-  /// Stops a client and restarts it later. Z may return from another address.
+  /// Z may return from another address.
   void absence(std::size_t handle) {
     if (dice_.chance(0.5)) {
       world_.stop(handle);
@@ -335,9 +328,8 @@ class Day {
     recover(world_.now());
   }
 
-  /// Adds a client with the key of Z at another address while Z has a session. The first one is notified that it has
-  /// been replaced, and does not return. (If the notification could not reach it, because its address changed at that
-  /// instant, it would return after its timeout and take the session back; hence no address changes here.)
+  /// A client with the key of Z joins from another address. The first one is notified and does not return. (Hence no
+  /// address changes here: a lost notification would let it return after its timeout and take the session back.)
   void take_over() {
     Network::Weather calm = fair();
     calm.up.rebind = {};
@@ -353,8 +345,6 @@ class Day {
     }
     world_.kill(before);
   }
-
-  // ---- Promises ----
 
   struct Marks {
     std::uint64_t z = 0;
@@ -393,7 +383,6 @@ class Day {
     report_.slowest_recovery = std::max<Duration>(report_.slowest_recovery, world_.now() - kLook - from);
   }
 
-  /// All clients must be served all the time, unless a session reaches its maximum age.
   void see_fair_weather() {
     if (report_.troubles == 0) recover(world_.now());
     const LocalTime end = world_.now() + dice_.milliseconds(10'000, 40'000);

@@ -17,13 +17,11 @@ namespace tendon::simulation {
 ///        Returns from the same address or from another one, sometimes while its previous session is still alive.
 ///     Y  observer at a tenth of the haptic rate. Leaves and returns in the same ways.
 ///     X  observer at 20 states/s. Its link loses 30 %, reorders, duplicates and replays, and its address changes
-///        every ten minutes. Its session lives until its maximum age.
+///        every ten minutes. The session ends at its maximum age.
 ///
-/// For Z and Y, periods of good conditions (10 to 40 s, address changes possible) alternate with faults: 10 to 60 s of
-/// any injector model with bit flips and address changes, during which Z may be killed and restarted; or a client that
+/// For Z and Y, good conditions (10 to 40 s, address changes possible) alternate with faults: 10 to 60 s of any
+/// injector model with bit flips and address changes, during which Z may be killed and restarted; or a client that
 /// leaves.
-///
-/// Invariants:
 ///
 ///     served       Within kPromise after a fault, or after a session reached its maximum age, every client is in a
 ///                  session with states and forces. Under good conditions it remains the same session; X's always does.
@@ -37,8 +35,7 @@ struct DayConfig {
   std::uint64_t seed = 1;
   Duration length = std::chrono::hours(25);  ///< exceeds the maximum age of a session
   std::uint32_t loop_hz = 1000;
-  /// For A's datagrams. At 1 kHz, Z's keys change by datagram count (after 4 min), those of the observers by age.
-  /// Clients renew their keys as in production.
+  /// At 1 kHz, Z's keys change by datagram count (after 4 min), those of the observers by age.
   Rekey rekey{.datagrams = std::uint64_t{1} << 18};
   Duration session_life = Session::Config{}.life;
 
@@ -52,9 +49,9 @@ struct DayConfig {
 struct DayReport {
   std::optional<std::string> broken;  ///< the violated invariant and the time
   std::uint64_t troubles = 0;
-  std::uint64_t byes = 0;       ///< how often a client left with a Bye
+  std::uint64_t byes = 0;       ///< number of times that a client left with a Bye
   std::uint64_t deaths = 0;     ///< clients killed, including under bad conditions
-  std::uint64_t takeovers = 0;  ///< number of takeovers by Z's key from another address
+  std::uint64_t takeovers = 0;  ///< number of takeovers from another address with the key of Z
   std::uint64_t sessions = 0;
   std::uint64_t expired = 0;  ///< sessions ended by age
   std::uint64_t rekeys = 0;
@@ -73,7 +70,6 @@ struct DayReport {
   std::size_t heap_second_half = 0;
 };
 
-/// Stops at the first violated invariant.
 DayReport run_day(const DayConfig& config);
 
 }  // namespace tendon::simulation

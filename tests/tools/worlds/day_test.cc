@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// Shortened days: key changes and session ages within minutes. day.sh runs whole days.
+// Key changes and session ages within minutes. day.sh runs whole days.
 #include "tests/tools/worlds/day.h"
 
 #include <gtest/gtest.h>

@@ -30,7 +30,6 @@ Friction draw_friction(Dice& dice, double coulomb_decade, double viscous_decade)
           dice.decades(viscous_decade - 1, viscous_decade)};
 }
 
-/// Draws the device's true friction, above the limiter's `friction`.
 void draw_true_friction(Dice& dice, const Friction& friction, std::optional<double>& coulomb,
                         std::optional<double>& viscous) {
   if (friction.coulomb > 0) coulomb = friction.coulomb * (kMargin + dice.uniform());
@@ -111,8 +110,7 @@ void draw_gripper(Dice& dice, DrawnWorld& world, bool motor) {
   std::get<SimulatedDevice::Config>(world.device).gripper = gripper;
 }
 
-/// Each press uses its own button; two of them come after recovery. The presses are longer than any interval of the
-/// loop.
+/// Each press has its own button and is longer than any interval of the loop; two come after recovery.
 void draw_presses(Dice& dice, DrawnWorld& world) {
   auto& device = std::get<SimulatedDevice::Config>(world.device);
   constexpr std::array<std::array<double, 2>, 4> kFrom{{{0, 3}, {2, 6}, {8.7, 8.8}, {9.2, 9.3}}};  // s

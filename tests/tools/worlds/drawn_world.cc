@@ -26,8 +26,7 @@ Duration whole_ms(Dice& dice, double low, double high) {
   return milliseconds(static_cast<int>(dice.within(low, high)));
 }
 
-/// Quantized to factors of 2^¼ and whole milliseconds, because delay models are compiled once per distinct parameter
-/// set.
+/// Quantized to factors of 2^¼ and whole milliseconds, because delay models are compiled once per parameter set.
 Duration typical(Dice& dice, double low_ms, double high_ms) {
   const double octaves = std::log2(high_ms / low_ms);
   return std::max<Duration>(
@@ -283,8 +282,8 @@ void draw_clients(Dice& dice, DrawnWorld& world) {
   std::ranges::stable_sort(world.clients, {}, &DrawnClient::joins);
 }
 
-/// Half of the worlds use suite 1. Most of those renew keys so often that outages outlast some keys, and their clients'
-/// addresses may change at any time. Uses its own random stream so that the rest of the world is unchanged.
+/// Half of the worlds use suite 1. Most of those renew keys so often that outages outlast some, and their clients'
+/// addresses may change at any time. It uses its own random stream, so that the rest of the world is unchanged.
 void draw_suite(Dice dice, DrawnWorld& world) {
   if (dice.chance(0.5)) return;
   Ratchet secrets(dice.bits());
@@ -308,9 +307,8 @@ void draw_suite(Dice dice, DrawnWorld& world) {
   }
 }
 
-/// If the seed is at least kFirstSeedOfSuite2, half of the sealed worlds have a server with AES. A third of those allow
-/// only AES; in the others some clients do not know suite 2. Uses its own random stream so that the rest of the world
-/// is unchanged.
+/// From kFirstSeedOfSuite2 on, half of the sealed worlds have a server with AES. A third of those allow only AES; in
+/// the others some clients do not know suite 2. Its own random stream leaves the rest unchanged.
 void draw_aes(Dice dice, DrawnWorld& world) {
   for (DrawnClient& client : world.clients) client.config.suites = client.rogue.suites = world.config.suites;
   if (world.seed < kFirstSeedOfSuite2 || !world.sealed() || dice.chance(0.5)) return;
@@ -454,7 +452,6 @@ std::string describe(const DrawnWorld& world) {
 
 namespace {
 
-/// Adds optional fields to an engine's answer, correct or not.
 void say_more(Dice& dice, const DeviceState& hand, Touch& touch) {
   if (dice.chance(0.3)) touch.valid_radius = dice.decades(-5, 0);
   if (dice.chance(0.5)) touch.contact = any_contact(dice, hand.position);

@@ -44,8 +44,8 @@ struct DrawnClient {
   std::optional<Duration> restarted;  ///< restarted at the same address
 };
 
-/// Everything a seed determines except the fate of single datagrams, which the network draws from the same seed. At the
-/// start, the network conditions are bad. Then they are good until the end.
+/// Everything a seed determines except the fate of single datagrams, which the network draws from the same seed. The
+/// network is first bad, then good until the end.
 struct DrawnWorld {
   static constexpr Duration kLength = std::chrono::seconds(10);
 
@@ -55,7 +55,7 @@ struct DrawnWorld {
     Duration at{};
     Network::Weather weather;
   };
-  std::vector<Change> changes;  ///< changes of the network conditions. The last change makes them good.
+  std::vector<Change> changes;  ///< changes of the network conditions. They are good after the last change.
   Duration clears{};            ///< time of the last change
   Duration one_way_up{};        ///< after that
   Duration one_way_down{};

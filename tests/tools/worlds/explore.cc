@@ -55,19 +55,16 @@ void add(World& world, const DrawnClient& client, LocalTime began, Watch watch) 
   }
 }
 
-/// Sends random bytes from an unknown address or a client's.
 void forge_garbage(World& world, const DrawnWorld& drawn, Dice& dice) {
   std::vector<std::byte> bytes(1 + dice.bits() % kMaxDatagram);
   for (std::byte& b : bytes) b = static_cast<std::byte>(dice.bits());
   Address from = world.server_address();
   from.port = dice.chance(0.5) ? 9 : kFirstClientPort;
-  // A plausible header of our protocol.
   if (dice.chance(0.5) && bytes.size() >= 4) {
     bytes[0] = std::byte{0x54};
     bytes[1] = static_cast<std::byte>(0x10 | (1 + dice.bits() % 4));
     bytes[2] = bytes[3] = std::byte{0};
   }
-  // A plausible header of a sealed session.
   if (drawn.sealed() && dice.chance(0.5) && bytes.size() >= kHeaderSize) {
     std::ranges::copy(encode_header({.type = DatagramType::kData,
                                      .suite = drawn.config.suites.front(),

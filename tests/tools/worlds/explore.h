@@ -17,18 +17,18 @@ struct Outcome {
   bool turned = false;           ///< a torque was commanded
   bool gripped = false;          ///< a grip force was commanded
   int presses = 0;               ///< number of button presses that observers have received
-  bool recovered = false;        ///< recovery of all clients was checked
+  bool recovered = false;        ///< the recovery of all clients was checked
   double least_energy = 0;       ///< J
   std::uint64_t steps = 0;
   Network::Counts network;
 };
 
 struct Extras {
-  Network::Players players{};  ///< optional deciders in place of the injectors
-  Network::Watch watch{};      ///< sees every decision of the network
+  Network::Players players{};  ///< optional deciders that replace the injectors
+  Network::Watch watch{};      ///< observes all decisions of the network
 };
 
-/// Runs a world and checks the invariants. The outcome is deterministic. Thread-safe: yes.
+/// Deterministic. Thread-safe: yes.
 Outcome run(const DrawnWorld& world, const Extras& extras = {});
 
 }  // namespace tendon::simulation

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// Determinism of worlds, detection of violations, and shrinking. The invariants of all worlds are checked by
-// `tendon-worlds run` (ctest -R Worlds).
+// The invariants of all worlds are checked by `tendon-worlds run` (ctest -R Worlds).
 #include "tests/tools/worlds/explore.h"
 
 #include <gtest/gtest.h>

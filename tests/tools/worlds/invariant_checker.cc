@@ -66,7 +66,6 @@ Duration longest_validity(const DrawnWorld& world) {
   return std::min(longest + std::chrono::microseconds(1), most);
 }
 
-/// Every datagram that a client reads from its link is in one of these counters.
 std::uint64_t counted(const ForceClient::Stats& stats) {
   const LinkStats& link = stats.link;
   return link.datagrams_received + link.duplicated + link.malformed + link.forged + link.old_key + stats.foreign;
@@ -159,8 +158,8 @@ void InvariantChecker::see_bounds(const StepRecord& step) {
   }
 }
 
-/// The account must not fall below min(`last`, 0) − `may_take`, where `may_take` (J) is the most that a hold beyond the
-/// bound can take. Without such a hold, it must not decrease while it is below zero.
+/// Must not fall below min(`last`, 0) − `may_take`, where `may_take` (J) is the most that a hold beyond the bound can
+/// take. Without such a hold, it must not decrease while it is below zero.
 void InvariantChecker::see_account(const char* whose, double& last, double now, double may_take) {
   const double before = std::exchange(last, now);
   const double may_leave = std::min(before, 0.0) - may_take;
@@ -207,8 +206,7 @@ void InvariantChecker::see_age(const StepRecord& step) {
     if (port_.told() != Effort{}) report(Oracle::kStopped, words(port_.told()) + " without a position of the hand");
     return;
   }
-  // The slew limit reduces the force by at most the amount for the longest hold in each interval, even if there is a
-  // pause. (Other laws may also have a spring to release.)
+  // Even in a pause, the slew limit removes at most the amount for the longest hold. (Other laws may release a spring.)
   if (!over && step.mode != Mode::kFault) {
     silent_for_.reset();
   } else if (!silent_for_) {
@@ -287,7 +285,7 @@ void InvariantChecker::see_recovered() {
 void InvariantChecker::see_served() {
   std::size_t controllers = 0;
   std::size_t open_controllers = 0;
-  std::string others;  // why other clients are not served
+  std::string others;  // the reason why other clients are not served
   for (std::size_t i = 0; i < marks_.size(); ++i) {
     if (!world_.alive(i)) continue;
     const DrawnClient& drawn = drawn_.clients[i];
@@ -384,8 +382,7 @@ void InvariantChecker::see_end() {
   see_presses();
 }
 
-/// Each press uses a different button. Worlds in which addresses change are skipped, because a press can be in a state
-/// that is sent to the old address.
+/// Each press uses a different button. Not if addresses change, because a state to the old address can have a press.
 void InvariantChecker::see_presses() {
   const auto* const device = std::get_if<SimulatedDevice::Config>(&drawn_.device);
   const bool roams = drawn_.changes.back().weather.up.rebind > Duration::zero();

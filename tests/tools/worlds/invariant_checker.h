@@ -55,11 +55,8 @@ struct Breach {
 ///   + 600 ms       two Hellos and their answers, repeated every 100 ms, then the first state and force
 Duration recovery_promise(const DrawnWorld& world);
 
-/// Checks a world's invariants from outside, after every step and turn, and keeps the first violation. Uses independent
-/// observations instead of the statistics of the code under test where possible: energy at the port (WatchedDevice),
-/// arrival times of forces, and datagrams counted at the network.
-///
-/// Thread-safe: no.
+/// Keeps the first violation. Observes independently of the code under test where possible: energy at the port
+/// (WatchedDevice), arrival times of forces, and datagrams counted at the network. Thread-safe: no.
 class InvariantChecker {
  public:
   /// All arguments must outlive this object. `simulated` is null for an adversary.
@@ -84,12 +81,11 @@ class InvariantChecker {
   bool gripped() const { return gripped_; }  ///< a grip force was commanded
   int presses() const { return presses_; }
   bool checked_recovery() const { return checked_recovery_; }
-  /// The minimum of the account of the port in J. This ignores times with a deficit because of holds that are longer
-  /// than the bound of the law.
+  /// The minimum of the port's account, J, without deficits because of holds longer than the law's bound.
   double least_energy() const { return least_energy_; }
 
  private:
-  struct Mark {  ///< the counters of a client at the deadline of its recovery
+  struct Mark {  ///< counters of a client at its recovery deadline
     std::uint64_t sessions = 0;
     std::uint64_t states = 0;
     std::uint64_t arrived = 0;

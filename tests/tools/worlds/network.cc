@@ -10,7 +10,7 @@ namespace tendon::simulation {
 
 namespace {
 
-/// Distance between a client's port and its port after one NAT rebinding; larger than the number of clients.
+/// Between a client's ports before and after a NAT rebinding; larger than the number of clients.
 constexpr std::uint32_t kRebindStride = 128;
 
 }  // namespace
@@ -50,7 +50,6 @@ class Network::End final : public Link {
   std::uint64_t arrivals() const noexcept { return arrived_; }
 
  private:
-  /// Its buffer is reused.
   struct Letter {
     Address from;
     std::vector<std::byte> bytes;

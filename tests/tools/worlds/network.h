@@ -16,12 +16,9 @@
 
 namespace tendon::simulation {
 
-/// A set of simulated links between one server and its clients. An injector decides when each datagram arrives. Each
-/// client has its own link (numbered from 0 in the order of `open`), and each direction its own decider, so clients do
-/// not affect each other.
-///
-/// After a NAT rebinding (`rebinds`) the server sees an unknown source address, and datagrams sent to the old port are
-/// dropped.
+/// The links between a server and its clients. Each client has its own link (numbered from 0 in the order of `open`),
+/// and each direction its own decider, so clients do not affect each other. After a NAT rebinding (`rebinds`) the
+/// server sees an unknown source address, and datagrams sent to the old port are dropped.
 ///
 /// Invariant of the counters: sent + copies = delivered + lost + nowhere + in flight.
 ///
@@ -54,36 +51,34 @@ class Network {
   ~Network();
 
   Link& server();
-  /// A client's end. Opening the same address again returns the same link with an empty inbox. Lives as long as the
-  /// network.
+  /// Opening an address again returns the same link with an empty inbox. Lives as long as the network.
   Link& open(const Address& address);
 
-  /// Applies from `now` on to every link that uses an injector.
+  /// The weather applies to every link that uses an injector.
   void change(const Weather& weather, LocalTime now);
 
-  /// Advances the clock; datagrams due by `now` are in the inboxes afterwards.
+  /// Datagrams due by `now` are in the inboxes afterwards.
   void deliver(LocalTime now);
   std::optional<LocalTime> next_arrival() const { return flight_.next_wake(); }
 
-  /// Upper bound of the arrival times of all datagrams sent so far. A lost datagram counts if it would have arrived
-  /// more than kLongWait later: with order preserved, later datagrams wait for its slot. A shorter wait fits into the
-  /// 600 ms of recovery_promise().
+  /// Upper bound over all datagrams sent so far. A lost one counts if it would have arrived more than kLongWait later:
+  /// with order preserved, later datagrams wait for its slot. A shorter wait fits into the 600 ms of
+  /// recovery_promise().
   LocalTime latest_arrival() const noexcept {
     constexpr Duration kLongWait = std::chrono::milliseconds(300);
     return latest_of_lost_ > latest_arrival_ + kLongWait ? latest_of_lost_ : latest_arrival_;
   }
 
-  /// Returns whether a datagram arrived at the server (or at this link's client) since the last call.
+  /// A datagram arrived at the server (or at this link's client) since the last call.
   bool take_news_of_server();
   bool take_news_of(std::uint32_t link);
-  /// Returns the number of datagrams that have arrived but have not been read.
   std::size_t unread_by_server() const;
   std::size_t unread_by(std::uint32_t link) const;
   std::uint64_t arrived_at_server() const;
   std::uint64_t arrived_at(std::uint32_t link) const;
   std::size_t on_their_way_up(std::uint32_t link) const;
 
-  /// Puts bytes into the inbox of `to` immediately, with the source address `from`.
+  /// Puts bytes into the inbox of `to` immediately.
   void forge(const Address& from, const Address& to, std::span<const std::byte> datagram);
 
   Address outside(std::uint32_t link) const;
@@ -91,7 +86,7 @@ class Network {
   const Counts& counts() const noexcept { return counts_; }
   std::size_t in_flight() const noexcept { return flight_.size(); }
   void watch(Watch watch) { watch_ = std::move(watch); }
-  /// Called with each arriving datagram before the receiver can read it. Forged datagrams are not reported.
+  /// Before the receiver can read the datagram. Forged ones are not reported.
   void watch_arrivals(std::function<void(const Arrival&)> watch) { watch_arrivals_ = std::move(watch); }
 
  private:
@@ -125,7 +120,7 @@ class Network {
   std::vector<std::unique_ptr<Client>> clients_;
   injector::Flight<Tag> flight_;
   LocalTime latest_arrival_{};
-  LocalTime latest_of_lost_{};  ///< when the last lost datagram would have arrived
+  LocalTime latest_of_lost_{};  ///< the time when the last lost datagram would have arrived
   Counts counts_;
 };
 

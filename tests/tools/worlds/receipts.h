@@ -11,11 +11,8 @@
 
 namespace tendon::simulation {
 
-/// Reference model of receiver-side replay protection in suite 1 (SESSION.md): counts the datagrams that one end must
-/// accept. Uses a set of packet numbers instead of a bit ring, and no keys. An implementation that drops a genuine
-/// datagram or accepts a duplicate has a different count.
-///
-/// Thread-safe: no.
+/// Reference model of replay protection in suite 1 (SESSION.md): counts the datagrams that one end must accept, with a
+/// set of packet numbers instead of a bit ring, and without keys. Thread-safe: no.
 class Receipts {
  public:
   /// `overlap` is the time for which the previous key remains valid.
@@ -24,8 +21,7 @@ class Receipts {
   /// A datagram with `whole` = false cannot be authentic.
   void see(LocalTime now, std::span<const std::byte> datagram, bool whole);
 
-  /// Datagrams that must be accepted (LinkStats::datagrams_received) in this connection, which must be among the
-  /// newest.
+  /// LinkStats::datagrams_received of this connection, which must be among the newest.
   std::uint64_t accepted(std::uint32_t connection) const;
   /// The newest connection; 0 = none.
   std::uint32_t newest() const noexcept { return conversations_.empty() ? 0 : conversations_.rbegin()->first; }

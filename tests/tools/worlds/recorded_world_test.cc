@@ -1,10 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// A human hand recorded on a teleoperation rig (TU/e, 2 kHz, lever angle × 0.075 m) moves the handle. The network is a
-// 5G mid-band link with measured one-way delays (DETERMINISTIC6G). The device is the UE: its states take the uplink,
-// the forces that answer them the downlink.
-//
-// The data is read from $TENDON_DATA. The recordings are written next to the test, so that `tendon-report` can read
+// A human hand recorded on a teleoperation rig (TU/e, 2 kHz, lever angle × 0.075 m) over a 5G mid-band link with
+// measured one-way delays (DETERMINISTIC6G). The device is the UE: its states take the uplink, the answering forces the
+// downlink. The data is in $TENDON_DATA. The recordings are written next to the test, so that `tendon-report` can read
 // them.
 #include <gtest/gtest.h>
 

@@ -15,9 +15,8 @@
 
 namespace tendon::simulation {
 
-/// A malicious or faulty client that knows the protocol. It answers steps that do not exist or are too old. It sends
-/// forces that are not finite or 10⁶ N, validities that are zero or infinite, and requests that are not valid. It stops
-/// without a Bye at the time `quits`.
+/// It knows the protocol. It answers steps that do not exist or are too old, with forces that are not finite or 10⁶ N,
+/// validities that are zero or infinite, and invalid requests, and stops without a Bye at `quits`.
 class Rogue final : public CustomClient {
  public:
   struct Config {

@@ -212,7 +212,7 @@ void expect_events(const Tally& tally) {
   }
 }
 
-/// Runs `work` on `jobs` threads and rethrows an exception of any of them.
+/// Rethrows an exception of any thread.
 void on_threads(unsigned jobs, const std::function<void()>& work) {
   std::vector<std::exception_ptr> failures(jobs);
   {

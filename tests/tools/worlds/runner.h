@@ -25,24 +25,24 @@ struct RunOptions {
   bool progress = false;
 };
 
-/// Runs worlds on `jobs` threads until all are done or one violates an invariant; then it finishes the worlds in
-/// progress. Prints each violation with its oracle and the command that reproduces it, the number of worlds, the rate,
-/// and coverage counts. Returns true if every invariant held.
+/// Until all are done or one violates an invariant; worlds in progress are finished. Prints each violation with its
+/// oracle and the command that reproduces it, the number of worlds, the rate, and coverage counts. Returns true if
+/// every invariant held.
 bool explore(const RunOptions& options, std::ostream& out, std::ostream& progress);
 
-/// Runs all these seeds without stopping at a violation: one shard of a sweep (tests/support/units.h). Prints a JSON
-/// line per violation and one end line.
+/// Runs all these seeds, also after a violation: one shard of a sweep (tests/support/units.h). Prints a JSON line per
+/// violation and one end line.
 void explore_units(const Units& seeds, unsigned jobs, std::ostream& out);
 
-/// Summarizes the lines printed by explore_units as `explore` does. Returns true if every invariant held. Throws
+/// Summarizes the lines of explore_units as `explore` does. Returns true if every invariant held. Throws
 /// std::invalid_argument, naming the line, for malformed input, and std::runtime_error when coverage is too low.
 bool judge(std::istream& lines, std::ostream& out);
 
 /// Runs one world and prints its events if `verbose`. Returns true if every invariant held.
 bool run_one(std::uint64_t seed, bool verbose, std::ostream& out);
 
-/// Reads one seed from each line. The number can be followed by a note, and a comment starts with #. Throws
-/// std::runtime_error, naming file and line, for anything else.
+/// One per line. A note can follow, and a comment starts with #. Throws std::runtime_error, naming file and line, for
+/// anything else.
 std::vector<std::uint64_t> read_seeds(const std::filesystem::path& file);
 
 }  // namespace tendon::simulation

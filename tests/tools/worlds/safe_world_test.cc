@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// The whole server with a SafeDevice.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -20,7 +18,7 @@ using std::chrono::seconds;
 
 constexpr Friction kBounds = {.coulomb = 0.3, .viscous = 0.8};  // below the falcon's true friction
 
-/// A falcon in a hand that rests at first, then moves back and forth through a wall at x = 0.
+/// Rests at first, then moves back and forth through a wall at x = 0.
 SimulatedDevice::Config hand(const Vec3& to = Vec3(0.02, 0.004, 0)) {
   SimulatedDevice::Config device = find_device_profile("falcon")->device();
   device.hand = OperatorHand::Config{

@@ -19,12 +19,9 @@ struct SecondLookOptions {
   bool json = false;
 };
 
-/// `tendon-worlds replay`: simulates other laws on a recorded network. Device, hand and loop come from a scene; the
-/// wall of `tendon_virtual_wall` is behind the network of a trace; everything but the law is equal. The summary is that
-/// of `tendon-report`.
-///
-/// Only the first link of the trace is used. Each datagram has the fate of the last recorded datagram before this time,
-/// so the network is bad at the same times for all sessions.
+/// Simulates other laws on a recorded network. Device, hand and loop come from a scene; the wall of
+/// `tendon_virtual_wall` is behind the network of a trace. Only the first link of the trace is used. Each datagram has
+/// the fate of the last datagram recorded before its time, so that all sessions have the same network conditions.
 ///
 /// Throws std::invalid_argument for an unknown law, and the exceptions of the file readers.
 void second_look(const SecondLookOptions& options, std::ostream& out);

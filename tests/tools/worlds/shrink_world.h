@@ -12,8 +12,7 @@ namespace tendon::simulation {
 
 injector::Trace record_network(const DrawnWorld& world);
 
-/// Runs the same world with the network of a trace: datagram i of each link and direction gets the fate recorded for
-/// datagram i.
+/// Datagram i of each link and direction gets the fate recorded for datagram i.
 Outcome run_with_network(const DrawnWorld& world, const injector::Trace& trace);
 
 /// Reduces the network of a failing world to the few datagrams that matter for its violation and writes them as a

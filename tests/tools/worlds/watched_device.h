@@ -12,17 +12,14 @@
 
 namespace tendon::simulation {
 
-/// A wrapper for a device that observes all positions that are read and all forces that are held. It uses these values,
-/// but no code under test, to compute the energy of the port:
+/// Observes all positions read and all forces held, to compute the energy of the port without code under test:
 ///
 ///     E = Σ [ −F·Δx + f_c ‖Δx‖ + b ‖Δx‖²/T ]
 ///
 /// in total and per axis. An interval with unknown motion (a reading failed at either end, or the device's watchdog
 /// ended the force) is booked at its worst case, −T (‖F‖ − f_c)₊²/(4b). If motors turn the handle, torque and rotation
-/// enter E in the same way; a gripper with a motor has its own account.
-///
-/// Can inject failed readings (a bad cable) and a force that persists after a zero command (a slow amplifier or a lost
-/// command).
+/// enter E in the same way; a gripper with a motor has its own account. Can inject failed readings (a bad cable) and a
+/// force that persists after a zero command (a slow amplifier or a lost command).
 class WatchedDevice final : public Device {
  public:
   struct Config {
@@ -92,12 +89,11 @@ class WatchedDevice final : public Device {
  private:
   bool keeps(const Effort& told) { return config_.disobeys > 0 && told == Effort{} && dice_.chance(config_.disobeys); }
 
-  /// Dissipated energy, J, of a motion `along` the effort with path length `length` in time `t`.
+  /// Dissipated J for a motion `along` the effort with path length `length` in time `t`.
   static double taken(double effort_along, double length, const Friction& friction, double t) {
     const double rate = t > 0 ? friction.viscous / t : 0;
     return -effort_along + friction.coulomb * length + rate * length * length;
   }
-  /// Worst case of `taken` over all motions in time `t`.
   static double worst(double effort, const Friction& friction, double t) {
     const double excess = std::max(effort - friction.coulomb, 0.0);
     return excess > 0 ? -t * excess * excess / (4 * friction.viscous) : 0.0;

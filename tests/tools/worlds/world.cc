@@ -38,8 +38,7 @@ Address address_of(std::uint16_t port) {
   return address;
 }
 
-/// Wake-ups per kStretch; more than any burst of datagrams causes. A request to be called again immediately is served a
-/// nanosecond later.
+/// Wake-ups per kStretch; more than any burst of datagrams causes. An immediate request is served a nanosecond later.
 constexpr int kMostWakes = 20'000;
 constexpr Duration kStretch = std::chrono::milliseconds(1);
 

@@ -22,23 +22,18 @@
 
 namespace tendon::simulation {
 
-/// Port of the first client; later clients count up.
 inline constexpr std::uint16_t kFirstClientPort = 50000;
 
-/// A simulated peer other than our own clients.
 class CustomClient {
  public:
   virtual ~CustomClient() = default;
-  /// Runs everything that is due at `now` and returns when it must be called again. Both times are in the clock of the
-  /// peer.
+  /// Runs everything that is due at `now` and returns when it must be called again, in the peer's clock.
   virtual LocalTime turn(LocalTime now) = 0;
 };
 
-/// The whole server and its clients in one thread on a virtual clock. Uses the same Assembly, Session, Recorder and
-/// ForceClient as production, called in the order of their next wake-up. Nothing sleeps, and the result only depends on
-/// the seed.
-///
-/// The server is A, its clients are Z, Y, X …; the network is bad by default.
+/// Production's Assembly, Session, Recorder and ForceClient in one thread on a virtual clock, called in the order of
+/// their next wake-up. The result only depends on the seed. The server is A, its clients are Z, Y, X …; the network is
+/// bad by default.
 class World {
  public:
   struct Config {
@@ -47,19 +42,18 @@ class World {
     /// The default is 20 ± 5 ms and 2 % loss in each direction.
     Network::Weather weather = bad();
     Network::Players players{};
-    /// Upper bound of the uniformly distributed wake-up latency of the haptic thread.
+    /// Uniformly distributed.
     Duration latest_wake{};
-    /// Probability per step that the haptic thread is suspended for `pause`, as in a virtual machine.
+    /// Per step: the haptic thread is suspended for `pause`, as in a virtual machine.
     double pause_probability = 0;
     Duration pause{};
     std::string scene_text;
     bool record = false;
-    /// Steps are read as they are made; datagrams only go to a recording.
     Mailboxes::Capacities mail{.steps = 16, .flight = 2048, .datagrams = 1};
     std::size_t max_observers = 8;
     bool adapt_state_rate = false;
     std::vector<ClientKey> keys{};  ///< If this is empty, all clients are accepted, with suite 0.
-    /// For the server and the clients that have a key. Suite 2 requires a processor with AES; worlds of suite 1 are
+    /// For the server and the clients with a key. Suite 2 requires a processor with AES; worlds of suite 1 are
     /// identical on all processors.
     Suites suites = {Suite::kNoise};
     Rekey rekey{};
@@ -78,7 +72,6 @@ class World {
   std::size_t add_observer(const ForceClient::Config& config, Watch watch, const injector::DriftingClock& clock = {});
   std::size_t add_custom_client(
       const std::function<std::unique_ptr<CustomClient>(Link& link, const Address& server)>& make);
-  /// Replaces a client that has stopped by a new one with the same address and clock.
   void restart_controller(std::size_t handle, const ForceClient::Config& config, Physics physics);
   void restart_observer(std::size_t handle, const ForceClient::Config& config, Watch watch);
   bool alive(std::size_t handle) const { return clients_[handle].client != nullptr; }
@@ -87,7 +80,6 @@ class World {
   const injector::DriftingClock& clock(std::size_t handle) const { return clients_[handle].clock; }
   /// As SIGKILL: no Bye.
   void kill(std::size_t handle);
-  /// Stops a client with a Bye.
   void stop(std::size_t handle);
 
   /// Called synchronously with every haptic step, in order.

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// Whole server and its clients over time: engagement, loss of the engine, faults, clients, recordings.
 #include "tests/tools/worlds/world.h"
 
 #include <gtest/gtest.h>

@@ -88,7 +88,6 @@ void ToyClient::settle(LocalTime now, Span datagram) {
                    answered->server_to_client, fault_, now);
 }
 
-/// The kit never has more than one open request.
 void ToyClient::take(const pb::Control& control) {
   const std::string field = field_out_of_bounds(control);
   if (control.id() == 0 || (is(Fault::kSilentToBadRequests) && !field.empty())) return;

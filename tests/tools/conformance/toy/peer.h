@@ -14,7 +14,6 @@ namespace tendon::conformance {
 
 enum class Fault : std::uint8_t {
   kNone,
-  // Data, either side.
   kWrongVersion,
   kSkipsNumbers,
   kTimeGoesBack,
@@ -45,7 +44,6 @@ enum class Fault : std::uint8_t {
   kSilentToBadRequests,
   kKnowsNoAes,
   kLittleEndianNonce,  ///< in suite 2
-  // Server.
   kLongRetry,
   kTwoRetries,
   kAnswersShortHellos,
@@ -110,10 +108,9 @@ enum class Fault : std::uint8_t {
   kSharesOneLeader,
   kSetsOutputsUnasked,
   kSetsAnyOutput,
-  kKnowsNoChannels,  ///< not a fault: an older server
+  kKnowsNoChannels,  ///< this is an older server
   kKnowsNoCoupling,  ///< not a fault
   kKnowsNoColumns,   ///< not a fault
-  // Client.
   kShortHello,
   kHelloWithConnection,
   kDirtyPadding,
@@ -152,7 +149,6 @@ class ToyPeer {
   };
   virtual ~ToyPeer() = default;
   virtual void receive(LocalTime now, int port, Span datagram) = 0;
-  /// Called every millisecond.
   virtual void tick(LocalTime now) = 0;
   std::vector<Outgoing> take() { return std::exchange(out_, {}); }
 

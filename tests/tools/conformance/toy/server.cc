@@ -17,7 +17,6 @@ namespace {
 constexpr std::string_view kDevice = "arm";
 constexpr std::string_view kChannel = "wall";
 
-/// Whether the claimed channels exist, and the role is the highest of the claims.
 bool claims_good(const pb::Hello& hello) {
   std::set<pb::Role> roles;
   for (const pb::Claim& claim : hello.claims()) {
@@ -29,7 +28,6 @@ bool claims_good(const pb::Hello& hello) {
   return roles.empty() || *roles.rbegin() == hello.role();
 }
 
-/// Returns the first difference between a leader's options and this follower; empty if there is none.
 std::string difference(const pb::Couple& theirs) {
   if (theirs.role() != pb::PORT_ROLE_LEADER) return "role: follower in both scenes";
   if (theirs.method() != pb::COUPLING_METHOD_POSITION_POSITION) return "method: mine position-position";
@@ -386,7 +384,6 @@ void ToyServer::tick(LocalTime now) {
       if (asked && !is(Fault::kNoColumns)) frames.back() = in_columns(state);
       if (!asked && is(Fault::kColumnsUnasked)) frames.push_back(in_columns(state));
     }
-    // Splits the due frames into datagrams of eight.
     do {
       const auto count = std::min<std::ptrdiff_t>(8, std::ssize(frames));
       const std::vector<pb::Frame> some(frames.begin(), frames.begin() + count);

@@ -13,10 +13,8 @@
 namespace tendon::conformance {
 
 inline std::int64_t ns(LocalTime time) { return time.time_since_epoch().count(); }
-/// Returns a key that starts with the given byte.
 inline Key key_from(std::uint8_t first) { return Key(Bytes32{std::byte{first}, std::byte{0x5A}}); }
 
-/// One side of a toy's open session.
 class ToySession {
  public:
   /// Shorter than in WIRE.md to keep the tests fast.

@@ -11,20 +11,16 @@
 
 namespace tendon::injector {
 
-/// A bounded queue in front of a link that transmits one datagram at a time, for (size + overhead) · 8/rate. With a
-/// Mahimahi trace, the link instead sends 1500 bytes at each delivery opportunity.
-///
-/// Thread-safe: no.
+/// A bounded queue of a link that transmits one datagram at a time in (size + overhead) · 8/rate, or, with a Mahimahi
+/// trace, sends 1500 bytes at each delivery opportunity. Thread-safe: no.
 class BottleneckQueue {
  public:
   /// `bottleneck` must be enabled. The opportunities begin at `start`.
   BottleneckQueue(Bottleneck bottleneck, LocalTime start);
 
-  /// Returns the end of transmission, or nullopt if the queue is full. An `arrival` before the previous one counts as
-  /// the previous one.
+  /// Returns the end of transmission, or nullopt if the queue is full. An earlier `arrival` counts as the previous one.
   std::optional<LocalTime> pass(LocalTime arrival, std::uint32_t size);
 
-  /// Moves the datagrams in the queue of `before` to the head of this queue.
   void continue_from(BottleneckQueue&& before) noexcept;
 
  private:

@@ -68,8 +68,7 @@ TEST(Bottleneck, FifoHoldsForAClockThatGoesBack) {
   EXPECT_EQ(queue.pass(kStart, 125), kStart + 7ms);
 }
 
-/// A direct model of mm-link: each opportunity sends up to 1500 bytes of the waiting datagrams. Returns when the last
-/// byte of each has left.
+/// A direct model of mm-link: each opportunity sends up to 1500 waiting bytes. Returns the time of each last byte.
 std::vector<LocalTime> mm_link(const std::vector<std::uint32_t>& opportunities,
                                const std::vector<std::pair<LocalTime, std::uint64_t>>& datagrams) {
   std::vector<LocalTime> left;

@@ -18,8 +18,6 @@ namespace {
 
 using Piece = QuantileTable::Piece;
 
-// ---- Tables ---------------------------------------------------------------------------------------------------------
-
 constexpr std::int64_t kMost = kMaxDelay.count();
 
 double ns(Duration d) { return static_cast<double>(d.count()); }
@@ -92,8 +90,6 @@ struct Tabulate {
   }
 };
 
-// ---- The copula -----------------------------------------------------------------------------------------------------
-
 constexpr int kZBits = 29;
 constexpr std::int64_t kOneZ = std::int64_t{1} << kZBits;
 constexpr int kRhoBits = 30;
@@ -157,7 +153,7 @@ std::uint64_t integer_root(std::uint64_t n) {
   }
 }
 
-/// Cache key: the parameters of a smooth distribution, or nullopt for the others, whose tables are cheap to build.
+/// The parameters of a smooth distribution, or nullopt for the others, whose tables are cheap to build.
 using Numbers = std::array<std::int64_t, 2>;
 struct NumbersOf {
   std::optional<Numbers> operator()(const NormalDelay& d) const { return {{d.mean.count(), d.deviation.count()}}; }

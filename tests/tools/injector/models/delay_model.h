@@ -9,10 +9,8 @@
 
 namespace tendon::injector {
 
-/// Returns the quantile table of a delay distribution, in nanoseconds. A table of a smooth distribution takes up to a
-/// few milliseconds to build (gamma), so the most recent ones are cached by their parameters.
-///
-/// Thread-safe: yes.
+/// In nanoseconds. The table of a smooth distribution takes up to a few milliseconds to build (gamma), so the most
+/// recent ones are cached by their parameters. Thread-safe: yes.
 QuantileTable delay_table(const Delay& delay);
 
 /// Correlates consecutive uniform draws and keeps each of them uniform, with a Gaussian copula AR(1).
@@ -35,7 +33,6 @@ class Copula {
 
   std::uint64_t next(std::uint64_t draw, LocalTime at) noexcept;
 
-  /// Takes over the state of `before` and keeps this object's correlation.
   void continue_from(const Copula& before) noexcept;
 
  private:

@@ -6,7 +6,6 @@
 
 namespace tendon::injector {
 
-/// The values are stored in recorded runs.
 enum class Direction : std::uint8_t {
   kUp = 0,    ///< client to server
   kDown = 1,  ///< server to client
@@ -60,8 +59,8 @@ class Draws {
   std::uint32_t direction_;
 };
 
-/// A Bernoulli trial with probability p in 0…1 on 64 uniform bits: true if they are below p · 2⁶⁴. A draw that succeeds
-/// at p therefore succeeds at every larger p. p = 0 never succeeds and p = 1 always does.
+/// True if 64 uniform bits are below p · 2⁶⁴, for p in 0…1; a draw that succeeds at p therefore succeeds at every
+/// larger p. p = 0 never succeeds and p = 1 always does.
 class Chance {
  public:
   // Scaling by 2⁶⁴ is exact: only the exponent changes.

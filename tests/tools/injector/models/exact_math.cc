@@ -12,7 +12,6 @@ namespace {
 constexpr double kHalfLogTwoPi = 0.91893853320467274178;  // ln √(2π)
 constexpr double kInverseSqrtTwoPi = 0.39894228040143267794;
 
-/// c₀ + c₁x + c₂x² + …
 constexpr double polynomial(double x, std::span<const double> coefficients) noexcept {
   double sum = 0;
   for (std::size_t i = coefficients.size(); i-- > 0;) sum = sum * x + coefficients[i];
@@ -63,7 +62,7 @@ double log_gamma(double x) noexcept {
   return (x - 0.5) * log(x) - x + kHalfLogTwoPi + polynomial(1 / (x * x), kStirling) / x - log(product);
 }
 
-/// P(a, x) and Q(a, x) = 1 − P: the regularized incomplete gamma functions. Computes the smaller one where possible:
+/// P(a, x) and Q(a, x) = 1 − P, the regularized incomplete gamma functions; computes the smaller one where possible:
 /// the series of P below x = a + 1, the continued fraction of Q above it (Lentz's method).
 struct Shares {
   double below;
@@ -130,7 +129,7 @@ double normal_tail(double z) noexcept {
 
 double gamma_quantile(double shape, double p, double q) noexcept {
   const double log_gamma_shape = log_gamma(shape);
-  // Initial value: near zero the leading term P = x^a/Γ(a + 1), elsewhere Wilson and Hilferty (1931), by whom the cube
+  // Initial value: near zero the leading term P = x^a/Γ(a + 1); elsewhere Wilson and Hilferty (1931), where the cube
   // root is approximately normal.
   double y = (log(p) + log_gamma_shape + log(shape)) / shape;  // y = ln x
   if (y < -690) return 0;
@@ -146,7 +145,7 @@ double gamma_quantile(double shape, double p, double q) noexcept {
     const double share = p < q ? shares.below : shares.above;
     const double step = share / slope * (p < q ? log(p / share) : log(share / q));
     y += std::clamp(step, -2.0, 2.0);
-    if (std::abs(step) < 1e-6) break;  // the next step would be about 1e-12
+    if (std::abs(step) < 1e-6) break;  // the next step is about 1e-12
   }
   return y < -690 ? 0 : exp(y);
 }

@@ -41,11 +41,10 @@ TEST(ExactMath, GammaQuantileInvertsTheClosedFormsOfWholeAndHalfShapes) {
     EXPECT_NEAR(gamma_quantile(1, p, 1 - p) / -std::log1p(-p), 1, 1e-9) << p;
     EXPECT_NEAR(std::erf(std::sqrt(gamma_quantile(0.5, p, 1 - p))) / p, 1, 1e-9) << p;
   }
-  // Far below shape 1, nearly all of the distribution is at zero.
+  // If the shape is much smaller than 1, almost all values are near zero.
   EXPECT_EQ(gamma_quantile(0.01, 1e-12, 1 - 1e-12), 0);
 }
 
-/// Every compiler and libm must give these bits.
 TEST(ExactMath, GivesTheSameBitsEverywhere) {
   std::uint64_t sum = 0;
   const auto feed = [&sum](double x) {

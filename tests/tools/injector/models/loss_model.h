@@ -10,12 +10,8 @@
 
 namespace tendon::injector {
 
-/// Decides which datagrams are lost. The types of Loss in profile.h define the models.
-///
-/// Random loss compares the first draw with p, so a higher p loses a superset of the datagrams. The other models are
-/// Markov chains with a row of transition probabilities for each state.
-///
-/// Thread-safe: no.
+/// Decides which datagrams are lost, by the models of Loss (profile.h). Random loss compares the first draw with p, so
+/// a higher p loses a superset of the datagrams. The others are Markov chains. Thread-safe: no.
 class LossModel {
  public:
   /// `event` and `state` are the purposes of its two draws.

@@ -48,12 +48,12 @@ class QuantileTable {
   int guide_shift_ = 0;
 };
 
-/// Tabulates a smooth quantile function in 4096 equal cells. The outer 16 cells on either side are subdivided into 16
-/// cells for each halving of the tail probability, down to 2⁻⁴⁰ (9e-13), where the table ends. The error is below 5e-4
-/// of the distance over which the tail falls by a factor of e, both in the tails and in the middle.
+/// 4096 equal cells; the outer 16 on either side are subdivided into 16 cells for each halving of the tail probability,
+/// down to 2⁻⁴⁰ (9e-13), where the table ends. The error is below 5e-4 of the distance over which the tail falls by a
+/// factor of e, both in the tails and in the middle.
 ///
-/// `quantile(p, q)` receives the probability p below and q = 1 − p above (the smaller one is exact) and must increase
-/// with p. Its values are clamped to least…most and rounded to integers.
+/// `quantile(p, q)`, for the probability p below and q = 1 − p above (the smaller one is exact), must increase with p.
+/// Its values are clamped to least…most and rounded to integers.
 QuantileTable tabulate(const std::function<double(double p, double q)>& quantile, std::int64_t least,
                        std::int64_t most);
 

@@ -61,7 +61,6 @@ RC_GTEST_PROP(QuantileTable, ALargerDrawNeverGivesLess, (std::uint64_t a, std::u
 }
 
 RC_GTEST_PROP(QuantileTable, IsTheStraightLineOfWholeNumbersThatItSays, ()) {
-  // Compares random pieces with the definition in 128 bits.
   std::map<std::uint64_t, std::uint64_t> widths;
   widths[0] = *rc::gen::inRange<std::uint64_t>(1, std::uint64_t{1} << 37);
   for (int n = *rc::gen::inRange(0, 30); n > 0; --n) {

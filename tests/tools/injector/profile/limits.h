@@ -10,8 +10,8 @@
 
 namespace tendon::injector {
 
-// Limits of a profile. check(Profile) in limits.cc applies all of them. The readers of tables and fields call the
-// functions below, so that errors name the line.
+// check(Profile) applies all limits. The readers of tables and fields call the functions below, so that errors name the
+// line.
 
 inline constexpr std::uint64_t kMaxQueueBytes = std::uint64_t{1} << 30;
 inline constexpr std::uint64_t kMaxRate = 1'000'000'000'000;  ///< bit/s
@@ -19,7 +19,6 @@ inline constexpr std::uint64_t kMaxRate = 1'000'000'000'000;  ///< bit/s
 /// Throws std::invalid_argument if `value` is not in the range [least, most].
 void check_duration(const std::string& field, Duration value, Duration least = {}, Duration most = kMaxDelay);
 
-/// Describes the error in `entry`, which follows `previous`, or returns nullopt.
 std::optional<std::string> complaint(const Weighted* previous, const Weighted& entry);
 
 }  // namespace tendon::injector

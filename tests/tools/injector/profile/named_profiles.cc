@@ -10,10 +10,9 @@
 namespace tendon::injector {
 namespace {
 
-// Each profile names the source of its numbers; other numbers are marked as assumed. Published quantiles come from
-// probes with large intervals. Denser datagrams have longer delays, because FIFO order holds some of them back. The
-// duration of a delay (memory) is never published. It is chosen so that the median delay at 1 kHz is less than twice
-// the published one.
+// Each profile names the source of its numbers; the others are marked as assumed. Published quantiles come from sparse
+// probes; denser datagrams have longer delays, because FIFO order holds some back. The duration of a delay (memory) is
+// never published: it is chosen so that the median delay at 1 kHz is less than twice the published one.
 constexpr std::array<NamedProfile, 8> kProfiles = {{
     // Round trips of 0.46 ms (median), 0.65 ms (99 %), 2.5 ms (maximum) between two hosts on one Ethernet, 5 per
     // second, over an hour; half of it each way.
@@ -26,18 +25,17 @@ constexpr std::array<NamedProfile, 8> kProfiles = {{
      "base=0.4ms delay=lognormal(2.6ms,7.5ms) memory=2s loss=burst(0.05%,2)",
      "base=0.4ms delay=lognormal(2.6ms,7.5ms) memory=2s loss=burst(0.05%,2)"},
 
-    // Sui et al., "Characterizing and improving WiFi latency in large-scale operational networks", MobiSys 2016: the
-    // round trip of the Wi-Fi hop of 47 000 devices on a campus is 3 ms (median), 20 ms (90 %), 250 ms (99 %); half of
-    // it each way, linear between these quantiles. The spike represents a client that scans other channels. It and the
-    // loss are assumed.
+    // Sui et al., "Characterizing and improving WiFi latency in large-scale operational networks", MobiSys 2016: round
+    // trips of 47 000 devices on a campus of 3 ms (median), 20 ms (90 %), 250 ms (99 %); half of it each way, linear in
+    // between. Assumed: the loss, and the spike of a client that scans other channels.
     {"wifi-bad", "one Wi-Fi hop of a crowded campus",
      "delay=histogram(0.5ms:50,1.5ms:40,10ms:9,125ms:1) memory=5s spike(every=60s,for=100ms,60ms) loss=burst(1%,4)",
      "delay=histogram(0.5ms:50,1.5ms:40,10ms:9,125ms:1) memory=5s spike(every=60s,for=100ms,60ms) loss=burst(1%,4)"},
 
     // Fitted by mean and standard deviation to one-way delays of 32-byte UDP every 7 ms over low-latency
     // millimeter-wave 5G: DETERMINISTIC6G measurement data (PD-Wireless-5G-3a), see Ansari et al., "Performance of 5G
-    // trials for industrial automation", Electronics 11(3):412, 2022. The client has the radio. The data contain no
-    // losses, and none are assumed.
+    // trials for industrial automation", Electronics 11(3):412, 2022. The client has the radio. No losses, as in the
+    // data.
     {"5g-urllc", "5G millimetre wave, set up for low latency", "base=0.27ms delay=gamma(0.417ms,0.098ms) memory=10ms",
      "base=0.4ms delay=lognormal(0.376ms,0.123ms) memory=10ms"},
 
@@ -55,9 +53,8 @@ constexpr std::array<NamedProfile, 8> kProfiles = {{
     // arXiv:2601.08439 (Aalborg, 500 one-way probes per second over Starlink): cycles of 15 s, with higher latency in
     // the last 75 ms and the first 140 ms of each. Michel et al., "A first look at Starlink performance", IMC 2022:
     // round trips from Belgium to European servers of 50 ms (median), 40 to 60 ms (quartiles), 20 ms (minimum). Kassem
-    // et al., "A browser-side view of Starlink connectivity", IMC 2022: losses coincide with handovers. Assumed: the
-    // handover duration of 20 ms, the extra latency at the boundaries, and the division of the round trip into up and
-    // down.
+    // et al., "A browser-side view of Starlink connectivity", IMC 2022: losses coincide with handovers. Assumed:
+    // handovers of 20 ms, the extra latency at the boundaries, and the division into up and down.
     {"leo-satellite", "low earth orbit, like Starlink",
      "base=10ms delay=gamma(17ms,6ms) memory=1s spike(at=14.925s,every=15s,for=215ms,25ms) "
      "handover(every=15s,for=20ms,5ms) loss=burst(0.3%,3)",

@@ -23,8 +23,8 @@ std::span<const NamedProfile> named_profiles();
 /// For example "lan, wifi-good, …".
 std::string names_of_profiles();
 
-/// Parses a profile given by the user: a line, a name, or a name followed by a line of changes ("wifi-bad loss=5%").
-/// Throws std::invalid_argument if the profile is not valid.
+/// Parses a line, a name, or a name and a line of changes ("wifi-bad loss=5%"). Throws std::invalid_argument if the
+/// profile is not valid.
 Profile resolve_profile(std::string_view text, Direction direction);
 
 }  // namespace tendon::injector

@@ -59,7 +59,6 @@ std::uint64_t whole(const std::string& field, std::string_view text, std::uint64
   return *value;
 }
 
-/// Parses inline VALUE:WEIGHT,…; returns nullopt if the arguments have another form.
 std::optional<std::vector<Weighted>> inline_table(const Call& c) {
   std::vector<Weighted> table;
   for (std::string_view entry : c.arguments) {
@@ -234,7 +233,6 @@ constexpr std::string_view kFields =
     "base, delay, rho, memory, loss, drop(…), regime(…), step(…), ramp(…), spike(…), stall(…), handover(…), outage(…), "
     "duplicate, replay(…), flip, truncate, rebind(…), order, jump(…), rate, opportunities(…), queue or overhead";
 
-/// "field=value". Returns false for an unknown field.
 bool set_field(Profile& p, const std::string& field, std::string_view value) {
   if (field == "base") {
     p.base = duration(field, value);
@@ -270,7 +268,6 @@ bool set_field(Profile& p, const std::string& field, std::string_view value) {
   return true;
 }
 
-/// The form of each event, for errors.
 constexpr std::array<std::string_view, 8> kEvents = {"drop(byte=16,mask=0x0f,value=3,50%)",
                                                      "regime(NAME,dwell=4s,delay=…,loss=…)",
                                                      "step(at=5s,20ms)",
@@ -280,7 +277,6 @@ constexpr std::array<std::string_view, 8> kEvents = {"drop(byte=16,mask=0x0f,val
                                                      "handover(every=15s,for=60ms,10ms)",
                                                      "outage(at=5s,for=300ms)"};
 
-/// "field(…)". Returns false for an unknown field.
 bool add_event(Profile& p, const Call& c) {
   const auto* const form =
       std::ranges::find_if(kEvents, [&](std::string_view event) { return event.substr(0, event.find('(')) == c.name; });
@@ -317,7 +313,6 @@ bool add_event(Profile& p, const Call& c) {
   return true;
 }
 
-/// "field(…)", at most once. Returns false for an unknown field.
 bool set_call(Profile& p, const Call& c) {
   if (c.name == "replay") {
     c.expect(2, "replay(1%,64)");

@@ -13,16 +13,14 @@
 
 namespace tendon::injector {
 
-// ---- How long a datagram takes --------------------------------------------------------------------------------------
-
-/// A value, or the lower edge of a bin, with its share or count. Weights are relative to their sum.
+/// A value, or the lower edge of a bin. Weights are relative to their sum.
 struct Weighted {
   Duration value{};
   double weight = 0;
   bool operator==(const Weighted&) const = default;
 };
 
-// One-way delays, clamped to 0 … kMaxDelay.
+// Clamped to 0 … kMaxDelay.
 
 struct ConstantDelay {  ///< delay=20ms
   Duration value{};
@@ -67,14 +65,12 @@ struct SampledDelay {
 using Delay = std::variant<ConstantDelay, UniformDelay, NormalDelay, ExponentialDelay, LognormalDelay, ParetoDelay,
                            GammaDelay, HistogramDelay, SampledDelay>;
 
-// ---- Who is lost ----------------------------------------------------------------------------------------------------
-
 struct RandomLoss {  ///< loss=2%: independent losses
   double probability = 0;
   bool operator==(const RandomLoss&) const = default;
 };
-/// loss=burst(2%,4): loss rate and mean burst length, as a Gilbert chain with P(G→B) = p/(1 − p)/L and P(B→G) = 1/L (as
-/// WebRTC's SimulatedNetwork).
+/// loss=burst(2%,4): a Gilbert chain of this loss rate and mean burst length L, with P(G→B) = p/(1 − p)/L and P(B→G) =
+/// 1/L (as WebRTC's SimulatedNetwork).
 struct BurstLoss {
   double probability = 0;
   double length = 1;
@@ -82,8 +78,7 @@ struct BurstLoss {
 };
 /// loss=gilbert(P,R,BAD,GOOD): the Gilbert-Elliott chain. P = P(G→B), R = P(B→G) per datagram; the loss probability is
 /// BAD (netem's 1−h) in B and GOOD (netem's 1−k) in G. As in the kernel, the state before the transition decides.
-/// Unlike the kernel, the chain starts in its stationary distribution instead of G, so that short runs are not better
-/// than long ones.
+/// Unlike there, the chain starts in its stationary distribution, so that short runs are not better than long ones.
 struct GilbertLoss {
   double to_bad = 0, to_good = 1, lost_in_bad = 1, lost_in_good = 0;
   bool operator==(const GilbertLoss&) const = default;
@@ -101,8 +96,7 @@ struct PatternLoss {  ///< loss=pattern(0001): 1 is lost; starts with the first 
 };
 using Loss = std::variant<RandomLoss, BurstLoss, GilbertLoss, FourStateLoss, PatternLoss>;
 
-/// drop(byte=16,mask=0xf,value=3,50%): datagrams with (payload[byte] & mask) == value are lost with this probability,
-/// for losses by message type.
+/// drop(byte=16,mask=0xf,value=3,50%): datagrams with (payload[byte] & mask) == value are lost with this probability.
 struct DropRule {
   std::uint32_t byte = 0;
   std::uint8_t mask = 0xff;
@@ -111,7 +105,6 @@ struct DropRule {
   bool operator==(const DropRule&) const = default;
 };
 
-// ---- What changes with time -----------------------------------------------------------------------------------------
 // Times count from the activation of the profile, for the first profile from the injector's start.
 
 /// regime(NAME,dwell=4s,delay=…,loss=…): a state of a continuous-time Markov chain that is independent of the traffic.
@@ -162,9 +155,7 @@ struct Outage {  ///< outage(at=5s,for=300ms): arrivals in the window are lost
   bool operator==(const Outage&) const = default;
 };
 
-// ---- Copies, damage, order ------------------------------------------------------------------------------------------
-
-struct Replay {  ///< replay(1%,64): with this probability one of the last 64 datagrams is sent once more
+struct Replay {  ///< replay(1%,64): sends one of the last 64 datagrams again with this probability
   double probability = 0;
   std::uint32_t depth = 0;
   bool operator==(const Replay&) const = default;
@@ -181,13 +172,9 @@ enum class Order : std::uint8_t {
   kFree,  ///< order=free: each leaves after its own delay, as in netem
 };
 
-// ---- The bottleneck -------------------------------------------------------------------------------------------------
-
 /// rate=10Mbit/s or opportunities(FILE), queue=64kB or queue=50packets, overhead=28. A datagram costs its payload plus
-/// the overhead. If the queue is full, it is dropped (tail drop). The queue includes the datagram in transmission.
-///
-/// There is no head drop, because its effect on a datagram and its successors depends on later arrivals, whereas a
-/// decision is final.
+/// the overhead. A full queue, which includes the datagram in transmission, drops it (tail drop). There is no head
+/// drop, because it would depend on later arrivals, whereas a decision is final.
 struct Bottleneck {
   std::uint64_t bits_per_second = 0;  ///< zero: none
   /// Mahimahi's packet-delivery opportunities (mm-link): up to 1500 bytes leave at each of these times, in ms.
@@ -200,8 +187,8 @@ struct Bottleneck {
   bool operator==(const Bottleneck&) const = default;
 };
 
-/// The behavior of a bad network in one direction. The text form is one line, with fields in any order, each at most
-/// once except drop, regime, step, ramp, spike, stall, handover and outage:
+/// The behavior of a bad network in one direction. As text, one line with fields in any order, each at most once except
+/// drop, regime, step, ramp, spike, stall, handover and outage:
 ///
 ///     base=5ms delay=lognormal(20ms,5ms) rho=0.9 loss=burst(2%,4) spike(every=15s,for=50ms,80ms) rate=10Mbit/s
 ///     queue=64kB
@@ -210,8 +197,8 @@ struct Bottleneck {
 struct Profile {
   Duration base{};  ///< base=5ms: constant delay
   Delay delay;
-  /// Correlation of consecutive delays: a Gaussian copula AR(1), z' = ρz + √(1 − ρ²)e, delay = F⁻¹(Φ(z)), which keeps
-  /// the distribution of delays exact for every ρ. By packet (rho=0.9), or by time (memory=20ms): ρ = exp(−Δt/memory).
+  /// Correlation of consecutive delays: a Gaussian copula AR(1) (see Copula), which keeps their distribution exact. By
+  /// packet (rho=0.9), or by time (memory=20ms): ρ = exp(−Δt/memory).
   double rho = 0;
   Duration memory{};  ///< zero: none
   Loss loss;
@@ -247,23 +234,22 @@ inline constexpr std::size_t kMaxValues = 65'536;
 /// The longest traces of Mahimahi are 15 minutes of LTE: 700 000 opportunities.
 inline constexpr std::size_t kMaxOpportunities = 1'000'000;
 
-/// Maximum distance of a stale replay, and the number of datagrams that a driver stores.
 inline constexpr std::uint32_t kMaxReplayDepth = 64;
 inline constexpr std::uint32_t kMaxJump = 64;
 
-/// Throws std::invalid_argument that names field, value and expected format if `profile` is invalid, for example "loss
-/// is 150%, expected a probability from 0% to 100%".
+/// Throws std::invalid_argument if `profile` is invalid, for example "loss is 150%, expected a probability from 0% to
+/// 100%".
 void check(const Profile& profile);
 
-/// Formats a profile as one line without default values. Tables are written inline (histogram(0.56ms:72,…)), so that
-/// the line suffices to reproduce a run. parse_profile(to_string(p)) == p exactly for every p that passes check().
+/// One line without default values; tables are inline (histogram(0.56ms:72,…)). parse_profile(to_string(p)) == p
+/// exactly for every p that passes check().
 std::string to_string(const Profile& profile);
 
-/// Parses a profile line and reads the files that it names. Throws std::invalid_argument that names field, value and
-/// expected format. The result has passed check().
+/// Reads the files that the line names. Throws std::invalid_argument that names field, value and expected format. The
+/// result has passed check().
 Profile parse_profile(std::string_view line);
 
-/// Applies the line to a profile: fields replace the existing ones, events are added.
+/// Fields replace those of `onto`, events are added.
 Profile parse_profile(std::string_view line, Profile onto);
 
 }  // namespace tendon::injector

@@ -116,8 +116,6 @@ TEST(Profile, OnTopOfAnotherReplacesFieldsAndAddsEvents) {
             parse_profile("base=5ms loss=3% rho=0.5 outage(at=1s,for=1s) outage(at=5s,for=1s) rate=1kbit/s"));
 }
 
-// ---- Any profile ----------------------------------------------------------------------------------------------------
-
 double any_probability() { return static_cast<double>(*rc::gen::arbitrary<std::uint64_t>()) / 18446744073709551616.0; }
 Duration any_duration(std::int64_t least = 0, std::int64_t most = kMaxDelay.count()) {
   return Duration(*rc::gen::inRange<std::int64_t>(least, most + 1));
@@ -240,8 +238,6 @@ RC_GTEST_PROP(Profile, AnyTextIsReadOrRefusedAndNothingElseHappens, ()) {
   }
 }
 
-// ---- Refusals -------------------------------------------------------------------------------------------------------
-
 TEST(Profile, RefusesTheImpossibleByFieldValueAndExpectation) {
   expect_refusals(
       Profile{}, check,
@@ -305,8 +301,6 @@ TEST(Profile, RefusesALineItDoesNotUnderstandAndSaysWhere) {
     EXPECT_EQ(complaint_about(line), complaint) << line;
   }
 }
-
-// ---- Files ----------------------------------------------------------------------------------------------------------
 
 TEST(ProfileFiles, AHistogramMayHaveTabsCommasSemicolonsBlanksAndComments) {
   const std::string begin = "# edge in ms, count\n";

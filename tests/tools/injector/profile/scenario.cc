@@ -33,7 +33,6 @@ void append(std::string& text, std::string_view key, std::string_view value) {
       text, [](char c) { return c == '\n' || c == '\r'; }, ' ');
 }
 
-/// Adds a profile or a note to a change, and to its text.
 struct ChangeText {
   std::string_view key;
 
@@ -66,7 +65,6 @@ void declare_profiles(Table& keys, Change& change, const scene_file::Absent& abs
   keys.key("down", change, ChangeText{"down"}, "Profile from server to client", absent);
 }
 
-/// parse_scenario() checks the conditions that depend on several keys.
 template <class Table>
 void declare_scenario(Table& scenario, Scenario& to, Change& begin) {
   using scene_file::kRequired;

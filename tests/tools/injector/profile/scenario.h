@@ -34,7 +34,7 @@ namespace tendon::injector {
 // activation.
 
 struct Change {
-  std::optional<std::uint32_t> link;  ///< only this link; empty: all links
+  std::optional<std::uint32_t> link;  ///< if this is empty, all links
   std::optional<Profile> up, down;    ///< empty: unchanged
   std::string text;                   ///< the change in its author's words, on one line: "link 2 both wifi-bad"
   bool operator==(const Change&) const = default;
@@ -58,17 +58,14 @@ inline constexpr std::size_t kMaxChanges = 86'400;
 
 inline constexpr std::uint32_t kMaxLink = 65'535;
 
-/// Parses a scenario file. Throws std::runtime_error that names file, line and key for any error, including unknown
-/// keys: "storm.toml:9: at[0].both: expected a profile, found "loss=150%": loss is 150%, expected a probability from 0%
-/// to 100%".
+/// Throws std::runtime_error that names file, line and key for any error, including unknown keys: "storm.toml:9:
+/// at[0].both: expected a profile, found "loss=150%": loss is 150%, expected a probability from 0% to 100%".
 Scenario read_scenario(const std::filesystem::path& path);
 /// Parses a text. `name` replaces the file name in errors.
 Scenario parse_scenario(std::string_view toml, const std::string& name);
 
-/// The documentation of all keys.
 std::string scenario_reference();
 
-/// Commands other than a Change.
 enum class Request : std::uint8_t {
   kStats,
   kHelp,
@@ -88,15 +85,13 @@ Command parse_command(std::string_view line);
 
 std::string command_help();
 
-/// Plays a scenario and accepts changes at run time. Drivers query it for the profile of a new link, and pass each
-/// change to the existing injectors:
+/// Plays a scenario and accepts changes at run time. A driver passes each change to the existing injectors:
 ///
 ///     while (auto due = scenario.next_due(now))          // before any datagram of `now` is decided
 ///       for (each link and direction that due->change concerns)
 ///         injector.change(scenario.weather(direction, link).profile, due->at);
 ///
-/// A change applies to datagrams that arrive at its time or later. The result does not depend on when the driver polls,
-/// as long as it polls before each decision.
+/// A change applies to datagrams that arrive at its time or later, whenever the driver polls before each decision.
 ///
 /// Thread-safe: no.
 class ScenarioPlayer {
@@ -107,20 +102,17 @@ class ScenarioPlayer {
     LocalTime at{};
     Change change;
   };
-  /// Removes, applies and returns the next change of the script that is due at `now`, or nullopt.
   std::optional<Due> next_due(LocalTime now);
 
-  /// Returns when next_due next has a result, or nullopt after the last change.
   std::optional<LocalTime> next_wake() const;
 
-  /// Applies a change that is not part of the script.
   void change(const Change& change, LocalTime now);
 
   struct Weather {
     Profile profile;
     LocalTime since{};  ///< origin of its times
   };
-  /// The network of this link; the reference is valid until the next change.
+  /// Valid until the next change.
   const Weather& weather(Direction direction, std::uint32_t link) const;
 
  private:

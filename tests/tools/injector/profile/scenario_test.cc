@@ -130,7 +130,6 @@ TEST(Scenario, TheReferenceNamesEveryKeyThatTheFileMayHave) {
   }
 }
 
-// The decisions do not depend on how often the driver polls for changes.
 TEST(Scenario, InVirtualTimeTheSameSeedMeetsTheSameFates) {
   const auto run = [](Duration poll) {
     const Scenario scenario = parse_scenario(kStorm, "storm.toml");

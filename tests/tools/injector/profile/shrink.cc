@@ -66,7 +66,6 @@ class Shrinking {
   }
 
  private:
-  /// Returns false if the number of runs is exceeded, which stops the reduction.
   bool still_fails(const Part& part) {
     if (runs_ == max_runs_) return false;
     ++runs_;

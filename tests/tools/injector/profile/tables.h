@@ -24,14 +24,12 @@ void for_each_line(const std::filesystem::path& file, const std::string& expecte
 /// Reads a table with two columns, LOWER_EDGE_MS and COUNT. The edges must increase. A header is allowed.
 std::vector<Weighted> histogram_from_csv(const std::filesystem::path& file);
 
-/// Reads a list of delays with open_delays(). It ignores lost datagrams. The column `weight` is optional.
+/// Reads open_delays(), without lost datagrams. The column `weight` is optional.
 std::vector<Weighted> samples_from_csv(const std::filesystem::path& file);
 
-/// A list of delays for samples(FILE) and `tendon-inject import csv`. It has one row for each datagram. If the delay is
-/// empty, the datagram was lost.
-///
-/// The header names the columns t_ms, delay_ms, dir and weight. Other columns are ignored, and times in other units are
-/// converted. If there is no header, the list has one column with the delays in ms, and a blank line is an empty delay.
+/// For samples(FILE) and `tendon-inject import csv`: one row for each datagram, with an empty delay if it was lost. The
+/// header names the columns t_ms, delay_ms, dir and weight; others are ignored, times in other units are converted.
+/// Without a header there is one column with the delays in ms, and a blank line is an empty delay.
 struct DelayList {
   TableReader table;
   TableReader::Column delay;                  ///< ms
@@ -40,15 +38,13 @@ struct DelayList {
   std::optional<std::size_t> dir;             ///< up or down
 };
 
-/// Opens a list of delays and reads its first line. Throws std::runtime_error if the input is malformed. The error
-/// message starts with `name`. Rejects two columns without a header, which could be a time and a delay, or one delay
-/// with a decimal comma.
+/// Reads the first line. Throws std::runtime_error that begins with `name` if the input is malformed. Rejects two
+/// columns without a header, which could be a time and a delay, or one delay with a decimal comma.
 DelayList open_delays(std::istream& from, const std::string& name);
 
-/// Reads a table of netem (iproute2's *.dist): integers in units of a standard deviation/8192.
+/// iproute2's *.dist: integers in units of a standard deviation/8192.
 std::vector<Weighted> netem_table(const std::filesystem::path& file, Duration mean, Duration deviation);
 
-/// Sorts the values and merges equal ones.
 std::vector<Weighted> merged(std::vector<Weighted> values);
 
 }  // namespace tendon::injector

@@ -11,7 +11,6 @@
 
 namespace tendon::injector {
 
-/// The position of a time relative to the repetitions of a window.
 struct WindowState {
   bool open = false;
   std::uint64_t begun = 0;  ///< number of repetitions begun, including an open one
@@ -21,8 +20,7 @@ WindowState state_of(const Window& window, Duration since) noexcept;
 
 // Effects of a profile's events on a datagram that arrives at `since` after the profile's activation.
 
-/// The sum of steps, ramps, spikes and path changes after handovers. The draw of the n-th handover depends on n, not on
-/// the traffic.
+/// Sum of steps, ramps, spikes and path changes after handovers. The n-th handover's draw depends only on n.
 Duration extra_delay(const Profile& profile, Duration since, const Draws& draws) noexcept;
 bool in_outage(const Profile& profile, Duration since) noexcept;
 bool in_handover(const Profile& profile, Duration since) noexcept;
@@ -30,16 +28,13 @@ bool in_handover(const Profile& profile, Duration since) noexcept;
 /// Delays a release at `since` to the end of its stall, repeatedly if that is within another one (at most 1000 times).
 Duration past_stalls(const Profile& profile, Duration since) noexcept;
 
-/// The active regime: a continuous-time Markov chain that depends only on the seed.
-///
-/// Thread-safe: no.
+/// A continuous-time Markov chain that depends only on the seed. Thread-safe: no.
 class RegimeChain {
  public:
-  /// Starts at `start` with the first of `regimes`, which must outlive the chain. `first_visit` is the index of the
-  /// first draw.
+  /// Starts with the first of `regimes`, which must outlive the chain. `first_visit`: index of the first draw.
   RegimeChain(const std::vector<Regime>& regimes, const Draws& draws, LocalTime start, std::uint64_t first_visit);
 
-  /// The index of the regime at `now`, which must not decrease. Costs about 30 ns for each change since the last call.
+  /// `now` must not decrease. Costs about 30 ns for each change since the last call.
   std::size_t at(LocalTime now);
 
   std::uint64_t next_visit() const { return visit_ + 1; }

@@ -10,8 +10,7 @@
 
 namespace tendon::injector {
 
-/// Numbers with units in profiles, scenarios and traces. The parsers consume the whole text or return nullopt. The text
-/// functions write values that parse back exactly.
+/// The parsers consume the whole text or return nullopt. The text functions write values that parse back exactly.
 
 std::optional<double> parse_number(std::string_view text);
 std::string number_text(double value);  ///< the shortest that parses back exactly
@@ -19,7 +18,7 @@ std::string number_text(double value);  ///< the shortest that parses back exact
 /// A nonnegative integer, "64" or "0x40".
 std::optional<std::uint64_t> parse_whole(std::string_view text);
 
-/// Parses a number with a unit (ns, us, ms, s). The value is rounded to nanoseconds and must not exceed a day.
+/// With a unit (ns, us, ms, s). The value is rounded to nanoseconds and must not exceed a day.
 std::optional<Duration> parse_duration(std::string_view text);
 std::string duration_text(Duration duration);  ///< whole seconds in s, all else in ms with up to six decimals
 

@@ -34,7 +34,7 @@ sockaddr_un address_of(const std::filesystem::path& path) {
   return address;
 }
 
-/// Returns a new socket connected to `path`, or −1 with errno set.
+/// −1 with errno set.
 int connect_to(const std::filesystem::path& path) {
   const sockaddr_un address = address_of(path);
   const int fd = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
@@ -45,7 +45,7 @@ int connect_to(const std::filesystem::path& path) {
   return -1;
 }
 
-/// Returns false if the peer has closed the connection or, without blocking, its buffer is full.
+/// Returns false if the peer has closed the connection or its buffer is full.
 bool send_all(int fd, std::string_view text, int flags) {
   while (!text.empty()) {
     const ssize_t sent = ::send(fd, text.data(), text.size(), MSG_NOSIGNAL | flags);
@@ -119,7 +119,6 @@ bool ControlSocket::serve(Client& client, const std::function<std::string(std::s
     if (got < 0 && (errno == EAGAIN || errno == EWOULDBLOCK)) break;
     open = got > 0;
     if (open) client.text.append(piece.data(), static_cast<std::size_t>(got));
-    // Accepts a last line without a line break at the end of the stream.
     if (!open && !client.text.empty() && client.text.back() != '\n') client.text += '\n';
     std::size_t begin = 0;
     for (std::size_t end; (end = client.text.find('\n', begin)) != std::string::npos; begin = end + 1) {

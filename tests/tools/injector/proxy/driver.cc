@@ -27,13 +27,11 @@ constexpr std::uint64_t kBell = kListener + 2;
 
 /// Copying the histograms takes some 10 µs, and a display needs only a few updates per second.
 constexpr Duration kPublishPeriod = std::chrono::milliseconds(200);
-/// Publishes only if the next release is at least this far away.
 constexpr Duration kPublishRoom = std::chrono::microseconds(100);
 
 /// Time without an answer before the next address is tried. A client repeats its Hello every 100 ms.
 constexpr Duration kServerPatience = std::chrono::milliseconds(500);
 
-/// Returns true if one system call can send both.
 bool by_the_same_socket(const TraceRecord& a, const TraceRecord& b) {
   if (a.direction != b.direction) return false;
   return a.direction == Direction::kDown || (a.link == b.link && a.rebinds == b.rebinds);
@@ -266,7 +264,6 @@ std::bitset<kUdpBatch> Driver::send_with(std::size_t first, const std::bitset<kU
   for (std::size_t k = 0; k < count; ++k) {
     const Proxy::Departure& departure = due_[places[k]];
     // The kernel processes the datagrams of a call one by one, so their departures are spread evenly over its duration.
-    // The time from then until the receiver wakes counts as network time.
     const LocalTime left = begin + took * static_cast<std::int64_t>(k) / static_cast<std::int64_t>(count);
     refused.test(k) ? proxy_.not_sent(departure) : proxy_.left(departure, left);
   }

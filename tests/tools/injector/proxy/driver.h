@@ -20,30 +20,28 @@
 
 namespace tendon::injector {
 
-/// Connects a Proxy to sockets and the clock. The thread that calls run() receives the datagrams and sends them at
-/// their release time. It does not print, open files, build tables or wait for a lock.
+/// Connects a Proxy to sockets and the clock. The thread of run() receives the datagrams and sends them at their
+/// release time. It does not print, open files, build tables or wait for a lock.
 class Driver {
  public:
   struct Config {
     Address listen;
-    /// The addresses of the server, in order of preference. Each is tried for half a second in turn until the server
-    /// answers.
+    /// The server's addresses, each tried for half a second in turn until it answers.
     std::vector<Address> servers;
     Proxy::Config proxy;
 
-    /// Busy-waits for this long before each release, which is more exact but uses the processor. Zero: sleeps until the
-    /// release.
+    /// The time of the busy-wait before each release. If it is zero, the thread sleeps, which is less exact.
     Duration spin{};
 
     /// Priority 1…99 of SCHED_FIFO for the thread that calls run().
     std::optional<int> realtime = {};
 
-    /// None: runs until stop().
+    /// None: until stop().
     std::optional<Duration> duration = {};
   };
 
-  /// Opens the sockets. Throws std::runtime_error as UdpBatch does and std::invalid_argument as Proxy does. `recorder`
-  /// can be null; it receives every decision and must outlive the driver.
+  /// Throws std::runtime_error as UdpBatch does and std::invalid_argument as Proxy does. `recorder` receives all
+  /// decisions and must outlive the driver. It can be null.
   Driver(const Config& config, TraceRecorder* recorder);
   ~Driver();
   Driver(const Driver&) = delete;
@@ -53,7 +51,7 @@ class Driver {
   /// the system refuses a priority or a descriptor.
   void run();
 
-  // The following functions can be called from other threads, before, during and after run().
+  // Other threads can call the following functions at any time.
 
   /// Async-signal-safe.
   void stop() noexcept;
@@ -70,7 +68,6 @@ class Driver {
     std::uint32_t rebinds = 0;
     Address asked_at{};  ///< the local address to which the client sends, if the listener is bound to all addresses
   };
-  /// The reason for the next wake-up.
   enum class Wake : std::uint8_t { kOther, kRelease, kProbe };
 
   void wait(LocalTime now);

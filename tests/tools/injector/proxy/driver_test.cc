@@ -33,7 +33,6 @@ bool eventually(Condition condition) {
   return false;
 }
 
-/// Sends and receives strings as datagrams.
 class Peer {
  public:
   explicit Peer(UdpBatch socket) : socket_(std::move(socket)) {}
@@ -72,7 +71,6 @@ class Peer {
   std::vector<Got> waiting_;
 };
 
-/// Runs a driver in a thread.
 class Running {
  public:
   Running(const Address& server, const std::string& up, const std::string& down = "",
@@ -87,7 +85,6 @@ class Running {
                 nullptr),
         thread_([this] { driver_.run(); }) {}
   ~Running() { stop(); }
-  /// Returns the final status.
   Status stop() {
     driver_.stop();
     if (thread_.joinable()) thread_.join();
@@ -103,7 +100,6 @@ class Running {
 
 Peer server(const std::string& address = "127.0.0.1:0") { return Peer(UdpBatch::listening(parse_address(address))); }
 
-/// Sends a datagram to the server and back. Returns the address of the client as the server sees it.
 Address expect_round_trip(Peer& client, Peer& server_end, const std::string& text) {
   client.send(text);
   const auto got = server_end.receive().value_or(Peer::Got{"nothing came", {}});
@@ -205,7 +201,6 @@ TEST(Driver, ListeningOnAllAddressesItAnswersFromTheOneThatWasAsked) {
     std::vector<std::string> hosts = {"127.0.0.1", "127.0.0.2", "127.0.0.3"};
     if (std::string(all) == "[::]:0") hosts.emplace_back("[::1]");
     for (const std::string& host : hosts) {
-      // The socket is connected, so the kernel drops datagrams from any other address.
       Peer client(UdpBatch::connected(parse_address(host + port)));
       SCOPED_TRACE(all + (' ' + host));
       expect_round_trip(client, server_end, "ping");
@@ -239,7 +234,6 @@ TEST(Driver, GoesOnToTheNextAddressOfAServerThatDoesNotAnswer) {
   EXPECT_FALSE(is_unanswered(end));
 }
 
-/// Uses up the file descriptors of this process.
 class NoMoreFiles {
  public:
   NoMoreFiles() {

@@ -11,7 +11,6 @@
 namespace tendon::injector {
 namespace {
 
-/// Bytes buffered before each write.
 constexpr std::size_t kPiece = 1 << 16;
 
 void append(std::string& text, std::integral auto number) {
@@ -19,7 +18,6 @@ void append(std::string& text, std::integral auto number) {
   text.append(digits.data(), std::to_chars(digits.data(), digits.data() + digits.size(), number).ptr);
 }
 
-/// "12.345678"
 void append_ms(std::string& text, Duration d) {
   append(text, d.count() / 1'000'000);
   std::array<char, 8> rest{'.', '0', '0', '0', '0', '0', '0', '0'};
@@ -63,7 +61,6 @@ void append_text(std::string& text, const TraceRecord& record) {
   text += '\n';
 }
 
-/// The decider of one direction with its timeline.
 class Way {
  public:
   Way(const PreparedNetwork& network, Direction direction) : timeline_(network.timeline), direction_(direction) {
@@ -117,7 +114,7 @@ void dry_run(const PreparedNetwork& network, const DryRun& options, std::ostream
     if (text.size() < kPiece) continue;
     out << text;
     text.clear();
-    if (!out) return;  // the reader has closed the pipe
+    if (!out) return;  // the pipe was closed by the reader
   }
   out << text << std::flush;
 }

@@ -8,7 +8,6 @@
 
 namespace tendon::injector {
 
-/// Simulates packets with a fixed size and a fixed rate, without sockets.
 struct DryRun {
   std::uint64_t count = 10'000;  ///< the total number of packets in both directions
   std::uint64_t rate_hz = 1000;  ///< in each direction, 1…10⁹
@@ -18,8 +17,8 @@ struct DryRun {
 
 /// Writes one line per packet, in the order of sending. As JSON:
 ///     {"dir":"up","index":0,"t_in_ns":0,"verdict":"pass","cause":"delay","t_out_ns":20123456}
-/// t_out_ns is null for a dropped packet, and the time of the first copy for a duplicated one. Times count from the
-/// first packet. Also writes all decisions to `trace` unless it is null.
+/// t_out_ns is null for a dropped packet, and the time of the first copy for a duplicated one. All times are relative
+/// to the first packet. `trace` can be null.
 void dry_run(const PreparedNetwork& network, const DryRun& options, std::ostream& out, TraceWriter* trace);
 
 }  // namespace tendon::injector

@@ -7,7 +7,6 @@
 namespace tendon::injector {
 namespace {
 
-/// The bucket is determined by the 6 leading bits of `ns`. There is one bucket for each value below 64.
 std::size_t bucket_of(std::uint64_t ns) noexcept {
   if (ns < 64) return ns;
   const auto shift = static_cast<std::size_t>(std::bit_width(ns)) - 6;

@@ -9,22 +9,20 @@
 
 namespace tendon::injector {
 
-/// A histogram of durations in fixed memory. Quantiles are exact below 64 ns and at most 1/32 too high above: there are
-/// 32 buckets for each power of two, and the upper edge is returned. The maximum is exact. Negative durations count as
-/// zero.
+/// Durations in fixed memory, with 32 buckets for each power of two. Quantiles are exact below 64 ns. Otherwise, they
+/// are the upper edge of a bucket and at most 1/32 too high. The maximum is exact. Negative durations count as zero.
 ///
 /// Thread-safe: no.
 class DurationHistogram {
  public:
   void observe(Duration length) noexcept;
 
-  /// Returns the q-quantile (q in 0…1), or zero if the histogram is empty.
+  /// q in 0…1; zero if empty.
   Duration quantile(double q) const noexcept;
   Duration max() const noexcept { return max_; }
   std::uint64_t count() const noexcept { return count_; }
 
-  /// Returns the observations since `earlier`, a previous copy of this histogram. Its maximum is the upper edge of a
-  /// bucket.
+  /// `earlier`: a previous copy of this histogram. The maximum of the result is the upper edge of a bucket.
   DurationHistogram since(const DurationHistogram& earlier) const noexcept;
 
  private:

@@ -17,13 +17,9 @@
 
 namespace tendon::injector {
 
-/// The most recent datagrams of one direction of one link, for stale replays. It copies every datagram, so use it only
-/// if the profile has replays.
-///
-/// Thread-safe: no.
+/// The most recent datagrams of one flow, for stale replays. It copies every datagram. Thread-safe: no.
 class History {
  public:
-  /// The maximum distance of a replay, in datagrams.
   static constexpr std::size_t kDepth = kMaxReplayDepth;
 
   void remember(std::span<const std::byte> datagram) {
@@ -42,7 +38,6 @@ class History {
   std::size_t count_ = 0;
 };
 
-/// The type of a datagram that is sent due to a decision.
 enum class Copy : std::uint8_t {
   kFirst,  ///< the datagram itself, with the damage of the decision
   kSecond,
@@ -50,12 +45,8 @@ enum class Copy : std::uint8_t {
 };
 
 /// The datagrams in flight, ordered by due time and then by launch. Applies a Decision: copies, stale replays,
-/// truncation and bit flips. `Tag` is data of the sender, for example the destination, and is returned with the
-/// datagram.
-///
-/// Does not allocate in the steady state, because it reuses slots and buffers (powers of two, 64 bytes … 64 kB).
-///
-/// Thread-safe: no.
+/// truncation and bit flips. `Tag` is data of the sender. Does not allocate in the steady state, because it reuses
+/// slots and buffers (powers of two, 64 bytes … 64 kB). Thread-safe: no.
 template <class Tag>
 class Flight {
  public:
@@ -65,9 +56,8 @@ class Flight {
   /// `max_bytes` limits buffers and bookkeeping of the datagrams in flight.
   explicit Flight(std::size_t max_bytes = kDefaultMaxBytes) : max_bytes_(max_bytes) {}
 
-  /// Queues the copies of `datagram` for which `decision` asks. `history` belongs to the direction and link of the
-  /// datagram; null disables stale replays. Omits a copy that exceeds the memory limit. Returns false if the datagram
-  /// itself exceeded it.
+  /// `history`: of the datagram's flow; null disables stale replays. Omits a copy that exceeds the memory limit.
+  /// Returns false if the datagram itself exceeded it.
   bool launch(const Decision& decision, std::span<const std::byte> datagram, const Tag& tag,
               History* history = nullptr) {
     bool fits = true;
@@ -95,7 +85,6 @@ class Flight {
     LocalTime due{};
     std::span<const std::byte> datagram;  ///< valid until the next launch
   };
-  /// Removes and returns the next datagram due at `now`, or nullopt.
   std::optional<Departure> next_due(LocalTime now) {
     if (heap_.empty() || heap_.front().due > now) return std::nullopt;
     const Waiting next = heap_.front();
@@ -146,7 +135,6 @@ class Flight {
     return (kSmallestBuffer << size_class) + sizeof(Place) + sizeof(Waiting);
   }
 
-  /// Returns the copy's bytes, or null if it exceeds the memory limit.
   std::byte* take_off(std::span<const std::byte> datagram, LocalTime due, Copy copy, const Tag& tag) {
     const std::uint8_t size_class = size_class_of(datagram.size());
     if (size_class >= kSizeClasses || cost(size_class) > max_bytes_ - bytes_) return nullptr;
@@ -182,8 +170,7 @@ class Flight {
     return buffer;
   }
 
-  /// Frees all unused buffers. Otherwise, after a lasting change of datagram sizes, buffers of the old sizes would
-  /// remain allocated.
+  /// Otherwise, after a lasting change of datagram sizes, buffers of the old sizes would remain allocated.
   void give_back() {
     for (std::size_t size_class = 0; size_class < kSizeClasses; ++size_class) {
       held_ -= free_buffers_[size_class].size() * (kSmallestBuffer << size_class);

@@ -172,7 +172,6 @@ TEST(Flight, RefusesWhatDoesNotFitAndTakesItAgainWhenThereIsRoom) {
   while (flight.next_due(kStart + 1s)) {
   }
   EXPECT_EQ(flight.bytes(), 0U);
-  // Buffers of another size replace unused ones only.
   EXPECT_TRUE(flight.launch(passes(1ms), std::vector<std::byte>(100), 5));
   EXPECT_TRUE(flight.launch(passes(1ms), std::vector<std::byte>(4000), 6));
   EXPECT_EQ(flight.size(), 2U);

@@ -31,7 +31,6 @@
 namespace tendon::injector {
 namespace {
 
-/// The interval at which the driver publishes its status.
 constexpr Duration kRedrawPeriod = std::chrono::milliseconds(200);
 constexpr Duration kReportPeriod = std::chrono::seconds(1);
 constexpr Duration kRefusedPeriod = std::chrono::seconds(10);
@@ -42,7 +41,6 @@ void request_stop(int /*signal*/) {
   if (Driver* const driver = driver_to_stop) driver->stop();
 }
 
-/// For its lifetime, lets SIGINT and SIGTERM stop the driver, and ignores SIGPIPE.
 class Signals {
  public:
   explicit Signals(Driver& driver) {
@@ -141,7 +139,6 @@ Driver::Config driver_config(const PreparedNetwork& network, const LiveRun& opti
           .duration = options.duration};
 }
 
-/// Terminal, reports and control socket while the driver runs.
 class Conversation {
  public:
   Conversation(const PreparedNetwork& network, const LiveRun& options, const Address& server, Driver& driver,
@@ -248,7 +245,6 @@ class Conversation {
     tell_of_refused(status);
   }
 
-  /// Reports the first refused client immediately and later ones every few seconds.
   void tell_of_refused(const Status& status) {
     const std::uint64_t refused = status.of(Direction::kUp).counters.refused_clients;
     const LocalTime now = monotonic_now();
@@ -272,7 +268,6 @@ class Conversation {
     }
   }
 
-  /// Records the completed steps of the timeline in the trace.
   void note_changes(const Status& status) {
     for (; noted_ < status.scenario_done; ++noted_) {
       if (recorder_ != nullptr) recorder_->note(network_.timeline[noted_].change.text);

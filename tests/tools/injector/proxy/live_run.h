@@ -13,8 +13,8 @@
 
 namespace tendon::injector {
 
-/// The measured virtual machines wake a thread about 35 µs after its timer (p50). With this margin the proxy releases
-/// most datagrams on time. This uses at most 10 % of a core for a haptic loop at 1 kHz.
+/// The measured virtual machines wake a thread about 35 µs after its timer (p50), so most releases are on time. This
+/// uses at most 10 % of a core for a haptic loop at 1 kHz.
 inline constexpr Duration kSpin = std::chrono::microseconds(50);
 
 struct LiveRun {

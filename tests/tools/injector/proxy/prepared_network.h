@@ -27,7 +27,7 @@ struct NetworkOptions {
   std::optional<std::uint64_t> seed = {};
 };
 
-/// A network with all files read and all tables built.
+/// All files are read and all tables built.
 struct PreparedNetwork {
   std::uint64_t seed = 0;
   std::array<Injector, 2> networks;  ///< by Direction
@@ -39,8 +39,8 @@ struct PreparedNetwork {
   TraceHeader header() const;
 };
 
-/// Throws std::invalid_argument that names the option or file, the value and the expected format. Picks a seed if
-/// neither the options nor the scenario contain one.
+/// Throws std::invalid_argument that names the option or file, the value and the expected format. Picks a seed if none
+/// is given.
 PreparedNetwork prepare(const NetworkOptions& options);
 
 Proxy::PreparedChange prepare(const Change& change, std::uint64_t seed);

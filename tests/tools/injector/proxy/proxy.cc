@@ -13,7 +13,7 @@ std::uint64_t ProxyCounters::lost() const noexcept {
   return std::accumulate(dropped.begin(), dropped.end(), std::uint64_t{0});
 }
 
-/// Client addresses often differ only in the port, so the bytes are mixed to spread consecutive ports.
+/// Mixes the bytes, because client addresses often differ only in the port.
 std::size_t Proxy::AddressHash::operator()(const Address& address) const noexcept {
   std::uint64_t high = 0;
   std::uint64_t low = 0;

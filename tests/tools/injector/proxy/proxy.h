@@ -22,14 +22,12 @@
 
 namespace tendon::injector {
 
-/// Numbers the clients from 0 in order of their first datagram. An index is never reused. It is the `link` of the
-/// client's injectors and of its lines in a trace.
+/// Clients are numbered from 0 by their first datagram; no index is reused. It is the `link` of injectors and traces.
 using ClientIndex = std::uint32_t;
 
 inline constexpr std::size_t kCauses = static_cast<std::size_t>(Cause::kReplay) + 1;
 
-/// Counts of datagrams in one direction since the start. Each received datagram is refused, dropped, forwarded, unsent
-/// or still in flight.
+/// Datagrams of one direction: each received one is refused, dropped, forwarded, unsent or still in flight.
 struct ProxyCounters {
   std::uint64_t received = 0;
   std::uint64_t refused_clients = 0;             ///< from clients that could not be added or have been forgotten
@@ -80,15 +78,13 @@ class Proxy {
 
     std::vector<Step> timeline = {};
 
-    /// Replays these decisions instead of `networks` and `timeline`. Must outlive the proxy.
+    /// Replayed instead of `networks` and `timeline`. Must outlive the proxy.
     const Trace* replay = nullptr;
     TracePlayer::By replay_by = TracePlayer::By::kIndex;
 
-    /// Keeps a TraceRecord of every decision, see records().
     bool record = false;
 
-    /// The maximum number of clients. Datagrams from additional clients are ignored. The driver needs one socket for
-    /// each client.
+    /// Datagrams from additional clients are ignored.
     std::size_t max_clients = 64;
 
     /// Forgets a client after this silence, once none of its datagrams are in flight. NATs keep a UDP mapping for 30 s
@@ -99,13 +95,12 @@ class Proxy {
     std::size_t max_bytes_in_flight = Flight<int>::kDefaultMaxBytes;
   };
 
-  /// Throws std::invalid_argument as TracePlayer does.
+  /// Throws std::invalid_argument if TracePlayer does.
   explicit Proxy(Config config);
 
   bool is_new(const Address& client) const;
 
-  /// Receives a datagram from a client to the server. Returns the index of the client, or nothing if the datagram was
-  /// refused because there are too many clients or `may_add` is false.
+  /// Returns nothing if the datagram was refused because there are too many clients or `may_add` is false.
   std::optional<ClientIndex> receive_from_client(const Address& client, std::span<const std::byte> datagram,
                                                  LocalTime arrival, bool may_add = true);
 
@@ -118,8 +113,7 @@ class Proxy {
     std::span<const std::byte> datagram;  ///< valid until the next datagram is received
     TraceRecord record;
   };
-  /// Removes and returns the next datagram due at `now`, ordered by due time and then arrival, or nullopt. Report the
-  /// result to `left` or `not_sent`.
+  /// The next datagram due at `now`, by due time and then arrival. Report the result to `left` or `not_sent`.
   std::optional<Departure> next_due(LocalTime now);
 
   void left(const Departure& departure, LocalTime now);
@@ -128,21 +122,17 @@ class Proxy {
   /// Has no effect while a trace is replayed.
   void change(const PreparedChange& change, LocalTime now);
 
-  /// Applies the due changes of the timeline, for timely display. Each datagram meets the changes due at its arrival
-  /// without this call.
+  /// Applies the due changes of the timeline, only for timely display: each datagram meets those due at its arrival.
   void follow_timeline(LocalTime now);
 
-  /// Forgets one idle client and returns its index, so that the driver can close its socket. Returns nullopt if no
-  /// (further) client is idle.
+  /// Forgets one idle client, so that the driver can close its socket.
   std::optional<ClientIndex> next_evicted(LocalTime now);
 
-  /// Returns when next_due or next_evicted next has a result, or nullopt if nothing is in flight and there are no
-  /// clients.
+  /// When next_due or next_evicted next has a result; nullopt if nothing is in flight and there are no clients.
   std::optional<LocalTime> next_wake() const;
 
-  /// The decisions completed since the caller last cleared this vector. A dropped datagram's decision is complete on
-  /// arrival, others on departure. The times are relative to the first datagram. The vector is empty if Config::record
-  /// is not set.
+  /// Decisions since the caller last cleared this vector, if Config::record is set. A dropped datagram's is complete on
+  /// arrival, others on departure. Times are relative to the first datagram.
   std::vector<TraceRecord>& records() noexcept { return records_; }
 
   const ProxyMeasurements& measurements(Direction direction) const { return measurements_[index_of(direction)]; }
@@ -192,7 +182,6 @@ class Proxy {
   };
   std::array<std::optional<LocalTime>, 2> changed_;              // when config_.networks last changed, by Direction
   std::array<std::map<ClientIndex, Network>, 2> of_one_client_;  // networks that differ from config_.networks, by
-                                                                 // Direction
   std::string last_change_;
   std::size_t steps_done_ = 0;
   std::unordered_map<ClientIndex, std::unique_ptr<Client>> clients_;

@@ -293,7 +293,7 @@ TEST(Proxy, AnOutageHitsAllClientsAtTheSameTimeWheneverTheyCame) {
   EXPECT_EQ(departures(proxy, kStart + 1s), (Lines{"a@0>server", "z@8>server", "b@15>server", "b@15>server"}));
 }
 
-/// A run with 300 datagrams that starts at `begin`. Each datagram is sent 7 µs after its release time.
+/// Each of the 300 datagrams is sent 7 µs after its release time.
 struct Recorded {
   Lines left;
   Trace trace;

@@ -26,7 +26,7 @@ struct Status {
   DurationHistogram timer_floor;
 
   std::uint64_t overflowed = 0;  ///< dropped by the kernel because the receive buffer was full
-  std::uint64_t unrecorded = 0;  ///< number of decisions that were not recorded because the disk was too slow
+  std::uint64_t unrecorded = 0;  ///< number of decisions that were lost because the disk was too slow
   std::size_t scenario_steps = 0;
   std::size_t scenario_done = 0;
   std::string last_change;  ///< the last change of the network
@@ -34,19 +34,17 @@ struct Status {
   std::string no_socket;           ///< the first error of opening a socket for a client, or empty
   std::uint64_t late_rebinds = 0;  ///< datagrams sent from the old port because the new one could not be opened
 
-  /// Quantiles are up to 3 % too high.
+  /// The error of the quantiles is at most 3 %.
   const ProxyMeasurements& of(Direction direction) const { return directions[static_cast<std::size_t>(direction)]; }
 };
 
-/// Returns true if datagrams were sent to the server, but nothing was received.
+/// Datagrams were sent to the server, but nothing was received.
 bool is_unanswered(const Status& status) noexcept;
 
-/// At a haptic period of 1 ms, a datagram released this late arrives one step late, so the run no longer reproduces the
-/// requested network.
+/// At a haptic period of 1 ms, such a datagram arrives one step late, so the run is not the requested network.
 inline constexpr Duration kMaxReleaseError = std::chrono::milliseconds(1);
 
-/// Returns sentences that explain why a run did not reproduce the requested network, or nothing for a valid run.
-/// `max_release_error` limits the 99th percentile in either direction.
+/// Sentences for the user; none for a valid run. `max_release_error` limits the 99th percentile in either direction.
 std::vector<std::string> why_invalid(const Status& status, Duration max_release_error);
 
 /// Totals since the start, whether valid or not:

@@ -14,7 +14,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-/// Returns the status after 1000 datagrams. The release error is 2 ms for `late` datagrams and 40 µs for the others.
+/// After 1000 datagrams. The release error is 2 ms for `late` datagrams and 40 µs for the others.
 Status status(int late) {
   Status s;
   s.elapsed = 10s;

@@ -83,7 +83,6 @@ std::optional<std::string> Terminal::next_line() {
     unread_.erase(0, 1);
     if (c == '\n' || c == '\r') return std::exchange(typed_, {});
     if (c == '\b' || c == '\x7f') {
-      // Removes a whole UTF-8 character.
       while (!typed_.empty() && (static_cast<unsigned char>(typed_.back()) & 0xc0) == 0x80) typed_.pop_back();
       if (!typed_.empty()) typed_.pop_back();
     } else if (c == '\x15') {  // ^U

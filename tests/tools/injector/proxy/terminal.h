@@ -11,8 +11,7 @@
 
 namespace tendon::injector {
 
-/// The controlling terminal: a picture that is redrawn in place, with the line that the user is typing. ^C and ^Z keep
-/// their function.
+/// A picture that is redrawn in place, with the line that the user is typing. ^C and ^Z keep their function.
 ///
 /// Thread-safe: no.
 class Terminal {
@@ -21,17 +20,15 @@ class Terminal {
   static std::unique_ptr<Terminal> take();
   Terminal(const Terminal&) = delete;
   Terminal& operator=(const Terminal&) = delete;
-  /// Restores the state of the terminal.
   ~Terminal();
 
   std::size_t columns() const;
 
-  /// Draws `lines` over the previous picture. They must not exceed columns(). If they do not fit on the screen, lines
-  /// above the last one are omitted.
+  /// Lines must not exceed columns(). If they do not fit on the screen, lines above the last one are omitted.
   void draw(std::string_view lines);
 
   static int fd();
-  /// Returns a complete line if the user has typed one. Never blocks.
+  /// Never blocks.
   std::optional<std::string> next_line();
   const std::string& typed() const noexcept { return typed_; }
 

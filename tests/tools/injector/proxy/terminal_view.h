@@ -18,13 +18,11 @@ struct Heading {
   Duration max_release_error{};
 };
 
-/// The terminal display, as lines no wider than `columns`. Shows for each direction the rate, one-way delays, losses,
-/// copies and release errors since `before`, then totals by cause, clients and the scenario's step. The last line is
-/// the user's incomplete input.
+/// Lines no wider than `columns`: for each direction the rate, one-way delays, losses, copies and release errors since
+/// `before`, then totals by cause, clients and the scenario's step. The last line is the user's incomplete input.
 std::string terminal_view(const Heading& heading, const Status& now, const Status& before, const std::string& typed,
                           std::size_t columns);
 
-/// The same as one line for a log.
 std::string log_line(const Status& now, const Status& before);
 
 std::string end_text(const Heading& heading, const Status& end);

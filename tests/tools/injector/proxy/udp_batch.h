@@ -12,17 +12,14 @@
 
 namespace tendon::injector {
 
-/// Maximum datagrams per system call. More would be hardly faster, and due datagrams would wait behind incoming ones.
+/// More would be hardly faster, and due datagrams would wait behind incoming ones.
 inline constexpr std::size_t kUdpBatch = 64;
 
-/// One non-blocking UDP socket, IPv4 or IPv6, that receives and sends in batches (recvmmsg(2), sendmmsg(2)).
-///
-/// Thread-safe: no.
+/// A non-blocking UDP socket, IPv4 or IPv6, with recvmmsg(2) and sendmmsg(2). Thread-safe: no.
 class UdpBatch {
  public:
-  /// Binds to `address`. 0.0.0.0 means all IPv4 addresses, and [::] means all addresses of both families. If the port
-  /// is 0, the system chooses one. Throws std::runtime_error on failure, for example "cannot listen on 127.0.0.1:47100:
-  /// Address already in use".
+  /// 0.0.0.0: all IPv4 addresses; [::]: all of both families; port 0: any free one. Throws std::runtime_error on
+  /// failure, for example "cannot listen on 127.0.0.1:47100: Address already in use".
   static UdpBatch listening(const Address& address);
 
   /// Opens a socket on a free port that exchanges datagrams only with `server`. Throws std::runtime_error on failure.
@@ -41,9 +38,8 @@ class UdpBatch {
   /// Memory for one batch of arrivals. Several sockets can share it if they receive one after the other.
   class Inbox;
 
-  /// Receives up to kUdpBatch datagrams, which are valid until `inbox` is used again. Arrival times are at most the
-  /// current time. If the kernel's stamp is more than a second old, the real-time clock was set, and the arrival is the
-  /// time of this call.
+  /// The datagrams are valid until `inbox` is used again. Arrival times are at most the current time; it replaces a
+  /// stamp more than a second old, because then the real-time clock was set.
   std::span<const Arrival> receive(Inbox& inbox);
 
   struct Outgoing {
@@ -55,8 +51,7 @@ class UdpBatch {
   /// larger than the path allows), which are skipped.
   std::bitset<kUdpBatch> send(std::span<const Outgoing> batch);
 
-  /// Datagrams that the kernel dropped because the receive buffer was full (SO_RXQ_OVFL), as of the last received
-  /// datagram.
+  /// Drops due to a full receive buffer (SO_RXQ_OVFL), as of the last received datagram.
   std::uint64_t overflowed() const noexcept { return overflowed_; }
 
   Address local_address() const;

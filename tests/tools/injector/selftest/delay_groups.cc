@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-// Distributions of delays, their correlation, and the independence of streams.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -134,8 +133,7 @@ std::vector<Check> check_delays(std::string_view line, const Cdf& law, double rh
   if (!continuous) return checks;
   const auto n = static_cast<double>(samples.size());
   if (rho == 0) {
-    // Counts the tails, to which the Kolmogorov distance is insensitive. About 100 are expected, enough for the normal
-    // approximation.
+    // The Kolmogorov distance is insensitive to tails. About 100 are expected, enough for the normal approximation.
     const double far = std::max(1e-4, 100 / n);
     const auto high = std::ranges::count_if(samples, [&](double x) { return law(x) > 1 - far; });
     const auto low = std::ranges::count_if(samples, [&](double x) { return law(x) < far; });

@@ -12,21 +12,18 @@
 
 namespace tendon::injector {
 
-// Compares samples and counts with their laws. `model` is the profile line, `what` the statistic. A correct injector
-// exceeds a bound with a probability of 1e-7.
+// `model` is the profile line, `what` the statistic. A correct injector exceeds a bound with a probability of 1e-7.
 
-/// The two-sided quantile of the normal distribution for that probability, in standard deviations.
+/// The two-sided quantile of the normal distribution for that probability.
 double most_deviations();
 
 /// Kolmogorov distance of `samples` from `law`. `independent` is their effective number of independent samples.
 Check kolmogorov(std::string model, std::string what, std::vector<double> samples, const Cdf& law, double independent);
 Check kolmogorov(std::string model, std::string what, const std::vector<double>& samples, const Cdf& law);
 
-/// Pearson's chi-square of `counts` against the `shares` of their cells.
 Check pearson(std::string model, std::string what, std::span<const std::uint64_t> counts,
               std::span<const double> shares);
 
-/// Absolute deviation of the rate of `happened` out of n events of probability p.
 Check rate(std::string model, std::string what, double happened, double n, double p, double variance_factor = 1);
 
 Check none(std::string model, std::string what, std::size_t deviations);
@@ -35,14 +32,11 @@ Check none(std::string model, std::string what, std::size_t deviations);
 std::vector<Check> check_events(const std::string& model, const std::string& what, const std::vector<bool>& events,
                                 const LossChain& chain);
 
-/// Innovations of a Gaussian copula, which should be independent standard normal variates. rho(t) is the correlation
-/// between t − 1 and t.
+/// Of a Gaussian copula; should be independent standard normal. rho(t) is the correlation between t − 1 and t.
 std::vector<double> innovations(const std::vector<double>& z, const std::function<double(std::size_t)>& rho);
 
-/// Φ⁻¹(law(sample)) of each.
 std::vector<double> normal_scores(std::vector<double> samples, const Cdf& law);
 
-/// Checks that innovations are standard normal and independent.
 std::vector<Check> check_innovations(const std::string& model, const std::vector<double>& independent);
 
 std::vector<double> even_shares(std::size_t cells);

@@ -8,8 +8,7 @@
 
 namespace tendon::injector {
 
-// Groups of checks in the order of `selftest`. Each group compares the decisions of the injector with the expected
-// distribution.
+// In the order of `selftest`. Each group compares the decisions of the injector with the expected distribution.
 
 /// A delay model as text, and its distribution function in ns.
 struct DelayLaw {
@@ -22,12 +21,10 @@ std::vector<DelayLaw> delay_laws();
 std::vector<Check> all_delays(const SelftestOptions& options);
 /// Correlation by time, ρ = exp(−Δt / memory), for datagrams at irregular intervals.
 std::vector<Check> memory(const SelftestOptions& options);
-/// First datagrams of many links: processes start in their stationary distribution, and links are independent.
+/// Processes start in their stationary distribution, and links are independent.
 std::vector<Check> first_datagrams(const SelftestOptions& options);
-/// Independence of two streams of delays.
 std::vector<Check> independence(const SelftestOptions& options);
 std::vector<Check> all_losses(const SelftestOptions& options);
-/// Loss does not change delays.
 std::vector<Check> separation(const SelftestOptions& options);
 std::vector<Check> regimes(const SelftestOptions& options);
 std::vector<Check> order(const SelftestOptions& options);

@@ -44,8 +44,7 @@ Row scaled_to_one(Row row) {
   return row;
 }
 
-/// From a datagram of the given `kind` with state distribution `row`: the state distribution of the first datagram that
-/// is not of this kind.
+/// From a datagram of this `kind` with distribution `row`: the distribution of the first one that is not of it.
 Row after_run(Row row, const LossChain& chain, const Row& kind) {
   Row result(row.size());
   while (sum(row) > kNothing) {
@@ -102,8 +101,7 @@ LossChain LossChain::regimes(const std::vector<double>& dwell, double period, st
 }
 
 std::vector<double> LossChain::shares() const {
-  // Gauss–Jordan elimination on πS = π with one equation replaced by Σπ = 1. Unlike iteration, it also works for
-  // periodic chains.
+  // Gauss–Jordan on πS = π with one equation replaced by Σπ = 1. Unlike iteration, it also works for periodic chains.
   const std::size_t n = loss.size();
   std::vector<Row> rows(n, Row(n + 1));
   for (std::size_t i = 0; i < n; ++i) {
@@ -157,7 +155,6 @@ std::vector<double> LossChain::bursts(std::size_t longest) const {
 
 std::size_t LossChain::bursts_to_forget() const {
   std::vector<Row> starts;  // one for each state in which a burst can begin: the distribution of the state in which a
-                            // later one begins
   for (std::size_t i = 0; i < loss.size(); ++i) {
     Row state(loss.size());
     state[i] = 1;

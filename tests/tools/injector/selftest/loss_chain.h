@@ -6,16 +6,13 @@
 
 namespace tendon::injector {
 
-/// A hidden Markov chain of losses with its stationary statistics in closed form. It is the oracle for every loss
-/// model, because each of them is such a chain. In state i a datagram is lost with probability loss[i]; the chain then
-/// goes to j with probability step[i][j]. Every state must be reachable from every other.
-///
-/// Thread-safe: yes, once made.
+/// A hidden Markov chain with its statistics in closed form, the oracle of every loss model. In state i a datagram is
+/// lost with probability loss[i]; the chain then goes to j with probability step[i][j]. Every state must be reachable
+/// from every other. Thread-safe: yes, once made.
 struct LossChain {
   std::vector<std::vector<double>> step;
   std::vector<double> loss;
 
-  /// Independent losses with probability p.
   static LossChain bernoulli(double p);
   /// Loss rate `loss` in bursts of `mean_burst` datagrams: Gilbert 1960 with r = 1 / mean_burst, p = r · loss / (1 −
   /// loss), as WebRTC's SimulatedNetwork.

@@ -13,7 +13,6 @@
 namespace tendon::injector::loss_chain_test {
 namespace {
 
-/// A Monte Carlo simulation of the chain.
 std::vector<bool> played(const LossChain& chain, std::size_t n, std::uint64_t seed) {
   Dice dice(seed);
   std::size_t state = 0;

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-// Order, copies, damage and the bottleneck.
 #include <algorithm>
 #include <cmath>
 #include <deque>
@@ -20,8 +19,7 @@ using std::chrono::milliseconds;
 
 namespace {
 
-/// An independent simulation of a queue of `places` datagrams of equal cost. Returns each departure, or nullopt if the
-/// queue was full.
+/// An independent queue of `places` datagrams of equal cost. Returns each departure, or nullopt if it was full.
 class FifoQueue {
  public:
   FifoQueue(Duration service, std::size_t places) : service_(service), places_(places) {}
@@ -166,8 +164,8 @@ std::vector<Check> bottleneck(const SelftestOptions& options) {
        [&](std::size_t, const Decision& decision) { off += delay(decision) == kService ? 0U : 1U; });
   checks.push_back(none(idle, "waits in a queue that is never full", off));
 
-  // Three opportunities in 10 ms carry 4500 bytes, for datagrams of 1000 bytes at twice that rate. An opportunity can
-  // end within a datagram; the k-th leaves when 1000 (k + 1) bytes have been carried.
+  // Three opportunities in 10 ms carry 4500 bytes, for 1000-byte datagrams at twice that rate. An opportunity can end
+  // within a datagram; the k-th leaves when 1000 (k + 1) bytes have been carried.
   Profile opportunities = parse_profile("overhead=28 queue=20packets");
   opportunities.bottleneck.opportunities_ms = {3, 4, 10};
   const std::string line = "opportunities at 3, 4, 10 ms, queue=20packets";

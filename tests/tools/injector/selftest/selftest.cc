@@ -17,7 +17,7 @@
 namespace tendon::injector {
 namespace {
 
-constexpr std::size_t kFewest = 1000;  // datagrams; with fewer, the checks have no power
+constexpr std::size_t kFewest = 1000;  // datagrams; the checks need at least this number
 
 struct Histogram {
   std::filesystem::path file;

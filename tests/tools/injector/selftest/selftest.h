@@ -15,19 +15,18 @@
 
 namespace tendon::injector {
 
-/// `tendon-inject selftest`: compares many decisions of each model with its law in closed form. The laws use doubles
-/// and libm and share no code with the decision core.
+/// Compares many decisions of each model with its law in closed form. The laws use doubles and libm and share no code
+/// with the decision core.
 struct SelftestOptions {
   std::size_t count = 1'000'000;
   std::uint64_t seed = 7;
-  /// A folder: each histogram in it (*.csv, recursively) adds a model.
+  /// Each histogram in this folder (*.csv, recursively) adds a model.
   std::optional<std::filesystem::path> data = {};
   bool json = false;
 };
 
-/// A measured number and its bound. The bound of exact quantities (times of events, order) is 0 deviations or 1 ns. A
-/// correct injector exceeds the bound of a random quantity with a probability of 1e-7, so some hundred checks fail for
-/// one seed in 100 000.
+/// The bound of exact quantities (times of events, order) is 0 deviations or 1 ns. A correct injector exceeds that of a
+/// random one with a probability of 1e-7, so some hundred checks fail for one seed in 100 000.
 struct Check {
   std::string model;  ///< a profile line
   std::string statistic;
@@ -37,24 +36,23 @@ struct Check {
   bool passed() const { return value <= bound; }  // false for NaN
 };
 
-/// Checks delays of `line` at 1 kHz against the law F (in ns) with the Kolmogorov distance. If F is continuous, also
-/// checks the AR(1) Gaussian copula with this rho: with z = Φ⁻¹(F(delay)), the lag-1 autocorrelation of z, and the
-/// innovations (z_t − ρ z_{t−1}) / √(1 − ρ²), which must be independent standard normal variates. The bound of their
-/// Kolmogorov distance does not depend on the correlation.
+/// Kolmogorov distance of the delays of `line` at 1 kHz from the law F (in ns). If F is continuous, also the AR(1)
+/// Gaussian copula with this rho: with z = Φ⁻¹(F(delay)), the lag-1 autocorrelation of z, and the innovations (z_t − ρ
+/// z_{t−1}) / √(1 − ρ²), which must be independent standard normal variates. Their bound does not depend on the
+/// correlation.
 std::vector<Check> check_delays(std::string_view line, const Cdf& law, double rho, bool continuous,
                                 const SelftestOptions& options);
 
-/// Checks the rate and the burst lengths (chi-square) of the losses of `line` against a chain.
+/// Rate and burst lengths (chi-square).
 std::vector<Check> check_losses(std::string_view line, const LossChain& chain, const SelftestOptions& options);
 
-/// The law, in ns, of a measured histogram. A line is the lower edge of a bin in ms and its share or count; linear
-/// within a bin; the last bin is as wide as its predecessor. Parses independently of the injector. Returns nullopt if
-/// the file is not a histogram.
+/// In ns. A line is the lower edge of a bin in ms and its share or count; linear within a bin; the last bin is as wide
+/// as its predecessor. Independent of the injector's parser. Returns nullopt if the file is not a histogram.
 std::optional<Cdf> histogram_law(const std::filesystem::path& path);
 
-/// Runs all checks and writes a line for each when it completes (model, statistic, value, bound, PASS or FAIL, or one
-/// JSON object), and a line with the totals. Returns true if all have passed. Throws std::invalid_argument if the count
-/// is below 1000, and std::runtime_error if `data` is not a folder or contains no histogram.
+/// Writes a line for each check (model, statistic, value, bound, PASS or FAIL, or one JSON object) and the totals.
+/// Returns true if all have passed. Throws std::invalid_argument if the count is below 1000, and std::runtime_error if
+/// `data` is not a folder or contains no histogram.
 bool selftest(const SelftestOptions& options, std::ostream& out);
 
 }  // namespace tendon::injector

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// The self-test passes, and detects slightly wrong laws. $TENDON_SELFTEST_COUNT is the number of datagrams for each
-// model of the whole run (a million in the release build); $TENDON_DATA is the folder of histograms.
+// $TENDON_SELFTEST_COUNT: datagrams for each model (a million in the release build). $TENDON_DATA: folder of
+// histograms.
 #include "tests/tools/injector/selftest/selftest.h"
 
 #include <gtest/gtest.h>
@@ -102,8 +101,6 @@ TEST(SelfTest, RefusesAFolderWithoutHistograms) {
   std::ostringstream out;
   EXPECT_THROW(selftest({.count = 1000, .data = "/nowhere"}, out), std::runtime_error);
 }
-
-// ---- How far the named profiles are from what was measured ----------------------------------------------------------
 
 struct Fit {
   const char* profile;

@@ -141,7 +141,7 @@ std::vector<std::uint64_t> run_lengths(const std::vector<bool>& events, std::siz
   std::vector<std::uint64_t> counts;
   std::size_t runs = 0;
   std::size_t length = 0;
-  bool whole = false;  // it began after something that was not an event
+  bool whole = false;
   for (const bool event : events) {
     if (event) {
       ++length;
@@ -167,7 +167,7 @@ double normal_cdf(double x) { return std::erfc(-x / std::numbers::sqrt2) / 2; }
 double normal_quantile(double p) {
   if (p <= 0) return -std::numeric_limits<double>::infinity();
   if (p >= 1) return std::numeric_limits<double>::infinity();
-  // Symmetry for the upper half. It is as exact as 1 − p.
+  // Symmetry for the upper half. The result is as accurate as 1 − p.
   if (p > 0.5) return -normal_quantile(1 - p);
   constexpr std::array kA = {-3.969683028665376e+01, 2.209460984245205e+02,  -2.759285104469687e+02,
                              1.383577518672690e+02,  -3.066479806614716e+01, 2.506628277459239e+00};

@@ -9,14 +9,13 @@
 
 namespace tendon::injector {
 
-// Statistics of the self-test: distances of samples from a law, and their bounds under chance. Uses doubles and
-// <cmath>, which is allowed because no decision depends on them. The functions have no state. Sample values can have
-// any unit that the law has.
+// Distances of samples from a law, and their bounds under chance. No decision depends on them, so doubles and <cmath>
+// are allowed.
 
-/// A cumulative distribution function F(x) = P(X ≤ x), which may have steps.
+/// F(x) = P(X ≤ x), which may have steps.
 using Cdf = std::function<double(double)>;
 
-/// Kolmogorov-Smirnov distance sup |Fₙ(x) − F(x)| of ascending samples from a law; exact for steps. 0 without samples.
+/// sup |Fₙ(x) − F(x)| of ascending samples; exact for steps. 0 without samples.
 double kolmogorov_distance(std::span<const double> ascending, const Cdf& law);
 
 /// Bound that the distance of n independent samples of the law exceeds with probability `significance` at most:
@@ -28,8 +27,7 @@ double kolmogorov_bound(double n, double significance);
 /// Effective number of independent samples of an AR(1) Gaussian copula of length n, at the median, where it is
 /// smallest:
 ///     n / (1 + 2 Σ_k (2/π) asin ρᵏ),  k = 1 … n − 1       as P(z₀ < 0, z_k < 0) = 1/4 + asin(ρᵏ) / 2π (Sheppard 1899)
-/// A first-order correction: the supremum over a dependent path has another distribution, so the resulting bounds are
-/// approximate.
+/// Approximate, because the supremum over a dependent path has another distribution.
 double independent_samples(std::size_t n, double rho);
 
 /// Pearson's Σ (observed − expected)² / expected, and the degrees of freedom.
@@ -38,27 +36,25 @@ struct ChiSquare {
   std::size_t freedom = 0;
 };
 
-/// Compares counts with the probabilities of their cells, which should sum to 1. Merges neighboring cells until each
-/// expects at least ten. With fewer than two cells left, returns {0, 0}.
+/// The probabilities should sum to 1. Merges neighboring cells until each expects at least ten. With fewer than two
+/// cells left, returns {0, 0}.
 ChiSquare chi_square(std::span<const std::uint64_t> counts, std::span<const double> probabilities);
 
-/// P(X ≥ value) for a chi-square law: the p-value. 1 if freedom is 0.
+/// P(X ≥ value), the p-value; 1 if freedom is 0.
 double chi_square_tail(double value, std::size_t freedom);
 
 /// The value that a chi-square law exceeds with probability `significance`. 0 if freedom is 0.
 double chi_square_bound(std::size_t freedom, double significance);
 
-/// Autocorrelation at `lag`:
-///     Σ (x_t − x̄)(x_{t+lag} − x̄) / Σ (x_t − x̄)².  0 if all samples are equal or there are not more than `lag`.
+/// Σ (x_t − x̄)(x_{t+lag} − x̄) / Σ (x_t − x̄)².  0 if all samples are equal or there are not more than `lag`.
 double autocorrelation(std::span<const double> samples, std::size_t lag);
 
-/// Histogram of the lengths of runs of `true`: [k − 1] counts the runs of exactly k. Omits runs at either end, which
-/// may be incomplete. Uses only each `every`-th run, starting with that one.
+/// [k − 1] counts the runs of exactly k `true`. Omits runs at either end, which may be incomplete. Uses only each
+/// `every`-th run, starting with that one.
 std::vector<std::uint64_t> run_lengths(const std::vector<bool>& events, std::size_t every = 1);
 
-/// The regularized incomplete gamma function P(a, x) = ∫₀ˣ t^(a−1) e^(−t) dt / Γ(a), a > 0: the CDF of a gamma variate
-/// of shape a and scale 1. Series below a + 1, Lentz's continued fraction above (Press et al., Numerical Recipes, 6.2);
-/// relative error below 1e-12. 0 for x ≤ 0.
+/// P(a, x) = ∫₀ˣ t^(a−1) e^(−t) dt / Γ(a), a > 0, regularized. Series below a + 1, Lentz's continued fraction above
+/// (Press et al., Numerical Recipes, 6.2); relative error below 1e-12. 0 for x ≤ 0.
 double incomplete_gamma(double a, double x);
 
 double normal_cdf(double x);

@@ -103,7 +103,6 @@ TEST(Statistics, ChiSquareMergesCellsThatExpectFewerThanTen) {
   EXPECT_EQ(chi_square(counts, std::vector<double>{1.0}).freedom, 0U);
 }
 
-// From the printed tables: upper 5 % points of chi-square, and one in the far tail.
 TEST(Statistics, ChiSquareBoundsAreThoseOfTheTables) {
   EXPECT_NEAR(chi_square_bound(1, 0.05), 3.841458820694124, 1e-8);
   EXPECT_NEAR(chi_square_bound(2, 0.05), 5.991464547107979, 1e-8);

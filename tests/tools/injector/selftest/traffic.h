@@ -14,8 +14,6 @@
 
 namespace tendon::injector {
 
-// Traffic of the self-test and the injector's decisions on it.
-
 inline constexpr double kMs = 1e6;                                 // ns
 inline constexpr Duration kPeriod = std::chrono::milliseconds(1);  // default interval of datagrams
 
@@ -28,14 +26,13 @@ struct Traffic {
   Direction direction = Direction::kUp;
   /// Arrival of datagram i after the start, for irregular intervals.
   std::function<Duration(std::size_t)> at = {};
-  /// The first byte of datagram i, for rules by message type.
+  /// The first byte of datagram i; rules select datagrams by this byte.
   std::function<std::uint8_t(std::size_t)> type = {};
 };
 
 /// Not zero, to detect an injector that mistakes absolute times for times since its start.
 inline constexpr LocalTime kStart{std::chrono::hours(1)};
 
-/// Calls `visit(i, decision)` for each of `options.count` datagrams.
 template <class Visit>
 void play(const Profile& profile, const Traffic& traffic, const SelftestOptions& options, Visit visit) {
   Injector injector(profile, options.seed, traffic.link, traffic.direction);

@@ -61,14 +61,12 @@ Fates shared(Share share, const std::optional<Duration>& delay) {
   return {Fate{false, *delay / 2}, Fate{false, *delay - *delay / 2}};
 }
 
-/// Builds a trace from measurements in order of time.
 class Building {
  public:
   explicit Building(const std::string& name) : name_(name) { trace_.notes.push_back({0, "imported from " + name}); }
 
   void add(Duration at, Share share, const Fates& fates, std::uint32_t size = 0) {
-    // In a round trip, an unknown fate still belongs to a datagram, and the return trip starts when the forward trip
-    // ends.
+    // In a round trip, an unknown fate belongs to a datagram, and the return trip starts after the forward trip.
     const bool round_trip = share == Share::kHalves || share == Share::kMeasured;
     if (fates.up || round_trip) put(Direction::kUp, at, fates.up, size);
     if (round_trip && fates.up) at += fates.up->delay;
@@ -127,8 +125,6 @@ void each_line(std::istream& from, const std::string& name, const Take& take) {
 /// Maximum number of losses from one number in a file, so that a small file cannot exhaust the memory.
 constexpr std::uint64_t kMostLost = 65'536;
 
-// ---- ping -----------------------------------------------------------------------------------------------------------
-
 /// The integer after the last `label` in the line, for example "icmp_seq=" in "… icmp_seq=3 ttl=64 time=26.3 ms".
 std::optional<std::uint64_t> whole_after(std::string_view line, std::string_view label) {
   const std::size_t at = line.rfind(label);
@@ -137,12 +133,11 @@ std::optional<std::uint64_t> whole_after(std::string_view line, std::string_view
   return parse_whole(rest.substr(0, rest.find_first_not_of("0123456789")));
 }
 
-/// Reads the times of answers, for example "time=0.481 ms". The format depends on the program and the language.
 class PingTimes {
  public:
   explicit PingTimes(const std::string& name) : name_(name) {}
 
-  /// Returns the time in this line. Reads a single comma as a decimal comma, which check() verifies later.
+  /// A single comma is a decimal comma, which check() verifies later.
   Duration in(std::string_view line, std::size_t number) {
     const std::size_t at = line.rfind("time=");
     const std::string_view text = line.substr(std::min(at, line.size()));
@@ -163,7 +158,7 @@ class PingTimes {
     return *time;
   }
 
-  /// Throws if the log does not show whether commas are decimal commas or thousands separators.
+  /// Throws if commas could be decimal commas or thousands separators.
   void check() const {
     const bool thousands = point_ != 0 || whole_ != 0;
     if (comma_ != 0 && point_ != 0) {
@@ -268,7 +263,6 @@ PingLog read_ping(std::istream& from, const std::string& name) {
     oldest = std::min(oldest.value_or(index), index);
     latest = std::max(latest.value_or(index), index);
     if (!answer) return;
-    // Keeps the first of duplicate answers.
     log.answers.try_emplace(index, PingLog::Answer{times.in(line, number), time_stamp(line)});
     const std::string_view counted =
         line.starts_with('[') ? line.substr(std::min(line.find("] "), line.size() - 2) + 2) : line;
@@ -294,8 +288,6 @@ PingLog read_ping(std::istream& from, const std::string& name) {
   }
   return log;
 }
-
-// ---- irtt -----------------------------------------------------------------------------------------------------------
 
 using Json = nlohmann::json;
 

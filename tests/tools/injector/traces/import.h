@@ -11,28 +11,25 @@
 
 namespace tendon::injector {
 
-// Imports measured networks as traces for TracePlayer. Usually played by time, because measurements are sparser than
-// the traffic; each then applies to all datagrams until the next. By index they are a list of delays.
+// Measured networks as traces for TracePlayer. They are usually played by time, because measurements are sparser than
+// the traffic; each then applies to all datagrams until the next.
 //
-// All import functions throw std::runtime_error, which names the input `name`: "ping.txt:12: …". Causes are kDelay and
-// kLoss, link is 0, times begin at 0. Input beyond kMaxTraceRecords is rejected.
+// All functions throw std::runtime_error, which names the input `name`: "ping.txt:12: …". Causes are kDelay and kLoss,
+// link is 0, times begin at 0. Input beyond kMaxTraceRecords is rejected.
 //
-// Mahimahi's packet-delivery files are not imported. They describe sending opportunities instead of packets and are
-// part of a profile, opportunities(FILE). import_mahimahi_log() reads the log of a run of mm-link, which describes
-// packets.
+// Mahimahi's packet-delivery files describe sending opportunities and are part of a profile, opportunities(FILE).
 
-/// How a measured delay is assigned to the directions.
 enum class Share : std::uint8_t {
   kHalves,    ///< half of a round trip for each direction (up the smaller one, by at most a nanosecond)
   kUp,        ///< the delay from client to server; the other direction has no delay
   kDown,      ///< the delay from server to client
   kBoth,      ///< a one-way delay, the same for each direction
-  kMeasured,  ///< the file has one for each direction; irtt only
+  kMeasured,  ///< the file contains one delay for each direction (irtt only)
 };
 
 struct ImportOptions {
   Share share = Share::kHalves;
-  /// Interval of measurements without times in the file. Above zero.
+  /// Used if the file has no times. Above zero.
   Duration interval = std::chrono::seconds(1);
 };
 
@@ -48,18 +45,16 @@ struct ImportOptions {
 Trace import_ping(std::istream& from, const std::string& name, const ImportOptions& options);
 
 /// The JSON file of `irtt client -o FILE.json` (not gzipped). kMeasured uses delay.send and delay.receive, which are
-/// valid only if the clocks of client and server were synchronized (PTP, GPS); throws if one of them is negative. All
-/// other shares use delay.rtt, from which irtt has subtracted the server's own time. "true_up" is a loss up,
-/// "true_down" a loss down; "true" has an unknown direction and counts as up.
+/// valid only if the clocks were synchronized (PTP, GPS); throws if one of them is negative. Other shares use
+/// delay.rtt, from which irtt has subtracted the server's own time. "true_up" is a loss up, "true_down" a loss down;
+/// "true" is unknown and counts as up.
 Trace import_irtt(std::istream& from, const std::string& name, const ImportOptions& options);
 
-/// Reads a list of delays with open_delays(). The column t_ms is the time when a datagram was sent. Times must not
-/// decrease. Without this column, the interval between datagrams is options.interval. The column dir replaces the
-/// share, as in a file from write_delays(). Without this column, the times are shifted to begin at 0.
+/// Reads open_delays(). Sending times t_ms must not decrease; without this column they are options.interval apart. The
+/// column dir replaces the share, as in a file from write_delays(); without it, times are shifted to begin at 0.
 Trace import_csv(std::istream& from, const std::string& name, const ImportOptions& options);
 
-/// Returns a summary of an imported trace. The line for each direction contains the number of datagrams and losses, the
-/// first and last time, and the minimum, median and maximum delay.
+/// For each direction: number of datagrams and losses, first and last time, minimum, median and maximum delay.
 std::string import_summary(const Trace& trace);
 
 /// The log of mm-link with --uplink-log or --downlink-log (mahimahi 0.98 or later): each departure ("MS - BYTES

@@ -77,7 +77,6 @@ TEST(ImportPing, GapsAndWhatWasNeverAnsweredAreLosses) {
 TEST(ImportPing, ARoundTripIsHalvedAndALostOneIsLostOnce) {
   const Trace trace = import(import_ping, kPing);
   EXPECT_EQ(up(trace), "0:0:lost 1:1002:10 2:2004:lost 3:3006:lost 4:4008:505.5 5:5010:5.25 6:6012:lost 7:7014:lost ");
-  // The return trip starts when the forward trip ends.
   EXPECT_EQ(down(trace), "1:1012:10 4:4513.5:505.5 5:5015.25:5.25 ");
   EXPECT_EQ(down(import(import_ping, kPing, {.share = Share::kDown})).substr(0, 20), "0:0:lost 1:1002:20 2");
 }
@@ -266,7 +265,6 @@ TEST(ImportCsv, ASummarySaysHowManyWhenAndHowLong) {
             "down: 1 datagrams from 0ms to 0ms, 0 lost; delay 5ms to 5ms, median 5ms\n");
 }
 
-// Fates survive export and import of delays to the nanosecond.
 TEST(ImportCsv, ReadsBackExportedDelays) {
   Trace trace;
   trace.start = LocalTime(5s);
@@ -347,8 +345,7 @@ TEST(Import, NoBytesWhateverDoMoreThanAnError) {
   }
 }
 
-// Three pings of the DETERMINISTIC6G project. The packets, losses and medians are those of ping's summary or of its
-// sorted lines.
+// Of the DETERMINISTIC6G project. Packets, losses and medians are those of ping's summary or its sorted lines.
 TEST(ImportPing, TheRealPingsHaveThePacketsAndDelaysThatTheirLinesSay) {
   const char* const data = std::getenv("TENDON_DATA");
   if (data == nullptr) GTEST_SKIP() << "TENDON_DATA is not set: the measured pings are not part of this repository";

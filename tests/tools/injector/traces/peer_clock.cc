@@ -12,7 +12,6 @@ namespace {
 
 constexpr std::int64_t kBillion = 1'000'000'000;
 
-/// ⌊a · b / c⌋ for c above zero.
 Duration scaled(Duration a, std::int64_t b, std::int64_t c) noexcept {
   const Int128 product = Int128{a.count()} * b;
   const Int128 quotient = product / c;

@@ -34,7 +34,7 @@ class DriftingClock {
     bool operator==(const Config&) const = default;
   };
 
-  /// This is larger than the drift of any real clock. The clock must not stop, because truth() needs the inverse.
+  /// Larger than the drift of any real clock. The clock must not stop, because truth() needs the inverse.
   static constexpr std::int64_t kMaxDriftPpb = 100'000'000;
   /// Ten years: all sums stay far within 64 bits.
   static constexpr Duration kMaxOffset = std::chrono::hours(24 * 3650);

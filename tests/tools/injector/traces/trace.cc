@@ -29,8 +29,6 @@ constexpr std::string_view kNote = "# note ";
 
 constexpr std::array<std::string_view, 2> kDirections = {"up", "down"};
 
-// ---- Writing --------------------------------------------------------------------------------------------------------
-
 /// A line under construction. No field is longer than 20 characters, so a record's 16 fit.
 class Line {
  public:
@@ -69,8 +67,6 @@ void write_text(std::ostream& to, std::string_view key, std::string_view text) {
   }
   to << "# " << key << ' ' << text << '\n';
 }
-
-// ---- Reading --------------------------------------------------------------------------------------------------------
 
 /// Quotes and truncates text of an untrusted file, and removes terminal control characters.
 std::string shown(std::string_view text) {
@@ -228,7 +224,7 @@ class Reader {
     return record;
   }
 
-  /// Detects traces in order, which most are; check_order() handles the others.
+  /// Most traces are in order; check_order() handles the others.
   void place(const TraceRecord& record) {
     const auto [at, first] = flows_.try_emplace({record.direction, record.link}, Newest{record.index, record.arrival});
     Newest& newest = at->second;
@@ -312,7 +308,6 @@ class Reader {
   bool in_order_ = true;
 };
 
-/// Exact milliseconds with all decimals.
 std::string milliseconds(Duration duration) {
   const std::int64_t ns = duration.count();
   std::string decimals = std::to_string(1'000'000 + std::abs(ns % 1'000'000)).substr(1);

@@ -20,26 +20,25 @@ namespace tendon::injector {
 
 inline constexpr std::string_view kTraceBegins = "# tendon-trace 1";
 
-// A recorded network with the fate, the time and the cause of every datagram. The format is CSV after some header
-// lines:
+// A recorded network with the fate, the time and the cause of every datagram, as CSV after some header lines:
 //
-//   # tendon-trace 1
-//   # seed 7
-//   # start 0                          start of the run, on the clock of all times below (ns)
-//   # up delay=lognormal(20ms,5ms)     the initial profiles
-//   # down delay=20ms
-//   # tables 3c0ffee0ddba11ad          hashes of the quantile tables in use, 16 hexadecimal digits each
-//   # build v0.1.0-12-gabc1234         the program that wrote it
-//   # benign up 20000000               only in a sparse trace: see Trace::benign
-//   dir,link,index,t_in_ns,bytes,hash,verdict,cause,t_out_ns,t_actual_ns,duplicate_ns,stale_back,stale_ns,flipped_bit,truncated_to,rebinds
-//   up,0,0,1000000,213,b1946ac92492d234,pass,delay,21340211,21391002,,,,,,0
-//   # note 5000000000 both wifi-bad    notes can stand between the datagrams
-//   …
+//     # tendon-trace 1
+//     # seed 7
+//     # start 0                          start of the run, on the clock of all times below (ns)
+//     # up delay=lognormal(20ms,5ms)     the initial profiles
+//     # down delay=20ms
+//     # tables 3c0ffee0ddba11ad          hashes of the quantile tables in use, 16 hexadecimal digits each
+//     # build v0.1.0-12-gabc1234         the program that wrote it
+//     # benign up 20000000               only in a sparse trace: see Trace::benign
+//     dir,link,index,t_in_ns,bytes,hash,verdict,cause,t_out_ns,t_actual_ns,duplicate_ns,stale_back,stale_ns,flipped_bit,truncated_to,rebinds
+//     up,0,0,1000000,213,b1946ac92492d234,pass,delay,21340211,21391002,,,,,,0
+//     # note 5000000000 both wifi-bad    notes can stand between the datagrams
+//     …
 //
-// The first line and the line of column names are required. All other lines with # are optional, and at most one of
-// each kind precedes the column names. Times are integer nanoseconds; an empty field means none. The columns are the
-// members of TraceRecord. The decided one-way delay of a datagram is t_out_ns − t_in_ns; in a run of the proxy the
-// actual one is t_actual_ns − t_in_ns (write_delays() lists both in milliseconds).
+// The first line and the line of column names are required; other lines with # are optional, at most one of each kind
+// before the column names. All times are integers in nanoseconds. A field without a value is empty. The columns are the
+// members of TraceRecord. The one-way delay is t_out_ns − t_in_ns as decided, t_actual_ns − t_in_ns in a run of the
+// proxy.
 //
 // Datagrams can be in any order, but each index of a flow (a direction of a link) occurs only once, and t_in_ns must
 // not decrease with the index of a flow.
@@ -90,8 +89,8 @@ inline constexpr std::uint64_t kMaxTraceIndex = (std::uint64_t{1} << 62) - 1;
 /// Times of a trace are within this distance from zero (73 years), so that sums of two do not overflow.
 inline constexpr Duration kMaxTraceTime{std::int64_t{1} << 61};
 
-/// Writes a trace incrementally, beginning with the header. About 0.2 µs of CPU per record. Passes each line to the
-/// stream in one piece, so that the stream controls buffering. The stream's state reports errors.
+/// Writes a trace incrementally, beginning with the header. This takes about 0.2 µs for each record. Passes each line
+/// to the stream in one piece, so that the stream controls buffering. The stream's state reports errors.
 ///
 /// Thread-safe: no. (The proxy uses it in a separate thread.)
 class TraceWriter {

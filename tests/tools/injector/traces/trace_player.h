@@ -17,13 +17,11 @@ namespace tendon::injector {
 ///     kIndex   datagram i gets the fate of datagram i, so the same packets are lost. Use this for the same traffic and
 ///              for traces of shrink.h.
 ///     kTime    a datagram that arrives at `start` + t gets the fate of the newest record at or before the trace's
-///              start + t, or of the first record if there is none. The network is bad at the same times. Use this for
-///              other traffic.
+///              start + t, or of the first record if there is none. Use this for other traffic.
 ///
-/// The fate is shifted in time and keeps its delay. The same arrivals as in the record give bitwise identical decisions
-/// (by time: if no two arrivals of a flow coincide in the same nanosecond). For other arrivals, releases remain in
-/// order if they were in order in the record: release = max(release of the predecessor that passed, arrival + recorded
-/// delay).
+/// The fate is shifted in time, but its delay is not changed. The same arrivals give bitwise identical decisions (by
+/// time: if no two arrivals of a flow coincide in the same nanosecond). For other arrivals, releases remain in order if
+/// they were in order in the record: release = max(release of the predecessor that passed, arrival + recorded delay).
 ///
 /// Datagrams without a record:
 /// * In a sparse trace, an unlisted datagram takes TraceHeader::benign (or no time if that is not given for the
@@ -31,8 +29,7 @@ namespace tendon::injector {
 /// * In any other trace, a missing datagram (a gap in the indices) takes the median delay of those that passed.
 /// * After its end, a trace that is not sparse repeats, like Mahimahi's files: by index after the last record, by time
 ///   after the last record plus the mean interval.
-/// * A link that is not in the trace uses another one: of n links in order, link i uses the (i modulo n)-th, so that
-///   many clients can share an imported trace.
+/// * Of n links in the trace, link i uses the (i modulo n)-th, so that many clients can share an imported trace.
 /// * A direction that is not in the trace passes without delay.
 ///
 /// Thread-safe: no.
@@ -40,8 +37,8 @@ class TracePlayer final : public Decider {
  public:
   enum class By : std::uint8_t { kIndex, kTime };
 
-  /// `start` corresponds to the trace's start; unused by index. Copies what it needs. Throws std::invalid_argument if a
-  /// sparse trace is replayed by time.
+  /// `start` corresponds to the trace's start; unused by index. Throws std::invalid_argument if a sparse trace is
+  /// replayed by time.
   TracePlayer(const Trace& trace, Direction direction, std::uint32_t link, By by, LocalTime start = {});
 
   Decision decide(const Packet& packet) override;
@@ -69,8 +66,7 @@ class TracePlayer final : public Decider {
   std::uint32_t rebinds_ = 0;
 };
 
-/// Returns the median delay (lower of two) of the datagrams of one direction that passed, over all links; zero if none
-/// passed.
+/// Returns the median delay (lower of two) of the datagrams that passed, over all links; zero if none passed.
 Duration median_delay(const Trace& trace, Direction direction);
 
 }  // namespace tendon::injector

@@ -23,7 +23,6 @@ using By = TracePlayer::By;
 
 LocalTime at(Duration since_zero) { return LocalTime(since_zero); }
 
-/// One datagram per millisecond, with jitter, from 3 s on.
 Packet packet_of(std::uint64_t i) {
   const std::uint64_t jitter = one_of(200'000, Draws(1, 0, Direction::kUp)(Purpose::kDelay, i));
   return {.arrival = at(3s + 1ms * i + Duration(jitter)), .size = 213, .bytes = {}};
@@ -34,7 +33,6 @@ constexpr const char* kEverything =
     "duplicate=2% replay(1%,64) flip=1% truncate=1% rebind(every=900ms) jump(1%,3) rate=5Mbit/s queue=20packets";
 constexpr const char* kInOrder = "delay=lognormal(5ms,4ms) rho=0.8 loss=burst(3%,4) duplicate=2%";
 
-/// A run in virtual time through `profile`, written to and read from a file.
 Trace recorded(const char* profile, std::uint64_t packets, std::vector<Direction> directions = {Direction::kUp}) {
   std::stringstream file;
   TraceHeader header;
@@ -197,7 +195,6 @@ TEST(TracePlayer, InASparseTraceAllThatIsNotListedIsBenignForEver) {
     const Decision decision = player.decide({.arrival = at(1ms * i), .size = 9, .bytes = {}});
     EXPECT_EQ(decision.verdict == Verdict::kDrop, i == 2);
     if (i == 2) continue;
-    // The following datagrams do not overtake the late one.
     EXPECT_EQ(decision.release, i >= 5 && i < 35 ? at(45ms) : at(1ms * i + 10ms)) << i;
   }
 }

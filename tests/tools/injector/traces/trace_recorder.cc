@@ -13,7 +13,7 @@
 namespace tendon::injector {
 namespace {
 
-/// Maximum delay of a record before it is written. Polling avoids a system call in the thread that calls put().
+/// Delay of a record before it is written. Polling avoids a system call in the thread that calls put().
 constexpr auto kPeriod = std::chrono::milliseconds(50);
 
 std::ofstream open(const std::filesystem::path& file) {

@@ -26,15 +26,15 @@ class TraceRecorder {
   TraceRecorder(const TraceRecorder&) = delete;
   TraceRecorder& operator=(const TraceRecorder&) = delete;
 
-  /// Takes the content of `records`. Leaves it unchanged while the writer is fetching the queue and there is room, so
-  /// that the caller retries with its next records. Must be called from one thread only. Never blocks.
+  /// Takes the content of `records`, but leaves it for the next call while the writer is fetching the queue and there
+  /// is room. Must be called from one thread only. Never blocks.
   void put(std::vector<TraceRecord>& records);
   /// Adds a comment after the records put so far. Thread-safe.
   void note(std::string text);
   /// Number of records lost by put(). Thread-safe.
   std::uint64_t lost() const noexcept { return lost_; }
 
-  /// Writes the rest and ends the thread. Throws std::runtime_error if something could not be written.
+  /// Ends the thread. Throws std::runtime_error if something could not be written.
   void finish();
 
  private:

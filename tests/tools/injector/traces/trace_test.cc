@@ -24,7 +24,6 @@ using namespace std::chrono_literals;
 
 LocalTime at(Duration since_zero) { return LocalTime(since_zero); }
 
-/// A record whose optional members are set according to `bits`.
 TraceRecord record_of(std::uint64_t index, std::uint64_t bits) {
   TraceRecord record;
   record.direction = (bits & 1) != 0 ? Direction::kDown : Direction::kUp;
@@ -161,7 +160,6 @@ TEST(Trace, WhatIsWrongIsNamedWithFileAndLine) {
            {"# tendon-trace 1\n# seed -1\n", "2: seed is \"-1\", expected a whole number"},
            {"# tendon-trace 1\n# seed\n", "2: # seed has no value"},
            {"# tendon-trace 1\n# benign up -1\n", "2: benign up is \"-1\", expected a delay of 0 ns or more"},
-           // Such a text could not be written back.
            {"# tendon-trace 1\n# down a\rb\n", "2: found a carriage return, expected lines that end with \\n"},
            {"# tendon-trace 1\n# tables 12 34\n", "2: tables is \"12\", expected 16 hexadecimal digits"}}) {
     EXPECT_EQ(refusal(text), "run.csv:" + complaint);
@@ -192,7 +190,6 @@ TEST(Trace, WhatIsWrongIsNamedWithFileAndLine) {
   }
 }
 
-// A small fuzz test: a valid trace with a few bytes changed, removed or moved.
 TEST(Trace, NoBytesWhateverDoMoreThanAnError) {
   std::mt19937_64 random(1);
   const std::string good = written(any_trace(20));

@@ -79,7 +79,6 @@ class OnMesh {
   std::map<Key, std::array<Stiffness, 2>> known_;
 };
 
-/// Stiffness and total error of a settled answer, not yet divided into parts.
 Accuracy accuracy_of(const Reaction& reaction, const Stiffness& right, double solver) {
   const double k = reaction.force / reaction.depth;
   return {.k = k,
@@ -130,7 +129,6 @@ Route route_of(const Network& network, double update_ms) {
           .compute = from_seconds(1e-3 * update_ms)};
 }
 
-/// Returns the meter's own cost.
 double floor_of(const Meter& meter) {
   std::vector<double> idle;
   for (int i = 0; i < 200; ++i) {
@@ -164,7 +162,6 @@ void follow_script(PressedEngine& engine, const std::vector<Touched>& script, co
       times.push_back(std::max(0.0, engine.took(took) - floor));
       if (took.instructions && !point.candidate.elsewhere())
         instructions.push_back(static_cast<double>(*took.instructions));
-      // A factor of 2 is not explained by other load on the machine.
       if (times.size() == kFirstUpdates && 1e3 * quantile(times, 0.5) > 2 * slowest_ms) {
         throw TooSlow("an update takes more than " + shortest(slowest_ms) + " ms");
       }
@@ -203,9 +200,7 @@ void follow_script(PressedEngine& engine, const std::vector<Touched>& script, co
   if (!instructions.empty()) point.instructions = quantile(instructions, 0.5);
 }
 
-// ---- The refinement ladders -----------------------------------------------------------------------------------------
-
-/// Extrapolates the cost of a larger n from the last two points with cost ∝ n^p, or from one with the given p.
+/// From the last two points with cost ∝ n^p, or from one with the given p.
 double predicted(const std::vector<AccuracyPoint>& ladder, int n, double AccuracyPoint::*cost, double power) {
   if (ladder.empty()) return 0;
   const AccuracyPoint& last = ladder.back();
@@ -220,8 +215,8 @@ constexpr double kPowerOfFactors = 6;
 constexpr double kPowerOfSolutions = 4;
 constexpr double kPowerOfMeasuring = 2;  // the loop at the hand does not depend on the mesh
 
-/// Measures a model and element on increasingly fine meshes within the limits on update, setup and total time.
-/// `measured` returns a point of a candidate, or throws.
+/// On increasingly fine meshes, within the limits on update, setup and total time. `measured` returns a point or
+/// throws.
 template <class Measured>
 std::vector<AccuracyPoint> ladder(Candidate candidate, const AccuracyOptions& options,
                                   std::vector<std::string>& left_out, Measured measured) {
@@ -316,7 +311,6 @@ void feel(Trial& trial, Truth& truth, const Network& network, double longest_s) 
 
 AccuracyPoint measure(const Candidate& candidate, Truth& truth, OnMesh& on_mesh, const Meter& meter,
                       const std::optional<Network>& network, const Patience& patience, const std::string& worker) {
-  // Computes the shared results first, so that they are not charged to this point.
   truth.script();
   truth.limit(law_of(candidate.model), material_of(truth.block(), candidate.model), 0);
   const Meter::Reading before = meter.read();
@@ -414,8 +408,6 @@ void check(const AccuracyOptions& options) {
   }
   if (options.network) route_of(*options.network, 0);  // rejects an unknown network before measuring
 }
-
-// ---- Errors alone ---------------------------------------------------------------------------------------------------
 
 std::vector<Candidate> candidates(const AccuracyOptions& options) {
   std::vector<Candidate> all;

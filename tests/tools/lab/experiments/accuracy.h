@@ -21,23 +21,21 @@
 
 namespace tendon::lab {
 
-/// Errors of a model under one load, relative to the true stiffness: total = model + discretisation + solver. The parts
-/// are NaN if the model cannot support the load on an infinitely fine mesh. For a worker, `solver` is the error bound
-/// that it sent.
+/// Errors relative to the true stiffness: total = model + discretisation + solver. The parts are NaN if the model
+/// cannot support the load on an infinitely fine mesh. For a worker, `solver` is the error bound that it sent.
 ///
-/// Two models converge to another material than their parameters: as-rigid-as-possible elements (projective) have µ but
-/// λ = 0. Springs along edges are, for small strains, a body with central forces: Cauchy's relations, ν = 1/4. The
-/// deviation of the spring net from that body is included in `model`, estimated as the ratio of both on the same mesh;
-/// it still depends on n.
+/// Two models converge to another material: as-rigid-as-possible elements (projective) have µ but λ = 0; springs along
+/// edges are, for small strains, a body with central forces: Cauchy's relations, ν = 1/4. The deviation of the spring
+/// net from that body is in `model`, estimated as the ratio of both on the same mesh; it still depends on n.
 struct Accuracy {
   double k = 0;               ///< N/m, force over depth
   double total = 0;           ///< k/truth − 1
-  double model = 0;           ///< the error of the law on an infinitely fine mesh
+  double model = 0;           ///< error of the law on an infinitely fine mesh
   double discretisation = 0;  ///< the error of the law on this mesh, solved exactly
   double solver = 0;          ///< the remainder
   double tangent = 0;         ///< error of the tangent stiffness
 
-  /// |model| + |discretisation| + |solver|: the error if the parts did not cancel on this mesh.
+  /// The error if the parts did not cancel on this mesh.
   double without_luck() const noexcept { return std::abs(model) + std::abs(discretisation) + std::abs(solver); }
 };
 
@@ -64,34 +62,30 @@ struct Network {
   std::uint64_t seed = 1;
 };
 
-/// Limits of a measurement. The measurement throws TooSlow if updates take much longer than `update_ms`, or if the loop
-/// of `felt` takes longer than `felt_s`.
+/// TooSlow is thrown if updates take much longer than `update_ms`, or the loop of `felt` longer than `felt_s`.
 struct Patience {
   double update_ms = std::numeric_limits<double>::infinity();
   double felt_s = std::numeric_limits<double>::infinity();
 };
 
-/// Measures a candidate. Throws the model's exception if it does not support the mesh, std::invalid_argument for an
-/// unknown network, and TooSlow. `worker`: command of the worker, for candidates answered by one.
+/// Throws the model's exception if it does not support the mesh, std::invalid_argument for an unknown network, and
+/// TooSlow. `worker`: the command, for candidates answered by one.
 AccuracyPoint measure(const Candidate& candidate, Truth& truth, const Meter& meter,
                       const std::optional<Network>& network = {}, const Patience& patience = {},
                       const std::string& worker = {});
 
-/// Returns the points for which no other point has a lower time and a lower error without luck, sorted by time. Points
-/// are excluded if their parts are not known.
+/// Returns the points without a faster and more accurate (without luck) one, by time. Their parts must be known.
 std::vector<AccuracyPoint> pareto_front(std::vector<AccuracyPoint> points, std::size_t load);
 
-/// Returns p in update ∝ unknowns^p, which is fitted to the logarithms by least squares. Returns NaN if there are fewer
-/// than two sizes.
+/// p in update ∝ unknowns^p, by least squares of the logarithms. NaN with fewer than two sizes.
 double cost_exponent(const std::vector<AccuracyPoint>& ladder);
 
-/// Returns false if, under each load, one of `others` is as fast and has a smaller error without luck, so that the loop
-/// need not be run for this point. A point is not faster if the difference is less than a tenth of a period of the
-/// device. The total error is used if the parts of a point are not known.
+/// False if, under each load, one of `others` is as fast (to a tenth of a device period) and has a smaller error
+/// without luck, or total error if its parts are not known. The loop need not be run for this point.
 bool may_be_best(const AccuracyPoint& point, const std::vector<AccuracyPoint>& others);
 
-/// Returns the point with the smallest force error at the hand among those that need at most `budget_ms` per update and
-/// keep a free hand quiet, or null. Requires `felt`.
+/// The smallest force error at the hand among points that need at most `budget_ms` per update and keep a free hand
+/// quiet; null if there is none. Requires `felt`.
 const AccuracyPoint* closest_at_the_hand(const std::vector<AccuracyPoint>& points, double budget_ms);
 
 struct AccuracyOptions {
@@ -100,32 +94,26 @@ struct AccuracyOptions {
   std::vector<AnyModel> models;
   std::vector<softbody::Element> elements;  ///< empty: all
   std::vector<int> resolutions{4, 6, 8, 10, 12, 16};
-  /// The command of a worker that is also measured with the linear block, without its scene. If this is empty, no
-  /// worker is used. This cannot be combined with errors_only, because the last bits of the answers depend on the
-  /// number of ranks.
+  /// Also measures this command with the linear block, without its scene. Cannot be combined with errors_only, because
+  /// the last bits of the answers depend on the number of ranks.
   std::string worker{};
-  /// Also measures bodies of the model `near` with learned shapes and with a table of answers. This cannot be combined
-  /// with a budget.
+  /// Also the model `near` with learned shapes and with a table of answers. Cannot be combined with a budget.
   bool learned = false;
   Truth::Config truth;
   double slowest_ms = 200;                  ///< a refinement ladder ends where an update would take longer
   std::optional<double> longest_setup_s{};  ///< same for the setup; empty: 30, with a budget 5
   double longest_point_s = 20;              ///< same for the measurement of a point
   std::optional<Network> network{};         ///< network for `felt`
-  /// Finds the best candidate at the hand that needs at most this time per update. Skips the loop for candidates
-  /// excluded by may_be_best.
+  /// Time per update. Skips the loop for candidates excluded by may_be_best.
   std::optional<double> budget_ms{};
-  /// Only errors and sizes, which are deterministic; uses no clock and has no time limit. This cannot be combined with
-  /// a network or a budget.
+  /// Deterministic: no clock and no time limit. Cannot be combined with a network or a budget.
   bool errors_only = false;
   std::optional<std::filesystem::path> out{};  ///< folder for accuracy.csv and the figures
   bool json = false;
-  /// The units are the meshes. There is a unit for each n of each element of each model, in this order. Shards and
-  /// their merged result have errors only.
+  /// One unit for each n of each element of each model, in this order. Shards and their merged result have errors only.
   Part part{};
 };
 
-/// `tendon-lab accuracy`: accuracy against time for each model and mesh.
 void accuracy(const AccuracyOptions& options, std::ostream& out);
 
 /// Returns one line of JSON. The `commit` is the one of the build.

@@ -29,7 +29,6 @@ const char* colour_of(std::size_t i) {
   return kColours.at(i % kColours.size());
 }
 
-/// Line style of a source of answers, the same in all panels; dashed for comparison models.
 Curve curve_of(const Candidate& candidate) {
   const std::vector<AnyModel> models = all_models();
   const auto number = static_cast<std::size_t>(std::ranges::find(models, candidate.model) - models.begin()) +
@@ -43,7 +42,6 @@ Curve::Style points_on(const Curve& line) {
   return line.style == Curve::Style::kDashed ? Curve::Style::kRings : Curve::Style::kPoints;
 }
 
-/// Draws a curve with its points, or only the points if there are fewer than two.
 void add_with_points(Panel& panel, Curve curve) {
   Curve points{.name = "", .colour = curve.colour, .points = curve.points, .style = points_on(curve)};
   if (curve.points.size() < 2) {
@@ -68,7 +66,7 @@ std::vector<Candidate> ways_in(const Ladders& ladders) {
   return ways;
 }
 
-/// Returns the points of one source, or all points if `way` is empty.
+/// All points if `way` is empty.
 std::vector<AccuracyPoint> points_of(const Ladders& ladders, const std::optional<Candidate>& way) {
   std::vector<AccuracyPoint> points;
   for (const auto& ladder : ladders) {
@@ -81,8 +79,7 @@ std::string label_of(const Candidate& candidate) {
   return candidate.way() + " " + std::string(info(candidate.element).name) + " " + std::to_string(candidate.n);
 }
 
-/// Error (absolute value) over time: a point for each candidate, a line through the Pareto-optimal ones of each source,
-/// and the labeled Pareto front of all.
+/// A point for each candidate, a line through the Pareto-optimal ones of each source, and the labeled front of all.
 Panel error_over_time(const std::string& title, const Ladders& ladders, double extra_ms, std::size_t load) {
   Panel panel{.title = title, .x_label = "ms", .log_x = true, .log_y = true};
   const auto place = [&](const AccuracyPoint& p) {
@@ -119,7 +116,6 @@ Panel error_over_time(const std::string& title, const Ladders& ladders, double e
   return panel;
 }
 
-/// Error (absolute value) of each element over n, for the first source.
 Panel error_over_n(const Ladders& ladders) {
   const Candidate& first = ladders.front().front().candidate;
   std::pair range{std::numeric_limits<double>::infinity(), 0.0};
@@ -140,7 +136,6 @@ Panel error_over_n(const Ladders& ladders) {
   return panel;
 }
 
-/// Returns for each source the ladder that contains the point with the smallest error at the hand.
 std::vector<const std::vector<AccuracyPoint>*> felt_best(const Ladders& ladders) {
   std::vector<const std::vector<AccuracyPoint>*> best;
   const auto least = [](const std::vector<AccuracyPoint>& ladder) {
@@ -160,7 +155,6 @@ std::vector<const std::vector<AccuracyPoint>*> felt_best(const Ladders& ladders)
   return best;
 }
 
-/// Error at the hand over a property `x` of the points.
 template <class X>
 Panel felt_over(const std::string& title, const std::string& label, const Ladders& ladders, bool log_x, X x) {
   Panel panel{.title = title, .x_label = label, .log_x = log_x, .log_y = true};

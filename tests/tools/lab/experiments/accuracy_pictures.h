@@ -6,8 +6,7 @@
 
 namespace tendon::lab {
 
-/// Draws the figures of `tendon-lab accuracy` in the folder `options.out`. `round_trip_ms` is the round trip of the
-/// network, or 0 if there is no network.
+/// Writes to the folder `options.out`. `round_trip_ms`: 0 without a network.
 void draw(const AccuracyOptions& options, const Ladders& ladders, double round_trip_ms);
 
 }  // namespace tendon::lab

@@ -95,7 +95,6 @@ constexpr double kUnfeltMs = 0.1;  // a tenth of a device period; smaller differ
 
 double at_the_hand_ms(const AccuracyPoint& p) { return std::max({p.update_ms_p50, p.step_ms, kUnfeltMs}); }
 
-/// Visits a point's clock-independent numbers with their names, for writing and reading.
 template <class Errors, class Visit>
 void visit_numbers(Errors& errors, Visit visit) {
   auto& p = errors.point;

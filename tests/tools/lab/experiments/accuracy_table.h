@@ -15,7 +15,6 @@ namespace tendon::lab {
 /// A ladder is one model and element on increasingly fine meshes. None is empty.
 using Ladders = std::vector<std::vector<AccuracyPoint>>;
 
-/// Properties of the truth that are kept after it is destroyed.
 struct TruthFigures {
   double linear = 0;  ///< N/m for small strains
   double small = 0;   ///< N/m under the smaller load
@@ -29,7 +28,7 @@ struct MeshErrors {
   TruthFigures truth{};
   std::string left_out{};  ///< reason for a missing point
 };
-/// Writes all clock-independent numbers as a line of JSON. read_errors() is its inverse.
+/// All clock-independent numbers. read_errors() is its inverse.
 JsonLine line_of(const MeshErrors& errors);
 MeshErrors read_errors(const Candidate& candidate, const nlohmann::json& line);
 
@@ -38,7 +37,6 @@ void write_row(std::ostream& out, const AccuracyPoint& p);
 extern const char* const kFeltHeading;
 void write_felt(std::ostream& out, const AccuracyPoint& p);
 void write_truth(std::ostream& out, const TruthFigures& truth, const PressedBlock& block);
-/// Writes the cost exponent of each ladder.
 void write_exponents(std::ostream& out, const Ladders& ladders);
 void write_answer(std::ostream& out, const AccuracyOptions& options, const std::optional<AccuracyPoint>& best,
                   Truth& truth);

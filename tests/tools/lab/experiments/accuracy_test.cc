@@ -256,11 +256,9 @@ TEST(Accuracy, OnlyWhatNothingElseIsAsQuickAndCloserThanMayBeBestAtTheHand) {
   EXPECT_TRUE(may_be_best(point(1, 0.5, 0.5), others));
   EXPECT_TRUE(may_be_best(point(3, 0.5, 0.5), {}));
   EXPECT_FALSE(may_be_best(point(0.01, 0.06, 0.2), {point(0.05, 0.05, 0.1)}));
-  // An answer cannot be faster than the step of the body.
   AccuracyPoint steps = point(1, 0.06, 0.2);
   steps.step_ms = 4;
   EXPECT_FALSE(may_be_best(steps, others));
-  // Errors that cancel are not counted if the parts are known.
   AccuracyPoint lucky = point(3, 0.01, 0.01);
   EXPECT_TRUE(may_be_best(lucky, others));
   for (Accuracy& at : lucky.at_load) at = {.total = 0.01, .model = -0.2, .discretisation = 0.21};

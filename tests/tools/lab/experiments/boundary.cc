@@ -56,7 +56,6 @@ constexpr std::array kDelays = {0, 1, 2, 3, 5, 8, 13, 20, 32, 50};              
 constexpr std::array kRates = {25.0, 50.0, 100.0, 200.0, 500.0, 1000.0, 2000.0, 4000.0};  // Hz
 constexpr int kMapped = 6;  // springs above and below the exact limit, within a factor of 4
 
-/// A row of the table and a column of the map in the figure.
 struct Point {
   SampledSpring spring;
   double simulated = 0, eigenvalues = 0, linear = 0, passive = 0;

@@ -10,9 +10,8 @@
 
 namespace tendon::lab {
 
-/// Returns the maximum K (N/m) for which a SimulatedDevice without a hand comes to rest on a sampled and held spring.
-/// Above this value, an initial amplitude of 1 mm increases over 60 periods. Found by bisection to 0.5 %. Mass, b, T
-/// and d are those of `spring`; no Coulomb friction or encoder counts.
+/// Returns the maximum K (N/m) at which a SimulatedDevice without a hand comes to rest on a sampled and held spring;
+/// above it, 1 mm grows over 60 periods. By bisection to 0.5 %. No Coulomb friction or encoder counts.
 double simulated_stiffness_limit(const SampledSpring& spring);
 
 struct BoundaryOptions {
@@ -20,10 +19,10 @@ struct BoundaryOptions {
   double viscous = 0.26;  ///< N·s/m
   std::optional<std::filesystem::path> out{};
   bool json = false;
-  Part part{};  ///< its units are the rows of the table, 0 to 17
+  Part part{};  ///< the units are the rows of the table (0 to 17)
 };
 
-/// `tendon-lab boundary`: stability limit of a spring over delay and rate, simulated and in closed form.
+/// Stability limit of a spring over delay and rate, simulated and in closed form.
 void boundary(const BoundaryOptions& options, std::ostream& out);
 
 }  // namespace tendon::lab

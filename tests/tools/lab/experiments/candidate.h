@@ -32,8 +32,7 @@ softbody::Law law_of(const AnyModel& model);
 
 /// A model on a mesh with `n` cells along x and cells of about the same size along y and z.
 struct Candidate {
-  /// Source of the answers: the model, the learned shapes or the table of a `near` body, or the process
-  /// AccuracyOptions::worker.
+  /// The model, the learned shapes or the table of a `near` body, or AccuracyOptions::worker.
   enum class By : std::uint8_t { kModel, kLearned, kTable, kWorker };
 
   AnyModel model;
@@ -46,12 +45,11 @@ struct Candidate {
   std::string name() const;  ///< way and element: "linear-hex8-sri"
 };
 
-/// Creates the candidate's mesh, fixed at the bottom. Material and law may differ from those of block and model.
+/// Fixed at the bottom. Material and law may differ from those of block and model.
 softbody::Solid solid_of(const PressedBlock& block, const Candidate& candidate, softbody::Law law,
                          const softbody::Material& material);
 
-/// Creates the candidate's engine. `worker` is the command of the external process, if used. Throws the model's
-/// exception if it does not support the mesh.
+/// `worker`: command of the external process, if used. Throws the model's exception if it does not support the mesh.
 std::unique_ptr<PressedEngine> engine_of(const PressedBlock& block, const Candidate& candidate,
                                          const std::string& worker);
 

@@ -160,7 +160,7 @@ std::vector<Summary> summaries(const std::vector<Cell>& cells, const std::functi
   return result;
 }
 
-/// Returns the passivity constraint that a law guarantees on this device; for laws without a guarantee the weakest one.
+/// The constraint that the law guarantees on this device, or else the weakest one.
 Passive sense_of(const Contender& contender, const Friction& friction) {
   if (!contender.promises) return Passive::kOnThisMotion;
   if (contender.law != Law::kAolPlus) return Passive::kWhateverComes;
@@ -177,7 +177,6 @@ Passive sense_of(const Contender& contender, const Friction& friction) {
 /// Lower bounds for the grid's hands on ideal springs, computed on demand.
 class Floors {
  public:
-  /// Median over the cells of `contender`, relative to the true force.
   double median_of(const Contender& contender, const std::vector<Cell>& cells) {
     std::vector<double> floors;
     for (const Cell& cell : cells) {
@@ -197,8 +196,8 @@ class Floors {
   std::map<std::tuple<double, double, bool, Passive>, double> known_;
 };
 
-/// Writes a sentence naming the law with the least force error among those that guarantee passivity, were passive and
-/// stable throughout, and a better law without guarantee, if any.
+/// The law with the least force error among those that guarantee passivity, were passive and stable throughout, and a
+/// better one without guarantee, if any.
 void recommend(std::ostream& out, const std::string& where, const std::vector<Summary>& laws) {
   const auto best_of = [&](bool promised) {
     const Summary* best = nullptr;

@@ -14,7 +14,6 @@
 
 namespace tendon::lab {
 
-/// A bilateral spring behind a network, with a device and a hand that is free to move.
 struct Situation {
   double stiffness = 0;  ///< N/m
   double delay_ms = 0;
@@ -47,21 +46,19 @@ Cell compare_cell(const Situation& situation, Law law, std::uint64_t seed, const
 
 Cell compare_cell(const Situation& situation, Preset preset, std::uint64_t seed);
 
-/// Comparison of AOL+ without a preset with the other passive laws.
+/// AOL+ without a preset against the other passive laws.
 struct Verdict {
   std::size_t cells = 0;    ///< number of cells
   std::size_t passive = 0;  ///< cells in which AOL+ was passive
-  /// The number of cells in which another law has a lower force error. The other law must guarantee passivity and must
-  /// be passive in this cell.
+  /// Cells in which a law that guarantees passivity, and is passive in this cell, has a lower force error.
   std::size_t beaten = 0;
   std::size_t beaten_clearly = 0;  ///< cells in which the error of the other law is lower by more than 5 %
-  /// The number of beaten cells for each cause. The cause is a part of AOL+. If this part is removed, AOL+ is not
-  /// beaten.
+  /// Beaten cells in which AOL+ without this part is not beaten.
   std::size_t robust_ledger = 0, knee = 0, energy_cap = 0, bounded_acceleration = 0;
   std::size_t vibrating = 0;  ///< no single part; the other law is too soft to vibrate there, AOL+ vibrates
   std::size_t no_single_part = 0;
 };
-/// `cells` are grouped by situation, in the order of laws(); situation i has the seed `seed` + i · `every`.
+/// In the order of laws(); situation i has the seed `seed` + i · `every`.
 Verdict verdict(const std::vector<Cell>& cells, std::uint64_t seed, std::size_t every);
 
 struct CompareOptions {
@@ -72,7 +69,6 @@ struct CompareOptions {
   Part part{};  ///< its units are the selected situations from 0, each with all laws
 };
 
-/// `tendon-lab compare`: runs every law in every situation with the same seeds, and recommends laws.
 void compare(const CompareOptions& options, std::ostream& out);
 
 }  // namespace tendon::lab

@@ -45,7 +45,7 @@ struct Line {
   double passive = 0, within8 = 0, within3 = 0, within1_5 = 0;  ///< shares
   double error = 0, vibration = 0, sensation = 0, noticed = 0;  ///< medians: %, mm/s, dB, share
   std::size_t beaten = 0;                                       ///< by more than 3 percentage points
-  /// The maximum difference, in percentage points, from the best other law that guarantees passivity and was passive.
+  /// Percentage points behind the best other law that guarantees passivity and was passive.
   double worst = 0;
   std::uint64_t worst_seed = 0;
 };

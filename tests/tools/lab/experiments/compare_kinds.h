@@ -22,11 +22,9 @@ struct CompareKindsOptions {
   bool progress = false;                       ///< prints to standard error
 };
 
-/// `tendon-lab compare --kinds`: runs laws in situations drawn from seeds. A table per kind shows how many runs are
-/// passive and quiet, the median error, and where a contender is furthest behind the best other law that guarantees
-/// passivity and was passive, with the seed of that situation. Results do not depend on the number of threads.
-///
-/// Throws std::invalid_argument if there is no such kind or law.
+/// A table per kind shows how many runs are passive and quiet, the median error, and where a contender is furthest
+/// behind the best other law that guarantees passivity and was passive, with that seed. Results do not depend on the
+/// number of threads. Throws std::invalid_argument if there is no such kind or law.
 void compare_kinds(const CompareKindsOptions& options, std::ostream& out);
 
 }  // namespace tendon::lab

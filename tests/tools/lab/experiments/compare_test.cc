@@ -21,8 +21,8 @@ TEST(Compare, AolPlusGivesOutNothingInASampleOfTheGrid) {
   }
 }
 
-/// The results of the whole grid are 100 % passive, 99.9 % within 8 mm/s, 98 % within 3 mm/s, 68 % within 1.5 mm/s, and
-/// an error of 17.4 %.
+/// The whole grid is 100 % passive, 99.9 % within 8 mm/s, 98 % within 3 mm/s, 68 % within 1.5 mm/s. The error is 17.4
+/// %.
 TEST(Compare, ThePresetIsPassiveQuietAndTrueInASampleOfTheGrid) {
   const auto grid = comparison_grid();
   std::size_t within3 = 0;

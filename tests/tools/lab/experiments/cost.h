@@ -13,9 +13,9 @@ struct CostOptions {
   bool json = false;
 };
 
-/// `tendon-lab cost`: time (and instructions, if the kernel counts them) per step of each law, each part of AOL+, each
-/// model of the output estimator, and each order of its least squares in float32 and float64, with the
-/// remaining force error. The baseline, an empty loop in the same run, is not subtracted.
+/// Time (and instructions, if the kernel counts them) per step of each law, part of AOL+, model of the output
+/// estimator, and order of its least squares in float32 and float64, with the remaining force error. The baseline, an
+/// empty loop in the same run, is not subtracted.
 void cost(const CostOptions& options, std::ostream& out);
 
 }  // namespace tendon::lab

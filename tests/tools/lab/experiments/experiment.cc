@@ -15,7 +15,7 @@
 namespace tendon::lab {
 namespace {
 
-constexpr double kMeanOver = 0.05;         // s; slower motion is not vibration
+constexpr double kMeanOver = 0.05;         // s, the limit of vibration
 constexpr double kLongestLatency = 0.5;    // s
 constexpr std::uint32_t kDatagram = 200;   // bytes
 constexpr double kCorrelationStep = 2e-3;  // s, between the correlated samples
@@ -80,7 +80,7 @@ class Remote {
         if (one.hand.at > newest.at) newest = one.hand;
         return true;
       });
-      if (newest.at <= answered_.at) continue;  // only motions that were overtaken by a newer one
+      if (newest.at <= answered_.at) continue;  // all of them were overtaken by a newer motion
       answered_ = newest;
       free_ = start + environment_.route->compute;
       const injector::Decision way = back_->decide({.arrival = free_, .size = kDatagram});
@@ -138,7 +138,6 @@ HapticController::Config controller(const Experiment& experiment) {
 
 double count(double x, double step) { return step > 0 ? std::round(x / step) * step : x; }
 
-/// Common interface of both kinds of hand: true position, measured position, and response to a force.
 class Hand {
  public:
   explicit Hand(const PrescribedMotion& motion) : motion_(&motion), friction_(motion.friction) {}

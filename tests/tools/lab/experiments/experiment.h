@@ -14,16 +14,15 @@
 
 namespace tendon::lab {
 
-/// An engine with a computing time behind a network of tendon-inject. The device sends its motion once per engine
-/// period; a free engine answers the newest one that arrived, without a queue.
+/// The device sends its motion once per engine period; a free engine answers the newest one that arrived, without a
+/// queue.
 struct Route {
   injector::Profile there;  ///< for motions
   injector::Profile back;   ///< for forces
   Duration compute{};       ///< per answer
 };
 
-/// A remote environment behind a network. The force depends on the position and the time. When the clock starts, the
-/// hand is at rest, and the answer to its position has already arrived.
+/// When the clock starts, the hand is at rest, and the answer to its position has already arrived.
 struct Environment {
   using Force = std::function<Vec3(double t, const Vec3& position)>;
   using Stiffness = std::function<Mat3(double t, const Vec3& position)>;
@@ -37,7 +36,7 @@ struct Environment {
   Duration jitter{};             ///< maximum additional delay; a force that is overtaken by a later one is dropped
   double loss = 0;               ///< fraction of forces lost
   std::optional<Route> route{};  ///< replaces the four above
-  /// N, on the hand: the error-free answer, see Moment::true_force. Empty: `force`.
+  /// The error-free answer, see Moment::true_force. Empty: `force`.
   Force truth{};
 };
 
@@ -48,7 +47,7 @@ struct PrescribedMotion {
   double encoder_step = 0;                 ///< m, per axis; 0 = exact
 };
 
-/// A simulated device with a hand that responds to forces; used to show instability.
+/// Responds to forces; shows instability.
 using FreeHand = SimulatedDevice::Config;
 
 struct Experiment {
@@ -83,7 +82,7 @@ struct Outcome {
   double largest_force = 0;   ///< N
   double limited_share = 0;   ///< the fraction of the periods in which the law changes the force
   double force_error = 0;     ///< N, rms of felt minus true force
-  double true_force = 0;      ///< N, the rms of the true force
+  double true_force = 0;      ///< rms of the true force, N
   double latency = 0;         ///< s, the delay that maximizes the correlation with the true force
   bool stable = false;        ///< late_vibration ≤ kMostVibration
 };
@@ -91,18 +90,16 @@ struct Outcome {
 /// m/s: a third of the peak speed of a hand that moves by 15 mm at 0.25 Hz.
 inline constexpr double kMostVibration = 8e-3;
 
-/// Runs the server's HapticController against the environment and the hand on a virtual clock. The hold, ramp and slew
-/// limits are disabled, so a force is held until the next one arrives.
-///
-/// Deterministic on machines with the same floating point. Throws the exceptions of the parts if a value is not valid,
-/// and std::invalid_argument if there is no environment.
+/// The server's HapticController on a virtual clock. The hold, ramp and slew limits are disabled, so a force is held
+/// until the next one arrives. Deterministic on machines with the same floating point. Throws the exceptions of the
+/// parts if a value is not valid, and std::invalid_argument if there is no environment.
 std::vector<Moment> run(const Experiment& experiment);
 
 /// The `period` must be the one of the experiment.
 Outcome outcome(const std::vector<Moment>& record, Duration period);
 
-/// Returns the velocity (m/s) minus its mean over 50 ms, for the last `last` seconds of the record except its final 25
-/// ms, which have no such mean.
+/// Velocity (m/s) minus its mean over 50 ms, for the last `last` seconds but their final 25 ms, which have no such
+/// mean.
 std::vector<Vec3> fast_velocity(const std::vector<Moment>& record, Duration period, double last);
 
 /// Standard deviation (m/s) of fast_velocity, summed over axes.

@@ -17,16 +17,15 @@ namespace {
 constexpr Duration kTrialLength = std::chrono::seconds(3);
 constexpr Friction kDevice{.coulomb = 0.02, .viscous = 0.26};
 
-/// An engine's answers; force and stiffness of each are requested in turn. Between two answers a dynamic body advances
-/// by the elapsed time, as in tendon-softbody, while its tool moves continuously, because a jump would strike the
-/// surface away from it. If an engine is too slow, it falls behind.
+/// Each answer has a force and a stiffness. Between two, a dynamic body advances by the elapsed time, as in
+/// tendon-softbody, while its tool moves continuously, because a jump would strike the surface. A slow engine falls
+/// behind.
 class Answers {
  public:
   /// `compute`: s, time of the engine per step of a dynamic body, or per answer of a static one.
   Answers(PressedEngine& engine, double compute, double longest)
       : engine_(engine), pace_(std::max(engine.step(), compute)), longest_(longest) {}
 
-  /// Restarts time for another hand.
   void restart() {
     given_.clear();
     again();
@@ -66,7 +65,7 @@ class Answers {
     const double steps = engine_.step() > 0 ? std::max(1.0, std::floor((t - went_on_to_) / pace_)) : 1;
     for (double step = 1; step <= steps; ++step) feel_ = engine_.touch(from + step / steps * (tool - from));
     went_on_to_ += steps * pace_;
-    given_.resize(next_++);  // later answers were for another hand
+    given_.resize(next_++);  // later answers belong to another hand
     given_.push_back({t, tool, feel_});
   }
 
@@ -83,7 +82,7 @@ class Answers {
   std::size_t next_ = 0;  ///< of them
 };
 
-/// Depth of the hand below the surface, m.
+/// m, below the surface.
 double depth_at(double t, double deepest) {
   const double turn = 2 * std::numbers::pi * t;
   return deepest * (0.37 - 0.47 * std::cos(0.8 * turn) + 0.13 * std::sin(2.3 * turn));

@@ -15,7 +15,7 @@ namespace tendon::lab {
 struct Felt {
   double displayed = 0;      ///< Σ F·d / Σ F_true·d over depths d: displayed fraction of the true stiffness
   double force_error = 0;    ///< the rms of the error divided by the rms of the true force
-  double held_error = 0;     ///< the same without sending the stiffness, with held forces
+  double held_error = 0;     ///< the same value if the forces are held
   double limited_share = 0;  ///< the fraction of the periods in which the limiter changes the force
   double vibration = 0;      ///< m/s, the vibration of a free hand in the last second
   double latency = 0;        ///< s, the delay of the felt force

@@ -21,7 +21,7 @@ Truth& truth() {
   return the;
 }
 
-/// A body that is a few percent too stiff, otherwise like the truth, and instantaneous.
+/// A few percent too stiff, otherwise the truth, and instantaneous.
 std::unique_ptr<PressedEngine> good_body() {
   const PressedBlock& block = truth().block();
   BodyConfig config;
@@ -66,8 +66,7 @@ TEST(Felt, AStiffnessThatIsSentAlongMakesUpForMostOfTheWait) {
   EXPECT_LT(here.force_error, 0.7 * here.held_error);
 }
 
-// Every encoder count excites this body, its force oscillates between zero and too much, and the limiter removes half
-// of it; but it follows the hand.
+// Every encoder count excites this body: its force oscillates between zero and too much, and the limiter removes half.
 TEST(Felt, ABodyOfManyShortStepsKeepsUpWithTheHand) {
   const PressedBlock& block = truth().block();
   constexpr auto kModel = softbody::compared::Kind::kTensorMass;
@@ -79,7 +78,6 @@ TEST(Felt, ABodyOfManyShortStepsKeepsUpWithTheHand) {
   const Felt quick = felt(*body, truth(), route("base=0.05ms", 0.2), 1);
   EXPECT_GT(quick.displayed, 0.4);
   EXPECT_LT(quick.latency, 0.006);
-  // Five times slower than real time: it lags behind the hand.
   const Felt slow = felt(*body, truth(), route("base=0.05ms", 1), 1);
   EXPECT_LT(slow.displayed, 0.8 * quick.displayed);
 }
@@ -115,7 +113,6 @@ TEST(Routes, AForceIsAsLateAsBothWaysAndTheAnswerTogether) {
 TEST(Routes, AnEngineThatIsBusyTakesTheNewestAndQueuesNothing) {
   std::vector<double> asked;
   answered(route("base=1ms", 30), &asked);
-  // The first is the rest position before the clock starts.
   ASSERT_GE(asked.size(), 7U);
   for (std::size_t i = 2; i < asked.size(); ++i) EXPECT_EQ(asked[i] - asked[i - 1], 30);
 }

@@ -25,7 +25,6 @@ constexpr double kFewer = 0.3;         // ratio of successive barriers
 constexpr int kMostSteps = 400;        // Newton steps per barrier
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
 
-/// ℓ and its derivatives with respect to a signed force.
 struct Loss {
   double value = 0, slope = 0, curvature = 0;
 };
@@ -96,8 +95,8 @@ class Programme {
     return sum;
   }
 
-  /// Newton's method for one barrier; returns whether it converged. The backward pass computes the cost-to-go P E² + 2
-  /// p E, the forward pass the forces.
+  /// One barrier; returns whether Newton's method converged. The backward pass computes the cost-to-go P E² + 2 p E,
+  /// the forward pass the forces.
   bool centre(std::vector<double>& force, double barrier) const {
     std::vector<double> energy = accounts(force);
     std::vector<double> constant(n_);

@@ -12,7 +12,7 @@
 
 namespace tendon::lab {
 
-// Lower bounds of the force error of any law on a given motion, with motion and object known in advance.
+// Lower bounds for any law, with motion and object known in advance.
 
 /// The constraint that makes a held force passive. E is the account, ℓ that of core/ledger/output_bound.h.
 enum class Passive : std::uint8_t {
@@ -37,11 +37,11 @@ struct Floor {
   std::vector<double> force;  ///< N
 };
 
-/// Returns the forces with the least error that satisfy the passivity constraint. Solves the convex program
+/// The forces with the least error that satisfy the passivity constraint: the convex program
 ///
 ///     minimise Σ (F_k − t_k)²   subject to   E_(k+1) = E_k − F_k Δx_k + f_c |Δx_k| + b Δx_k²/T,   |F_k| ≤ F_max
 ///
-/// and the constraint of `sense` by an interior point method: a logarithmic barrier, and Newton steps by a Riccati
+/// and the constraint of `sense`, by an interior point method: a logarithmic barrier, and Newton steps by a Riccati
 /// recursion, because E is the only state. E₀ = 1 µJ. Before the first period the hand is at rest.
 ///
 /// Throws std::invalid_argument if the sizes differ, all true forces are zero, or a value is invalid.
@@ -54,7 +54,7 @@ Floor floor_of(const FloorProblem& problem, Passive sense);
 std::optional<double> floor_of(const std::vector<Moment>& record, const Friction& friction, Duration period,
                                double max_force, Passive sense);
 
-/// Returns the motion of a hand of `compare` on an ideal spring without sampling, −stiffness · x (N/m): 2 s, T = 1 ms.
+/// Of a hand of `compare` on an ideal spring without sampling (N/m): 2 s, T = 1 ms.
 FloorProblem on_perfect_spring(double stiffness, const Friction& friction, bool firm);
 
 struct FloorOptions {
@@ -62,7 +62,6 @@ struct FloorOptions {
   bool json = false;
 };
 
-/// `tendon-lab floor`: bounds for the hands of `compare` on ideal springs.
 void floors(const FloorOptions& options, std::ostream& out);
 
 }  // namespace tendon::lab

@@ -18,7 +18,7 @@ namespace {
 
 constexpr Friction kDamped{.coulomb = 0.02, .viscous = 0.26};
 
-/// Creates a hand that moves ± 4 mm at 0.5 Hz against a spring.
+/// ± 4 mm at 0.5 Hz.
 FloorProblem spring(double stiffness, const Friction& friction = kDamped) {
   FloorProblem problem{.friction = friction, .period = std::chrono::milliseconds(1), .max_force = 8.5};
   const auto place = [](int k) { return 0.004 * portable::sin(2 * 3.14159265358979 * 0.5 * k * 1e-3); };

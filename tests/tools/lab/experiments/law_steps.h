@@ -9,9 +9,8 @@
 
 namespace tendon::lab {
 
-/// The steps of a limiter whose cost is measured. The hand moves as in the paper, 15 mm at 0.25 Hz, against a spring of
-/// 2000 N/m. A period has a thousand samples 4 ms apart; each step moves a quarter of the distance between samples, as
-/// in 1 ms.
+/// Steps whose cost is measured: 15 mm at 0.25 Hz, as in the paper, against a spring of 2000 N/m. A period has a
+/// thousand samples 4 ms apart; each step moves a quarter of the distance between samples, as in 1 ms.
 class LawSteps {
  public:
   static constexpr std::size_t kPeriod = 1000;  ///< steps
@@ -35,8 +34,7 @@ class LawSteps {
   Vec3 applied_ = Vec3::Zero();
 };
 
-/// Returns the limiter of `law` with LawSteps' friction. A law with a model of the environment gets LawSteps' stiffness
-/// and delay. AOL+ has no parts.
+/// With LawSteps' friction and, for a law with a model of the environment, its stiffness and delay. AOL+ has no parts.
 LimiterConfig measured_limiter(Law law);
 
 }  // namespace tendon::lab

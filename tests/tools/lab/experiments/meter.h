@@ -11,9 +11,8 @@ struct TooSlow : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// Measures time and instructions. Everything else in the lab is independent of clocks.
+/// Time and instructions: the lab's only clock.
 ///
-///     const Meter meter;
 ///     const Meter::Reading before = meter.read();
 ///     work();
 ///     const Meter::Reading cost = meter.read() - before;

@@ -63,8 +63,7 @@ std::vector<injector::Decision> decisions(const std::string& line, const NetemOp
   return result;
 }
 
-/// Returns the mean burst length with the requested correlation of consecutive losses. The correlation of a Gilbert
-/// chain is 1 − P(good → bad) − P(bad → good).
+/// For a Gilbert chain, the correlation is equal to 1 − P(good → bad) − P(bad → good).
 double mean_burst(double probability, double correlation) { return 1 / ((1 - correlation) * (1 - probability)); }
 
 Losses our_losses(double probability, double correlation, const NetemOptions& options) {
@@ -86,8 +85,7 @@ constexpr double kRho = 0.9;
 /// The requested distribution: 2 ms plus an exponential of mean 6 ms.
 double exponential_quantile(double u) { return 2 - 6 * std::log1p(-u); }
 
-/// netem uses x % size as a table index and x % (2 · jitter) for uniform jitter: the low bits of x, which are not
-/// correlated with those of the previous number.
+/// netem uses x % size as a table index and x % (2 · jitter) for uniform jitter: the uncorrelated low bits of x.
 Delays netem_table(const NetemOptions& options) {
   constexpr std::uint32_t kSize = 4096;
   NetemRandom random(kRho, options.seed);

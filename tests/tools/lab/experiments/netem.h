@@ -10,7 +10,7 @@
 
 namespace tendon::lab {
 
-/// Correlated random numbers of tc-netem, as get_crandom() in Linux' net/sched/sch_netem.c computes them:
+/// get_crandom() in Linux' net/sched/sch_netem.c:
 ///     x_t = (U_t (2³² − ρ') + x_{t−1} ρ') / 2³²,   ρ' = ρ + 1 in units of 2⁻³², U uniform in 0 … 2³² − 1
 /// The result is not uniform: its variance is 1/12 · (1 − ρ)/(1 + ρ).
 ///
@@ -34,8 +34,7 @@ struct NetemOptions {
   bool json = false;
 };
 
-/// `tendon-lab netem`: actual loss rates, bursts, delays and autocorrelation when a correlation is requested, from the
-/// arithmetic of tc-netem and from the injector.
+/// Actual loss rates, bursts, delays and autocorrelation for a requested correlation, by tc-netem and by the injector.
 void netem(const NetemOptions& options, std::ostream& out);
 
 }  // namespace tendon::lab

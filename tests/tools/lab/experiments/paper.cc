@@ -90,8 +90,8 @@ std::vector<PaperExperiment> make_experiments() {
   all.push_back(same_for_all("12", "stiffness up to 3000 N/m and down to 0 again every 0.78 s", "law and coefficient",
                              {.force = [](double t, const Vec3& x) { return Vec3(-triangle(t, 0.78, 3000) * x); }}));
 
-  // After learning 840 N/m, an estimator overestimates the force by 3/2 when the stiffness becomes 560: by more than 4
-  // N. The change occurs at the greatest depth and is known with the next answer.
+  // After learning 840 N/m, an estimator overestimates the force by 3/2 at 560: by more than 4 N. The change occurs at
+  // the greatest depth and is known with the next answer.
   const auto softens = [](double t) { return t < 1 || (t >= 2 && t < 3) || t >= 4 ? 840.0 : 560.0; };
   all.push_back(same_for_all("14", "output estimator, 25 Hz and 40 ms late; 840 N/m become 560 at 1 s and 3 s",
                              "the object, when it changed, the estimator's reset threshold",
@@ -283,7 +283,6 @@ PaperRow row_of(const nlohmann::json& line) {
 
 using AnyRow = std::variant<PaperRow, FrictionTable>;
 
-/// If `drawn` is true, the motion is kept for a figure.
 PaperRow run_row(std::size_t experiment, std::size_t kind, bool drawn) {
   PaperRow row = paper_row(paper_experiments().at(experiment), kRowKinds.at(kind).law, kRowKinds.at(kind).preset);
   row.prescribed_record = {};

@@ -14,9 +14,8 @@
 
 namespace tendon::lab {
 
-/// An experiment of Lee & Lee 2009, section III, with an environment that no sampled loop can display exactly.
-///
-/// Table IV of the paper is lost. `assumed` names the values that replace it (core/PROOFS.md, "Paper's experiments").
+/// Lee & Lee 2009, section III, with an environment that no sampled loop can display exactly. Table IV of the paper is
+/// lost. `assumed` names the values that replace it (core/PROOFS.md, "Paper's experiments").
 struct PaperExperiment {
   std::string name;  ///< "A" … "E", "12", "14"
   std::string what;
@@ -33,18 +32,17 @@ struct PaperExperiment {
 
 const std::vector<PaperExperiment>& paper_experiments();
 
-/// The friction that reproduces all five operational stiffnesses of the paper (core/PROOFS.md, "Paper's experiments").
-/// It does not imply the friction of any device.
+/// Reproduces all five operational stiffnesses of the paper (core/PROOFS.md, "Paper's experiments"). It does not imply
+/// the friction of any device.
 inline constexpr Friction kPaperFriction{.coulomb = 0.005, .viscous = 0.26};
 inline constexpr double kPaperMaxForce = 8.5;   ///< N
 inline constexpr double kPaperEncoder = 30e-6;  ///< m, resolution of the device with the free hand
 
 /// Default parts of AOL+ in a scene for this device: cap, robust ledger, knee.
 AolPlus<1, 3>::Parts default_parts(double encoder_step);
-/// default_parts() plus bounded acceleration, for a device with very little damping (core/PROOFS.md, "Bounded
-/// acceleration").
+/// For a device with very little damping, also bounded acceleration (core/PROOFS.md, "Bounded acceleration").
 AolPlus<1, 3>::Parts low_friction_parts(double encoder_step);
-/// Returns low_friction_parts() if 2b/T is below the stiffness of common objects, otherwise default_parts().
+/// low_friction_parts() if 2b/T is below the stiffness of common objects.
 AolPlus<1, 3>::Parts parts_without_preset(const Friction& friction, double encoder_step);
 
 /// 15 mm · sin(2π · 0.25 Hz · t) along `direction`, independent of forces.
@@ -52,7 +50,7 @@ PrescribedMotion paper_motion(const Friction& friction, double encoder_step, con
 /// The same motion as the target of a compliant hand: 75 g of device, 50 g of hand, 400 N/m, 0.3 N·s/m.
 FreeHand paper_hand(const Friction& friction, const Vec3& direction = Vec3::UnitX());
 
-/// `law` in an experiment: displayed stiffness on the prescribed motion, stability with the free hand.
+/// Stiffness displayed on the prescribed motion, stability with the free hand.
 struct PaperRow {
   std::string experiment;
   std::string law;  ///< none, aol, aol+ or the name of a preset
@@ -70,12 +68,12 @@ PaperRow paper_row(const PaperExperiment& experiment, Law law, std::optional<Pre
 struct PaperOptions {
   std::optional<std::filesystem::path> out{};
   bool json = false;
-  /// The units are the rows of the table, which are four rows for each experiment and then the rows of Tables II and
-  /// III. With `from`, the motions of the figures are simulated again, because lines do not contain them.
+  /// Four rows for each experiment, then the rows of Tables II and III. With `from`, the motions of the figures are
+  /// simulated again, because lines do not contain them.
   Part part{};
 };
 
-/// `tendon-lab paper`: writes the table or JSON, and figures. Throws std::runtime_error if writing fails.
+/// Throws std::runtime_error if writing fails.
 void paper(const PaperOptions& options, std::ostream& out);
 
 }  // namespace tendon::lab

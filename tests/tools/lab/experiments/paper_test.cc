@@ -69,7 +69,7 @@ TEST(Paper, AWrongEstimateCannotPushTheHandHarderThanEnergyAllows) {
   EXPECT_GE(plus.least_energy(), -1e-12);
 }
 
-// ---- AOL+ as a whole: core/PROOFS.md, "Force inside the bound" -----------------------------------------------------
+// core/PROOFS.md, "Force inside the bound"
 
 struct Composite {
   const char* name;
@@ -95,7 +95,6 @@ Environment along(const std::function<double(double t, double x)>& law, const Ve
   return {.force = [law, direction](double t, const Vec3& x) { return Vec3(law(t, x.dot(direction)) * direction); }};
 }
 
-/// Returns the environments in the given direction, for a hand that moves along `motion`.
 std::vector<Composite> composites(const Vec3& direction, const Vec3& motion) {
   const ScriptedMotion sine(ScriptedMotion::Sine{.amplitude = 0.015, .frequency = 0.25, .direction = motion});
   const auto spring = [&](double k) { return along([k](double, double x) { return -k * x; }, direction); };

@@ -23,8 +23,7 @@ constexpr double kCoarser = 1.5;  // ratio of cell widths for estimating the mes
 constexpr double kSlide = 0.25;   // patch radii
 constexpr int kSamples = 100;     // of the script
 
-/// Returns the cell boundaries as distances from a point: `fine` wide up to `around`, then growing, the last at
-/// `length`.
+/// Distances of cell boundaries: `fine` wide up to `around`, then growing, the last at `length`.
 std::vector<double> outward(double length, double around, double fine) {
   std::vector<double> ends;
   double width = fine;

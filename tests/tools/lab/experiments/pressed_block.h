@@ -15,8 +15,7 @@
 
 namespace tendon::lab {
 
-/// A block that is fixed at the bottom and pressed by a patch on its top: the test problem of `tendon-lab accuracy`.
-/// The defaults are B1 of clients/softbody/README.md.
+/// Fixed at the bottom and pressed by a patch on its top. The defaults are B1 of clients/softbody/README.md.
 struct PressedBlock {
   softbody::Vec3 size{0.1, 0.1, 0.05};  ///< m
   softbody::Material material{.young = 1e4, .poisson = 0.45};
@@ -26,7 +25,7 @@ struct PressedBlock {
 
   /// Throws std::invalid_argument naming the invalid option.
   void check() const;
-  /// m, center of the patch; the body stands on z = 0, centered at the origin.
+  /// m; the body stands on z = 0, centered at the origin.
   softbody::Vec3 touch_point() const { return {patch_centre.x(), patch_centre.y(), size.z()}; }
 };
 
@@ -40,15 +39,16 @@ struct Touched {
   softbody::Vec3 force;
 };
 
-/// Reference solution for a pressed block, computed on meshes of quadratic hexahedra refined below the patch.
-///
-/// The material is Neo-Hookean. The stiffness is that of the linear body on the fine mesh times the ratio of both on a
-/// mesh that is coarse enough for Newton's method:
+/// The reference solution, on demand, with quadratic hexahedra refined below the patch. The Neo-Hookean stiffness is
+/// that of the linear body on the fine mesh times the ratio of both on a mesh that is coarse enough for Newton's
+/// method:
 ///
 ///     K = K_linear(a/cells) · K_neo-Hookean(a/cells_for_large)/K_linear(a/cells_for_large)
 ///
 /// because the ratio hardly depends on the mesh. `uncertainty()` is the change of both factors from the next coarser
-/// mesh. Results are computed on demand. Thread-safe: no.
+/// mesh.
+///
+/// Thread-safe: no.
 class Truth {
  public:
   /// Cells per patch radius below the patch, at least 1.5. The defaults take half a minute and 0.3 GB for B1.
@@ -65,16 +65,14 @@ class Truth {
 
   Stiffness stiffness(std::size_t load);
 
-  /// Returns the stiffness of the material law `law` on an infinitely fine mesh, that is the truth plus the model's own
-  /// error. Returns nullopt if that body collapses under the load.
+  /// The stiffness of `law` on an infinitely fine mesh; nullopt if that body collapses under the load.
   std::optional<Stiffness> limit(softbody::Law law, std::size_t load) { return limit(law, block_.material, load); }
-  /// The same for another material.
   std::optional<Stiffness> limit(softbody::Law law, const softbody::Material& material, std::size_t load);
 
   double uncertainty();  ///< relative, of the stiffness under the second load
 
-  /// Returns the force on a tool within a quarter of the patch radius from the patch center: that of the linear body
-  /// times 1 + αF + βF², which is exact for both loads at the center.
+  /// For a tool within a quarter of the patch radius from the center: the linear body's force times 1 + αF + βF², which
+  /// is exact for both loads at the center.
   softbody::Vec3 force(const softbody::Vec3& tool);
 
   /// The tool presses to the depth of the first load, slides by a quarter of the patch radius, and releases. Sampled

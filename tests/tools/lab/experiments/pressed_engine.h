@@ -12,8 +12,8 @@
 
 namespace tendon::lab {
 
-/// Computes the answers of a pressed block: a body in this process, or a worker (clients/cpp/worker/README.md) in other
-/// processes. Positions and forces are in the body's frame. Thread-safe: no.
+/// A body in this process, or a worker (clients/cpp/worker/README.md) in other processes. Positions and forces are in
+/// the body's frame. Thread-safe: no.
 class PressedEngine {
  public:
   virtual ~PressedEngine() = default;
@@ -25,18 +25,17 @@ class PressedEngine {
   virtual softbody::Reaction under(double load) = 0;
   virtual double step() const = 0;  ///< s, the simulated time of an answer, or 0 if the body is static
   virtual softbody::Body::Size size() const = 0;
-  /// Returns the time of an answer in s from a meter's reading: processor time of this process, or wall time for a
-  /// worker.
+  /// Seconds of an answer: processor time of this process, or wall time for a worker.
   virtual double took(const Meter::Reading& cost) const = 0;
 
  protected:
   PressedEngine() = default;
 };
 
-/// Creates the body of `config` in this process. Throws the exceptions of Body.
+/// Throws the exceptions of Body.
 std::unique_ptr<PressedEngine> own_engine(const softbody::BodyConfig& config);
 
-/// Creates an engine with a comparison model. See compared::PressedBody for arguments and exceptions.
+/// See compared::PressedBody for arguments and exceptions.
 std::unique_ptr<PressedEngine> compared_engine(softbody::compared::Kind kind, softbody::Solid solid,
                                                double patch_radius, const softbody::Vec3& middle,
                                                const softbody::compared::Config& config);

@@ -6,7 +6,6 @@
 
 namespace tendon::lab {
 
-/// The parameters of each method in the comparisons of the lab.
 inline Pressing pressing_by(CouplingMethod method) {
   Pressing with{.method = method};
   switch (method) {

@@ -10,8 +10,8 @@
 namespace tendon::lab::reconstruction_test {
 namespace {
 
-/// A hand moves in and out of a Hertzian contact with a sphere (force ∝ depth^3/2, slightly larger while loading) with
-/// two slow oscillations and a tremor; the object is at x > 0.
+/// Into a sphere at x > 0 (Hertz: force ∝ depth^3/2, slightly larger while loading) with two slow oscillations and a
+/// tremor.
 struct Press {
   static constexpr double kStiffness = 4.0 / 3 * 12539 * 0.1;  // N/m^1.5, for a radius of 10 mm
 
@@ -29,7 +29,7 @@ struct Press {
   }
 };
 
-/// The surface at x = 0, optionally with a table of forces in 0.32 mm steps into the object.
+/// At x = 0, optionally with a table of forces in 0.32 mm steps into the object.
 Contact surface(double t, const Vec3& x, bool with_table) {
   Contact contact{.normal = -Vec3::UnitX(), .gap = -x.x()};
   if (!with_table) return contact;
@@ -43,7 +43,7 @@ Contact surface(double t, const Vec3& x, bool with_table) {
 
 enum class Sent { kForce, kForceAndStiffness, kAndSurface, kAndTable };
 
-/// Returns the rms force error over the rms of the true force. The time of an answer is a period plus `late_ms`.
+/// rms error over rms of the true force. The time of an answer is a period plus `late_ms`.
 double error(double rate_hz, double late_ms, Sent sent) {
   Experiment set;
   set.environment = {

@@ -49,8 +49,6 @@ double one_of(Dice& dice, const std::array<double, Count>& values) {
 
 Vec3 towards_x(double force) { return {force, 0, 0}; }
 
-// ---- The kinds ---------------------------------------------------------------------------------------------------
-
 void nothing_else(Draft&) {}
 
 void counts(Draft& draft) {
@@ -148,7 +146,6 @@ void circle(Draft& draft) {
   const Vec3 principal(draft.k, draft.k * draft.dice.within(0.1, 1), draft.k * draft.dice.within(0.1, 1));
   const Mat3 stiffness = turned * principal.asDiagonal() * turned.transpose();
   draft.object([stiffness](double, const Vec3& x) { return Vec3(-stiffness * x); });
-  // A circle of 12 mm with 48 corners in 2 s.
   ScriptedMotion::MinimumJerk round;
   constexpr int kCorners = 48;
   for (int i = 0; i <= kCorners; ++i) {

@@ -14,9 +14,8 @@
 
 namespace tendon::lab {
 
-// Situations beyond the grid of compare.h, which has one encoder resolution, motion, period and only linear springs, so
-// that laws tuned on it could overfit. A situation is drawn from a seed: network, device and hand as in the grid, plus
-// one variation by kind.
+// Laws could overfit to the grid of compare.h, with its one encoder resolution, motion and period and its linear
+// springs. Here, network, device and hand are drawn as in the grid, with one variation by kind.
 
 struct SituationKind {
   std::string_view name;
@@ -24,7 +23,7 @@ struct SituationKind {
 };
 std::span<const SituationKind> situation_kinds() noexcept;
 
-/// Laws must only be tuned on smaller seeds. All other seeds are only used for the evaluation.
+/// Laws must only be tuned on smaller seeds; larger ones are only for the evaluation.
 inline constexpr std::uint64_t kHeldOutSeeds = 1'000'000;
 
 struct Trial {
@@ -34,8 +33,8 @@ struct Trial {
   std::string drawn{};      ///< drawn parameters, as text
 };
 
-/// Draws the situation of this kind for `seed`; nullopt for recorded hands if TENDON_DATA is not set. Deterministic on
-/// all machines. Throws std::invalid_argument if there is no such kind.
+/// Deterministic on all machines. nullopt for recorded hands if TENDON_DATA is not set. Throws std::invalid_argument if
+/// there is no such kind.
 std::optional<Trial> draw_situation(std::string_view kind, std::uint64_t seed);
 
 struct Contender {

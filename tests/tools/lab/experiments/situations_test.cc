@@ -55,8 +55,8 @@ TEST(Situations, AnObjectWithAMemoryIsAskedApartFromItsTruth) {
   EXPECT_EQ(truth(0, Vec3(-0.0001, 0, 0)), Vec3(Vec3::Zero()));  // the second instance was not pressed
 }
 
-/// This is a regression test. The damper reversed the direction of the force and held the hand, and the error was 64
-/// points higher than with three parts at seed 55.
+/// Regression: the damper reversed the force and held the hand. At seed 55, it had 64 points more error than three
+/// parts.
 TEST(Situations, AHandThatIsDrawnOutIsNotHeld) {
   for (std::uint64_t seed = 41; seed <= 60; ++seed) {
     const auto trial = draw_situation("drawn-out", seed);

@@ -34,8 +34,8 @@ inline StepRecord step_at(std::uint64_t n) {
   return step;
 }
 
-/// A hand moves by ± `amplitude` (m) at `frequency` (Hz) through a spring wall at `wall` (m) of `stiffness` (N/m),
-/// along x. Every 10th step uses a new force, which answers the motion `delay` steps before.
+/// ± `amplitude` (m) at `frequency` (Hz) along x through a wall at `wall` (m) of `stiffness` (N/m). Every 10th step
+/// uses a new force, which answers the motion `delay` steps before.
 inline std::vector<StepRecord> spring_run(std::uint64_t steps, double stiffness, double wall, std::uint64_t delay,
                                           double amplitude = 0.01, double frequency = 1) {
   const auto position = [&](std::uint64_t n) {
@@ -59,8 +59,8 @@ inline std::vector<StepRecord> spring_run(std::uint64_t steps, double stiffness,
   return run;
 }
 
-/// The real control law on a mass of 0.1 kg with viscous friction, pulled by a spring to a moving hand through a wall
-/// at x = 0. Forces of the wall are 20 steps late and arrive every 10 steps.
+/// The real control law on 0.1 kg with viscous friction, pulled by a spring to a moving hand through a wall at x = 0,
+/// whose forces are 20 steps late and arrive every 10 steps.
 inline std::vector<StepRecord> toy_run(Law law, std::uint64_t steps) {
   constexpr double kMass = 0.1;
   constexpr double kFriction = 1;
@@ -100,8 +100,7 @@ inline std::vector<StepRecord> toy_run(Law law, std::uint64_t steps) {
   return run;
 }
 
-/// Writes the runs of several devices to a file. `names` contains the names of all devices except the first. All runs
-/// except the first may be empty.
+/// `names`: of all devices except the first. All runs except the first may be empty.
 inline void record_devices(const std::filesystem::path& file, const std::vector<std::vector<StepRecord>>& runs,
                            const std::vector<std::string>& names, bool whole = true) {
   FileSink sink(file);
@@ -119,7 +118,7 @@ inline void record_devices(const std::filesystem::path& file, const std::vector<
   if (!sink.error().empty()) throw std::runtime_error(sink.error());
 }
 
-/// Writes a run to a file. If `whole` is false, the file has no end mark, as if the server has been killed.
+/// If not `whole`, the file has no end mark, as if the server had been killed.
 inline void record(const std::filesystem::path& file, const std::vector<StepRecord>& run, bool whole = true) {
   record_devices(file, {run}, {}, whole);
 }

@@ -87,7 +87,6 @@ TeleopRow row_of(CouplingMethod method, int round_trip_ms, std::span<const Trial
   return row;
 }
 
-/// All trials: each hand at each round trip of each method, in this order.
 class Trials {
  public:
   Trials(int hands, std::uint64_t seed, std::span<const int> round_trips_ms)

@@ -119,7 +119,7 @@ class Vibration {
   double follower_before_ = 0;
 };
 
-/// m: the mean offset between the ends over two periods of the motion.
+/// m: mean over two periods of the motion.
 double offset(Ports& ports) {
   double sum = 0;
   ports.run(kMean, [&](int) { sum += ports.leader.x().x() - ports.follower.x().x(); });

@@ -18,8 +18,7 @@ std::vector<std::string> fields_of(const std::string& line) {
   return fields;
 }
 
-/// The file tests/golden/teleop_matrix.csv is the output of `tendon-lab teleop --matrix`. This test repeats the rows of
-/// two unequal devices over bursts.
+/// tests/golden/teleop_matrix.csv is the output of `tendon-lab teleop --matrix`.
 TEST(TeleopMatrix, UnequalDevicesOverBurstsFeelWhatTheCommittedTableSays) {
   std::ifstream file(TENDON_GOLDEN "/teleop_matrix.csv");
   std::string line;

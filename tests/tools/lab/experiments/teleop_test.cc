@@ -11,7 +11,7 @@
 namespace tendon::lab::teleop_test {
 namespace {
 
-/// The file tests/golden/teleop.csv contains the results of three hands from seed 1, at 20 and 200 ms.
+/// tests/golden/teleop.csv contains the results of three hands from seed 1 at 20 and 200 ms.
 TEST(Teleop, EachMethodIsFeltAsTheCommittedTableSays) {
   constexpr int kRoundTrips[] = {20, 200};
   const auto rows = teleop_rows(3, 1, kRoundTrips);

@@ -10,9 +10,8 @@
 
 namespace tendon::lab {
 
-/// Keeps evenly spaced samples of a stream in bounded memory: all of them up to `most`, then every second one, every
-/// fourth, and so on. Statistics of a short run are exact; those of a long one use at least `most` / 2 samples,
-/// deterministically.
+/// Evenly spaced samples in bounded memory: all of them up to `most`, then every second one, every fourth, and so on. A
+/// short run is exact; a long one keeps at least `most` / 2 samples, deterministically.
 template <class T>
 class Thinned {
  public:
@@ -39,8 +38,7 @@ class Thinned {
   std::uint64_t stride_ = 1;
 };
 
-/// Returns the smallest sample that is at least as large as the fraction `p` (0 < p ≤ 1) of all samples. Returns
-/// nullopt if there are no samples.
+/// The smallest sample that is at least as large as the fraction `p` (0 < p ≤ 1) of all. nullopt if there are none.
 template <class T>
 std::optional<T> percentile(std::vector<T> samples, double p) {
   if (samples.empty()) return std::nullopt;

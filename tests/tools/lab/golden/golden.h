@@ -8,10 +8,9 @@
 
 namespace tendon::lab {
 
-/// Golden table: results of every law as a committed file, so that a change of a law is visible as a diff.
-///
-/// Columns are quantities in SI units, named in the header. Law and situation are the key of a row. Numbers have the
-/// shortest form that parses to the same value, so equal text means equal bits.
+/// Results of every law as a committed file, so that a change of a law is visible as a diff. Law and situation are the
+/// key of a row. Columns are quantities in SI units. Numbers have the shortest form that parses to the same value, so
+/// equal text means equal bits.
 struct GoldenTable {
   struct Row {
     std::string law;
@@ -22,15 +21,12 @@ struct GoldenTable {
   std::vector<Row> rows;
 };
 
-/// Runs every law in twelve situations and in the experiments of the paper, with the prescribed motion and with the
-/// free hand. The situations are every 209th of comparison_grid(), which covers all values of all axes. Takes some
-/// seconds.
-///
-/// The result is bit-identical on all x86-64 processors and C libraries, because only correctly rounded IEEE 754
-/// operations of libm are used (core/base/portable_math.h).
+/// Every law in every 209th situation of comparison_grid(), which covers all values of all axes, and in the experiments
+/// of the paper, with the prescribed motion and with the free hand. Bit-identical on all x86-64 processors and C
+/// libraries, because only correctly rounded IEEE 754 operations of libm are used (core/base/portable_math.h).
 GoldenTable golden_laws();
 
-/// Writes CSV: `law,situation,` and the columns. No cell contains a comma or quote.
+/// CSV: `law,situation,` and the columns. No cell contains a comma or quote.
 void write(std::ostream& out, const GoldenTable& table);
 
 /// Throws std::runtime_error if the file cannot be read or is not a golden table.
@@ -45,11 +41,11 @@ struct GoldenDifference {
 };
 std::vector<GoldenDifference> differences(const GoldenTable& was, const GoldenTable& is);
 
-/// One line each under a heading: law, situation, figure, was, is.
+/// Returns one line for each difference with the law, the situation, the figure and both values.
 std::string to_text(const std::vector<GoldenDifference>& differences);
 
-/// `tendon-lab golden`: compares the current results with FOLDER/laws.csv or rewrites it. With `cost`: FOLDER/cost.csv
-/// (law_cost.h), counted with the program `law_cost`.
+/// Compares the current results with FOLDER/laws.csv or rewrites it. With `cost`: FOLDER/cost.csv (law_cost.h), counted
+/// with the program `law_cost`.
 struct GoldenOptions {
   std::filesystem::path folder = "tests/golden";
   bool write = false;
@@ -57,8 +53,8 @@ struct GoldenOptions {
   std::filesystem::path law_cost{};
 };
 
-/// Returns true if nothing differs. Throws std::runtime_error if the file cannot be read or written, or its costs were
-/// counted with another compiler.
+/// True if nothing differs. Throws std::runtime_error if the file cannot be read or written, or its costs were counted
+/// with another compiler.
 bool golden(const GoldenOptions& options, std::ostream& out);
 
 }  // namespace tendon::lab

@@ -59,8 +59,6 @@ TEST(Golden, ADifferenceNamesLawSituationFigureAndBothValues) {
   EXPECT_TRUE(differences(was, was).empty());
 }
 
-// ---- The same bytes on every x86-64 processor -----------------------------------------------------------------------
-
 /// Makes glibc select the variants of sin, exp … for processors without FMA.
 constexpr const char* kWithoutFma = "GLIBC_TUNABLES=glibc.cpu.hwcaps=-AVX2,-FMA,-FMA4 ";
 

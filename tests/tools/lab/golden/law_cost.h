@@ -8,10 +8,8 @@
 
 namespace tendon::lab {
 
-/// Instructions per step of every law as a committed table, so that a higher cost is visible as a diff.
-///
-/// The counts depend only on the compiler, its flags and Eigen, which the table names. They are counted by callgrind
-/// and do not depend on time.
+/// Instructions per step of every law, counted by callgrind, as a committed table. They depend only on the compiler,
+/// its flags and Eigen, which the table names.
 struct CostTable {
   struct Row {
     std::string law;
@@ -26,23 +24,21 @@ inline constexpr double kCostTolerance = 0.02;
 /// Returns compiler, flags and Eigen version of this build: the first line of a table.
 std::string built_with();
 
-/// Counts every law of laws(), AOL+ with its default parts, on the motion of law_steps.h: instructions of two periods
-/// of the motion minus those of one, divided by the steps per period. `program` is law-cost.
-///
-/// Throws std::runtime_error if `program` cannot be run under valgrind.
+/// AOL+ with its default parts, on the motion of law_steps.h: instructions of two periods of the motion minus those of
+/// one, divided by the steps per period. `program` is law-cost. Throws std::runtime_error if it cannot be run under
+/// valgrind.
 CostTable count_law_costs(const std::filesystem::path& program);
 
-/// Writes CSV: "# counted with " and `built_with`, then `law,instructions_per_step` and the rows, to a tenth.
+/// CSV: "# counted with " and `built_with`, then `law,instructions_per_step` and the rows, to a tenth.
 void write(std::ostream& out, const CostTable& table);
 
 /// Throws std::runtime_error if the file cannot be read or is not a cost table.
 CostTable read_costs(const std::filesystem::path& file);
 
-/// Returns why two tables cannot be compared (different builds), or an empty string.
+/// The difference of the builds, or empty.
 std::string why_not_comparable(const CostTable& was, const CostTable& is);
 
-/// Returns a line (law, was, is) for each law that differs by more than kCostTolerance, or that is in only one of the
-/// tables.
+/// Returns a line (law, was, is) for each law that differs by more than kCostTolerance or is missing in one table.
 std::string cost_differences(const CostTable& was, const CostTable& is);
 
 }  // namespace tendon::lab

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// law-cost: runs the steps of every law for `tendon-lab golden --cost` and prints each law's name. Callgrind counts
-// inside `step_law` and writes a file at each return from it.
+// law-cost: prints each law's name. Callgrind counts inside `step_law` and writes a file at each return from it.
 #include <cstddef>
 #include <iostream>
 #include <string_view>

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// Friction experiment on a Falcon with its driver, packets, kinematics and encoder counts, on a model with known
-// friction.
+// A Falcon's driver, packets, kinematics and encoder counts, on a model with known friction.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -53,7 +51,6 @@ class FalconOnARail final : public Device {
     const double force = falcon_.force().x();
     const double dt = seconds(kStep);
     for (; now_ < then; now_ += kStep) {
-      // Coulomb friction cannot reverse the motion.
       const double pushed = speed_ + dt / kMass * (force - friction_.viscous * speed_);
       const double lost = dt / kMass * friction_.coulomb;
       speed_ = std::copysign(std::max(std::abs(pushed) - lost, 0.0), pushed);
@@ -90,7 +87,6 @@ TEST(FalconIdentification, FindsTheModelsFrictionWithinTheBoundsItStates) {
   EXPECT_LE(std::abs(place.integral.viscous - truth.viscous), 3 * place.integral_error.viscous);
   EXPECT_LE(found.lower_bound.coulomb, truth.coulomb);
   EXPECT_LE(found.lower_bound.viscous, truth.viscous);
-  // The bounds must not be too low either.
   EXPECT_GE(found.lower_bound.coulomb, 0.95 * truth.coulomb);
   EXPECT_GE(found.lower_bound.viscous, 0.9 * truth.viscous);
   std::cout << "f_c " << place.integral.coulomb << " ± " << place.integral_error.coulomb << " N, b "

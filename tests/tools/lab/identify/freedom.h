@@ -16,7 +16,6 @@ enum class Freedom : std::uint8_t {
   kGripper,   ///< fingers; m of travel, N at the fingers
 };
 
-/// Names and units of a degree of freedom. The fit is the same for all.
 struct FreedomInfo {
   Freedom freedom;
   std::string_view name;      ///< value of `tendon-identify --of`

@@ -32,7 +32,6 @@ constexpr double kSimulatedInertia = 1e-4;  // kg·m²
 
 double usual_step(Freedom freedom) { return freedom == Freedom::kRotation ? kAngularStep : kEncoderStep; }
 
-/// Source of the runs and parameters of their fits.
 struct Source {
   FreedomInfo freedom = info(Freedom::kMovement);
   std::vector<std::string> names{};  ///< names of the runs in messages
@@ -161,7 +160,6 @@ Source recorded(const IdentifyOptions& options) {
   return source;
 }
 
-/// Returns an error message if no handle can do this run, and an empty text otherwise.
 std::string impossible(const FreedomInfo& freedom, const RampRun& run) {
   if (run.samples.size() < 2) return "";
   const auto count = static_cast<double>(run.samples.size() - 1);
@@ -226,8 +224,6 @@ Friction bound_of(const Source& source, const Identification& result) {
   return {.coulomb = share * result.lower_bound.coulomb, .viscous = share * result.lower_bound.viscous};
 }
 
-// ---- For people -------------------------------------------------------------------------------------------------
-
 template <typename... Values>
 std::string formatted(const char* format, Values... values) {
   std::array<char, 256> text{};
@@ -290,9 +286,6 @@ void write_table(const Source& source, const Identification& result, std::ostrea
       << freedom.viscous_key << " = " << rounded_down(bound.viscous) << '\n';
 }
 
-// ---- JSON -------------------------------------------------------------------------------------------------------
-
-/// Adds `viscous_…` and `coulomb_…` with a key prefix.
 void add(JsonLine& line, const std::string& prefix, const Friction& friction, bool turns) {
   line.add(prefix + (turns ? "viscous_nm_s_per_rad" : "viscous_n_s_per_m"), friction.viscous)
       .add(prefix + (turns ? "coulomb_nm" : "coulomb_n"), friction.coulomb);
@@ -321,8 +314,6 @@ void write_json(const Source& source, const Identification& result, std::ostream
       .add("warnings", result.warnings);
   out << line.str() << '\n';
 }
-
-// ---- A sweep ----------------------------------------------------------------------------------------------------
 
 JsonLine line_of(const std::string& name, const RunEstimate& run, bool turns) {
   const std::string effort = turns ? "_nm" : "_n";

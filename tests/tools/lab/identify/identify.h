@@ -14,15 +14,13 @@
 
 namespace tendon::lab {
 
-/// Options of `tendon-identify`: recorded runs or a simulated device.
 struct IdentifyOptions {
   std::vector<std::filesystem::path> files = {};  ///< CSV, one run each
   /// Axis and pose, one per file in order. Empty: all runs are at one place.
   std::vector<std::string> places = {};
   std::optional<std::string> profile = {};  ///< name of the device profile to simulate
   Freedom freedom = Freedom::kMovement;
-  /// Simulate a device with this friction: a translation or gripper of 75 g and 30 µm resolution, or a rotation of 10⁻⁴
-  /// kg·m² and 0.1 mrad.
+  /// Simulates this friction: a translation or gripper of 75 g and 30 µm, or a rotation of 10⁻⁴ kg·m² and 0.1 mrad.
   std::optional<Friction> simulated_friction = {};
   std::uint64_t seed = 1;                   ///< of the simulation
   std::optional<double> mass = {};          ///< kg or kg·m²; empty: fitted, or that of the simulated device
@@ -31,9 +29,8 @@ struct IdentifyOptions {
   Part part{};  ///< the units are the runs, which are the files or 30 simulated runs
 };
 
-/// Identifies the friction and writes the result to `out`: a table, the trusted method and the reason, and a fragment
-/// of a scene with the lower bounds. There is no fragment if neither method is trusted. If `json` is set, it writes one
-/// line for each run and one more line.
+/// Writes a table, the trusted method and the reason, and a fragment of a scene with the lower bounds, unless neither
+/// method is trusted. `json`: one line for each run and one more.
 ///
 /// Writes nothing until the whole result is known, except in a sweep. Throws std::invalid_argument for invalid options
 /// before reading a file. Throws std::runtime_error with the file name if a run cannot be read or used, and also if

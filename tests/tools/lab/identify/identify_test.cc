@@ -24,7 +24,7 @@ class Identify : public ::testing::Test {
     double time = 1, position = 1, force = 1;
   };
 
-  /// Writes runs of a device with b = 0.005 N·s/m and f_c = 0.05 N to files.
+  /// b = 0.005 N·s/m and f_c = 0.05 N.
   std::vector<std::filesystem::path> recorded_runs() { return recorded_runs(Mistake()); }
   std::vector<std::filesystem::path> recorded_runs(const Mistake& by) {
     RampExperiment experiment;
@@ -122,7 +122,6 @@ TEST_F(Identify, SimulatesEveryProfile) {
   }
 }
 
-/// Random frictions and noise, rotations and grippers alternately.
 TEST_F(Identify, TheBoundsOfARotationAndAGripperAreBelowTheTruthAndNearIt) {
   for (std::uint64_t seed = 1; seed <= 12; ++seed) {
     Dice dice(seed);

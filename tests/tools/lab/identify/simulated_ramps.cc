@@ -27,7 +27,6 @@ class Noise {
   std::mt19937_64 random_;
 };
 
-/// Reads the position of one axis of a device and commands the effort of this axis.
 class Axis {
  public:
   Axis(Device& device, Freedom freedom) : device_(device), freedom_(freedom) {}

@@ -12,27 +12,27 @@
 
 namespace tendon::lab {
 
-/// One run of the friction experiment without a hand: from rest, the force along x rises from zero at a constant rate.
-/// For rotations and grippers a torque about x or a grip force, in their units.
+/// Without a hand: from rest, the force along x rises from zero at a constant rate. For rotations and grippers a torque
+/// about x or a grip force, in their units.
 struct RampPlan {
   Freedom freedom = Freedom::kMovement;
   double rate = 0.1;     ///< N/s, nonzero; negative: towards −x
-  double travel = 0.25;  ///< m, the run ends after this distance
+  double travel = 0.25;  ///< m, the maximum distance of the run
   Duration period = std::chrono::milliseconds(1);
   Duration longest = std::chrono::seconds(20);
   /// Returns an additional motor force (N) for each period; empty: none.
   std::function<double()> disturbance{};
 };
 
-/// Runs the plan, starting at `begin`. The recording contains the positions that have been read and the force that is
-/// reported by the device, without the disturbance. The force stays constant while readings fail. Ends with zero force.
+/// Records the positions read and the force that the device reports, without the disturbance. The force stays constant
+/// while readings fail. Ends with zero force.
 RampRun run_ramp(Device& device, LocalTime begin, const RampPlan& plan);
 
 /// The friction experiment of Lee & Lee 2009 (Tables II, III) on a simulated device: from rest, the force rises at a
 /// constant rate until the handle has crossed its workspace.
 struct RampExperiment {
   SimulatedDevice::Config device{};              ///< without a hand
-  Freedom freedom = Freedom::kMovement;          ///< the units below are those of a movement
+  Freedom freedom = Freedom::kMovement;          ///< the following units are for a movement
   std::vector<double> rates = {0.05, 0.1, 0.5};  ///< N/s, must be positive. Each rate is used in both directions.
   int repeats = 5;                               ///< per rate and direction
   double travel = 0.25;                          ///< m
@@ -43,8 +43,8 @@ struct RampExperiment {
   std::uint64_t seed = 1;
 };
 
-/// Returns the runs along x with encoder positions and commanded forces. Deterministic in the seed. Throws
-/// std::invalid_argument if SimulatedDevice rejects its configuration or a rate or the travel is not positive.
+/// Along x. Deterministic in the seed. Throws std::invalid_argument if SimulatedDevice rejects its configuration or a
+/// rate or the travel is not positive.
 std::vector<RampRun> simulated_ramps(const RampExperiment& experiment);
 
 }  // namespace tendon::lab

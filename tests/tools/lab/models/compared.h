@@ -14,7 +14,7 @@
 
 namespace tendon::softbody::compared {
 
-/// Soft body models that the accuracy experiment compares with the models of clients/softbody. Scenes cannot use them.
+/// Compared with the models of clients/softbody. Scenes cannot use them.
 enum class Kind : std::uint8_t { kStVenantKirchhoff, kMassSpring, kTensorMass, kTled, kXpbd, kProjective, kModal };
 
 struct Info {
@@ -39,13 +39,11 @@ struct Config {
   bool whole_stiffness = false;  ///< kModal: see BodyConfig::whole_stiffness
 };
 
-/// A body with a comparison model, pressed from above by a patch; corresponds to softbody::Body, which does not have
-/// these models. Thread-safe: no.
+/// Pressed from above by a patch; corresponds to softbody::Body. Thread-safe: no.
 class PressedBody {
  public:
-  /// The material law of the solid must be that of the model. `middle` (m) is the center of the patch for press() and
-  /// of the static modes; z is ignored. Throws std::invalid_argument if the model does not support the mesh or an
-  /// effect.
+  /// The solid's law must be that of the model. `middle` (m): the center of the patch for press() and of the static
+  /// modes; z is ignored. Throws std::invalid_argument if the model does not support the mesh or an effect.
   PressedBody(Kind kind, Solid solid, double patch_radius, const Vec3& middle, const Config& config);
   PressedBody(const PressedBody&) = delete;
   PressedBody& operator=(const PressedBody&) = delete;

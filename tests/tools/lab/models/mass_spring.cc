@@ -11,7 +11,7 @@
 namespace tendon::softbody::compared {
 namespace {
 
-/// If the relative length of a spring is less than this, the direction of the spring is not defined.
+/// A spring with less relative length has no direction.
 constexpr double kShortest = 1e-9;
 
 std::vector<double> factors_of(const Solid& solid) {

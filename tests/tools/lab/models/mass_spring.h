@@ -14,7 +14,7 @@ namespace tendon::softbody::compared {
 ///
 ///     energy ½ k (l − L)²,   k = Σ E V / L²
 ///
-/// For comparison only: it has no Poisson ratio and does not resist flattening of a tetrahedron.
+/// It has no Poisson ratio and does not resist flattening of a tetrahedron.
 class SpringNet : public Elastic {
  public:
   /// `factors`: ratio of each tetrahedron's modulus to `young`; empty: 1. Throws std::invalid_argument if the mesh is
@@ -41,7 +41,7 @@ class SpringNet : public Elastic {
   std::vector<int> slots_;  ///< target of each entry of a spring's 6 × 6 matrix; −1: none
 };
 
-/// Quasi-static or dynamic spring model, solved by the Newton method of the finite elements.
+/// Quasi-static or dynamic, by the Newton method of the finite elements.
 class MassSpringModel : public Model {
  public:
   MassSpringModel(const Solid& solid, const TouchSurface& surface, const QuasiStaticModel::Config& config,

@@ -10,18 +10,17 @@ namespace tendon::softbody::compared {
 
 /// Linear elasticity in a reduced basis (Pentland & Williams 1989): the slowest vibration modes and, optionally, static
 /// modes, which are the displacements under a force on a patch. Local contact requires far too many vibration modes.
-/// Quasi-static: the compliance is |Bᵀw|², with B the shapes at the surface, each scaled to unit stiffness. For
-/// comparison only.
+/// Quasi-static: the compliance is |Bᵀw|², with B the shapes at the surface, each scaled to unit stiffness.
 class ModalModel : public Model {
  public:
   struct Config {
     int swings = 30;
-    /// Centers (m, horizontal) of patches whose static displacements are added to the basis.
+    /// Centers (m, horizontal) of patches with static modes.
     std::vector<Vec2> patches;
     bool glides = false;  ///< answers contain a Glide
   };
-  /// The density is uniform and has no effect. Throws std::invalid_argument unless the material is linear and the solid
-  /// has at least `swings` modes. Keeps no reference to solid or surface.
+  /// The density has no effect. Throws std::invalid_argument unless the material is linear and the solid has at least
+  /// `swings` modes. Keeps no reference to solid or surface.
   ModalModel(const Solid& solid, const TouchSurface& surface, const Config& config);
 
   Reaction press(const Patch& patch, Prescribed given, double value) override;

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// The expected stiffness of block B1 is from an independent implementation of each model. Tolerance: 1.5 percentage
-// points.
+// Stiffness of block B1 by an independent implementation of each model. Tolerance: 1.5 percentage points.
 #include <gtest/gtest.h>
 
 #include <algorithm>

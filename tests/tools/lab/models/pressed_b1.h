@@ -6,14 +6,14 @@
 
 namespace tendon::softbody::compared::testing {
 
-/// Returns a configuration whose damping brings dynamic models to rest quickly.
+/// Damping that brings dynamic models to rest quickly.
 inline Config soon_at_rest(Kind kind) {
   Config config;
   if (info(kind).has_time) config.effects = {.density = 1000, .step = 1e-3, .inertia = true, .damping = 40};
   return config;
 }
 
-/// Creates block B1 (tests/clients/softbody/pressed_block.h) with a comparison model.
+/// tests/clients/softbody/pressed_block.h
 inline PressedBody pressed_b1(Kind kind, Element element, int n, const Config& config, double poisson = 0.45) {
   return {kind, softbody::testing::pressed_block(element, n, poisson, info(kind).law),
           softbody::testing::kB1PatchRadius, Vec3::Zero(), config};

@@ -10,7 +10,6 @@ namespace {
 
 /// Returns Σ 2µV ∇N ∇Nᵀ for each axis; the axes are not coupled.
 SymmetricMatrix matrix_of(const Solid& solid) {
-  // Omits entries between different axes, which are zero and would only enlarge the factor.
   const SymmetricMatrix& all = solid.pattern();
   std::vector<int> axis_of(static_cast<std::size_t>(all.size));
   for (int i = 0; i < solid.size(); ++i) {
@@ -56,7 +55,7 @@ Factor factor_of(const Solid& solid, const Effects& effects) {
   return factor;
 }
 
-/// Iterations for the rest shape under gravity; reaches a relative error of 1e-6 for the README's block.
+/// Reaches a relative error of 1e-6 for the README's block.
 constexpr int kRoundsToRest = 1000;
 
 }  // namespace

@@ -12,9 +12,8 @@ namespace tendon::softbody::compared {
 /// Projective dynamics (Bouaziz et al. 2014) with as-rigid-as-possible elements: energy µ V |F − R|², R the rotation
 /// nearest to F. An iteration finds R at every integration point, then solves for all displacements. The matrix is
 /// constant and block-diagonal by axis, because |F − R|² with fixed R is the same quadratic for each axis. An answer is
-/// a few iterations that continue from the previous one and reduce the error only partly.
-///
-/// For comparison only. The material is Law::kCorotational with λ = 0, without a Poisson ratio.
+/// a few iterations from the previous one, which reduce the error only partly. The material is Law::kCorotational with
+/// λ = 0, without a Poisson ratio.
 class ProjectiveModel : public Model {
  public:
   /// Throws std::invalid_argument if iterations < 1, or with viscosity, which would couple the axes. The solid must

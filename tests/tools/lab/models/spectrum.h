@@ -5,10 +5,9 @@
 
 namespace tendon::softbody::compared {
 
-/// Vibration modes of a body: K x = ω² M x with diagonal mass matrix M, by Lanczos' method (Spectra) with relative
-/// error of at most 1e-6.
+/// K x = ω² M x with diagonal mass matrix M, by Lanczos' method (Spectra) with relative error of at most 1e-6.
 
-/// Returns the largest ω, rad/s. `mass` in kg, all positive.
+/// rad/s. `mass` in kg, all positive.
 double fastest_swing(const SymmetricMatrix& stiffness, const VectorXd& mass);
 
 /// The `count` slowest modes. Throws std::invalid_argument unless `count` is from 1 to the number of displacements,

@@ -9,7 +9,7 @@ namespace tendon::softbody::compared {
 /// Throws std::invalid_argument without inertia or with viscosity.
 void check_only_with_inertia(const EffectsConfig& config);
 
-/// Returns the displacements of all nodes (m) at rest under the gravity in `loads`, whose other effects are ignored.
+/// Nodes (m) at rest under the gravity in `loads`, whose other effects are ignored.
 VectorXd shape_at_rest(const Elastic& elastic, const TouchSurface& surface, EffectsConfig loads);
 
 }  // namespace tendon::softbody::compared

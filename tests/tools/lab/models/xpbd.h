@@ -15,8 +15,8 @@ namespace tendon::softbody::compared {
 ///
 ///     |F| = 0 with the compliance 1/(µV),   det F = 1 + µ/(λ + µ) with 1/((λ + µ)V)
 ///
-/// and then the patch to its tool. For comparison only: unconditionally stable but not convergent; the stiffness
-/// depends on time step and iterations, with errors from −90 % to +200 %.
+/// and then the patch to its tool. Unconditionally stable but not convergent; the stiffness depends on time step and
+/// iterations, with errors from −90 % to +200 %.
 class XpbdModel : public Model {
  public:
   /// Throws std::invalid_argument if the mesh is not tetrahedral, if iterations < 1, or if `effects` has no inertia or

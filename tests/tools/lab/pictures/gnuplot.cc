@@ -17,7 +17,7 @@
 namespace tendon::lab {
 namespace {
 
-/// Ignores SIGPIPE during its lifetime, so that writing to a closed pipe returns an error.
+/// Writing to a closed pipe then returns an error.
 class IgnoreBrokenPipe {
  public:
   IgnoreBrokenPipe() {
@@ -79,11 +79,10 @@ void check_picture_name(const std::filesystem::path& path) {
 
 void run_gnuplot(const std::string& script, const std::filesystem::path& path) {
   const IgnoreBrokenPipe ignore;
-  // -d ignores ~/.gnuplot. Reading a file instead of standard input makes gnuplot stop at the first error.
+  // -d ignores ~/.gnuplot. Unlike standard input, a file makes gnuplot stop at the first error.
   std::FILE* const gnuplot =
       ::popen("command -v gnuplot >/dev/null || exit 127; exec gnuplot -d /dev/stdin >/dev/null", "w");
   if (gnuplot == nullptr) throw std::system_error(errno, std::generic_category(), "cannot start gnuplot");
-  // If gnuplot exits early, its status shows it.
   std::fwrite(script.data(), 1, script.size(), gnuplot);
   const int status = ::pclose(gnuplot);
   if (WIFEXITED(status) && WEXITSTATUS(status) == 0) {

@@ -24,12 +24,12 @@ std::string literal(std::string_view text);
 /// Returns the commands `set encoding`, `set terminal` and `set output` for an .svg or .png file.
 std::string begin_picture(const std::filesystem::path& path, int width, int height);
 
-/// Throws std::invalid_argument if `path` does not end with .svg or .png, or if it contains control characters. Throws
+/// Throws std::invalid_argument if `path` does not end with .svg or .png or contains control characters,
 /// std::runtime_error if the file exists and has a different type.
 void check_picture_name(const std::filesystem::path& path);
 
-/// Runs gnuplot (package gnuplot-nox) with a script that draws `path`, and waits. Throws std::runtime_error if gnuplot
-/// is missing or fails, or if the picture is incomplete (full disk); an incomplete picture is removed.
+/// Waits for gnuplot (package gnuplot-nox). Throws std::runtime_error if it is missing or fails, or if the picture is
+/// incomplete (full disk), which is then removed.
 void run_gnuplot(const std::string& script, const std::filesystem::path& path);
 
 }  // namespace tendon::lab

@@ -59,8 +59,7 @@ void range(std::ostream& out, char axis, const std::optional<std::pair<double, d
   out << "]\n";
 }
 
-/// gnuplot labels only powers of ten on a logarithmic axis. A short axis may contain none, so labels in between are
-/// added.
+/// gnuplot labels only powers of ten, of which a short logarithmic axis may contain none.
 void ticks(std::ostream& out, const Panel& panel) {
   constexpr double kShort = 30;
   if (!panel.log_x || !panel.x_range || panel.x_range->second > kShort * panel.x_range->first) {
@@ -78,10 +77,9 @@ void ticks(std::ostream& out, const Panel& panel) {
   out << ")\n";
 }
 
-/// Returns the labeled points of the curve at the right end of the panel, whose labels go below and to the left, or all
-/// others.
+/// At the right end of the panel labels go below and to the left. Returns those points, or all others.
 std::vector<std::size_t> labels_at(const Panel& panel, const Curve& curve, bool right_end) {
-  constexpr double kRightEnd = 0.7;  // share of the panel's width; a label needs up to 0.3
+  constexpr double kRightEnd = 0.7;  // fraction of the panel's width; a label needs up to 0.3
   const auto along = [&](double x) { return panel.log_x ? std::log(x) : x; };
   std::vector<std::size_t> found;
   for (std::size_t i = 0; i < curve.labels.size(); ++i) {

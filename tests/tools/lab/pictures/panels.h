@@ -36,7 +36,7 @@ struct Panel {
   bool log_y = false;
 };
 
-/// Reduces points sorted by x to the resolution of a panel: minimum and maximum of each interval.
+/// Minimum and maximum of each interval of points sorted by x, at the resolution of a panel.
 std::vector<std::pair<double, double>> thinned(const std::vector<std::pair<double, double>>& points);
 
 /// Returns a gnuplot script that draws the panels in rows of two, with a heading and a line of figures.

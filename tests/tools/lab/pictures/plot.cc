@@ -29,8 +29,7 @@ constexpr double kPanelHeight = 0.225;
 constexpr std::array kPanelTops = {0.840, 0.565, 0.290};
 constexpr double kAbovePanel = 0.018;
 
-/// If the energy ranges of runs differ by more than this factor, each run has its own scale; otherwise one would be a
-/// flat line.
+/// Beyond this ratio of energy ranges, each run has its own scale; otherwise one would be a flat line.
 constexpr double kTooDifferent = 20;
 /// The wanted force is unbounded; limits it to this multiple so that the applied force remains visible.
 constexpr double kMostWanted = 3;
@@ -227,7 +226,6 @@ class Script {
     label(left(i), kMoreFigures, figures) << "tc rgb '" << kPale << "'\n";
   }
 
-  /// Sets the position of panel `row` of drawing `i` and its title.
   void begin_panel(std::size_t i, std::size_t row, const std::string& title, const Scale& scale) {
     const double top = kPanelTops[row];
     out_ << "set lmargin at screen " << left(i) << "\nset rmargin at screen " << right(i) << "\n"
@@ -243,7 +241,7 @@ class Script {
     }
   }
 
-  /// Draws overruns at the top of the panel and resets the panel's settings.
+  /// Draws overruns at the top, and resets the panel's settings.
   void end_panel(std::size_t i, const Scale& scale, bool named) {
     const auto& columns = drawings_[i].trace.columns();
     if (std::ranges::any_of(columns, &Trace::Column::overrun)) {

@@ -17,10 +17,10 @@ struct Drawing {
   Trace trace;
 };
 
-/// Maximum number of legible columns.
+/// More are not legible.
 inline constexpr std::size_t kMostDrawings = 4;
 
-/// Throws std::invalid_argument if `path` does not end with .svg or .png, if it contains control characters, or if the
+/// Throws std::invalid_argument if `path` does not end with .svg or .png or contains control characters, or if the
 /// number of drawings is not from 1 to kMostDrawings.
 void check_picture(const std::filesystem::path& path, std::size_t drawings);
 
@@ -28,13 +28,11 @@ void check_picture(const std::filesystem::path& path, std::size_t drawings);
 std::size_t trace_columns(std::size_t drawings);
 
 /// Draws runs side by side as an .svg or .png file of 1000 pixels height and 1600 width (800 per run from the third
-/// on). A column shows the position, the wanted, permitted and applied force, and the energy ledger. All columns share
-/// the scales of position, force and time. They also share the scale of energy if this is legible. Otherwise, each
-/// column has its own scale and a note.
+/// on): position, wanted, permitted and applied force, and energy ledger. All columns share their scales; if the scale
+/// of energy would not be legible, each has its own and a note.
 ///
-/// Runs gnuplot (package gnuplot-nox) and waits. `path` and labels are quoted and cannot inject commands.
-///
-/// Throws the exceptions of `check_picture`, and std::runtime_error if gnuplot is missing or fails.
+/// Runs gnuplot (package gnuplot-nox) and waits. `path` and labels are quoted and cannot inject commands. Throws the
+/// exceptions of `check_picture`, and std::runtime_error if gnuplot is missing or fails.
 void draw(const std::filesystem::path& path, std::span<const Drawing> drawings);
 
 std::string plot_script(const std::filesystem::path& path, std::span<const Drawing> drawings);

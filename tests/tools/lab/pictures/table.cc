@@ -42,8 +42,6 @@ constexpr std::array kReasonNames = {
     ReasonName{Reason::kAcceleration, "acceleration", "no limit: acceleration of the hand was too large"},
 };
 
-// ---- For people -------------------------------------------------------------------------------------------------
-
 std::string digits(double value, const char* format) {
   std::array<char, 64> text{};
   std::snprintf(text.data(), text.size(), format, value);
@@ -210,8 +208,6 @@ std::string notes(std::span<const Run> runs) {
   }
   return text;
 }
-
-// ---- For programs -----------------------------------------------------------------------------------------------
 
 std::optional<double> p50_ms(const std::optional<Spread>& times) {
   return times ? std::optional(ms(times->p50)) : std::nullopt;

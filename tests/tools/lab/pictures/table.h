@@ -12,7 +12,6 @@
 
 namespace tendon::lab {
 
-/// Summary of one recorded run and defects of its recording.
 struct Run {
   std::string label;  ///< heading of the column
   std::string recording;
@@ -30,10 +29,10 @@ std::string with_unit(double value, std::string_view unit);
 /// Pads `text` with spaces to `to` terminal columns. Assumes no combining or wide characters.
 std::string padded(const std::string& text, std::size_t to);
 
-/// Returns an aligned UTF-8 table with a row per quantity, followed by notes.
+/// UTF-8, with a row per quantity, followed by notes.
 std::string to_table(std::span<const Run> runs);
 
-/// Returns one line of JSON without line end. Each key ends with the unit. Values that are not known are null.
+/// One line without line end. Each key ends with the unit. Values that are not known are null.
 std::string to_json(const Run& run);
 
 }  // namespace tendon::lab

@@ -28,7 +28,6 @@ constexpr double kDeep = 0.1;             // fraction of the largest depth
 constexpr double kMostError = 0.05;       // relative, of a stiffness
 constexpr double kCorrelated = 10;        // number of successive forces with the same error
 
-/// A force of a contact at larger x, which pushes towards smaller x.
 struct Answer {
   double x;
   double outermost;  ///< the minimum of `x` and the position where the force was used
@@ -42,12 +41,11 @@ struct Edge {
 };
 
 struct Gap {
-  double without = -kUnbounded;  ///< the last position in free motion
+  double without = -kUnbounded;  ///< last position in free motion
   double first = kUnbounded;     ///< the first push
 };
 
-/// Returns the position that minimizes the number of pushes before it plus free forces after it; the first one if
-/// several. Both arguments are sorted.
+/// The first position with the fewest pushes before it plus free forces after it. Both arguments are sorted.
 std::optional<Gap> best_gap(const std::vector<double>& pushes, const std::vector<double>& free) {
   std::size_t wrong = free.size();
   std::size_t fewest = wrong;
@@ -101,8 +99,7 @@ std::optional<Fit> line_through(const std::vector<Answer>& pushes) {
   return Fit{zero, slope, error};
 }
 
-/// Returns the smallest force in N that is not noise: above the noise if pushes above `least` are frequent in free
-/// motion, otherwise `least`.
+/// Returns the smallest force in N that is not noise. This is `least` unless larger forces are frequent in free motion.
 double above_noise(const std::vector<Answer>& answers, double first, double least) {
   std::vector<double> noise;
   std::size_t outside = 0;

@@ -41,7 +41,6 @@ struct Springs {
   Vec3 force(const Vec3& position) const { return -stiffness * pressed(position) * normal; }
 };
 
-/// A hand that moves in and out of springs, recorded from the real controller without a limiter.
 class Drawn {
  public:
   explicit Drawn(std::uint64_t seed) : dice_(seed) {

@@ -7,9 +7,8 @@
 
 namespace tendon::lab {
 
-/// Returns the names of the devices in a recording. The first device has the name from its scene, or "first" if the
-/// scene does not contain a name. Control characters are escaped (protocol/wire/text.h). Throws std::runtime_error if
-/// the recording cannot be read.
+/// The first device has the name from its scene, or "first". Control characters are escaped (protocol/wire/text.h).
+/// Throws std::runtime_error if the recording cannot be read.
 std::vector<std::string> device_names(const std::filesystem::path& recording);
 
 }  // namespace tendon::lab

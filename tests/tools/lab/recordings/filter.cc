@@ -63,7 +63,7 @@ std::vector<std::string_view> names(std::string_view header) {
   }
 }
 
-/// Returns the columns in the order of the format, or an empty list if the table does not have exactly these columns.
+/// In the order of the format; empty if the table does not have exactly these columns.
 std::vector<TableReader::Column> columns_of(const TableReader& table, const Format& format) {
   std::vector<TableReader::Column> columns;
   for (const std::string_view name : names(format.header)) {
@@ -75,7 +75,6 @@ std::vector<TableReader::Column> columns_of(const TableReader& table, const Form
   return columns;
 }
 
-/// Returns the number in the format's unit, with a decimal point.
 std::string cell_of(const TableReader& table, const TableReader::Column& column, double value) {
   if (column.multiply != 1 || column.divide != 1) return shortest(value);
   std::string text(table.text(column.index));

@@ -14,13 +14,12 @@ struct FilterLaw {
   std::string name = "aol+";  ///< a name of core/control/limiter.h
   double viscous = 0;         ///< N·s/m, lower bound of the device's friction
   double coulomb = 0;         ///< N, lower bound of the device's friction
-  double period_us = 1000;    ///< µs, the maximum time between two forces
-  /// Scene settings "TABLE.KEY=VALUE" in the syntax of `parse_scene`, such as parts of AOL+. Applied after the fields
-  /// above.
+  double period_us = 1000;    ///< µs, the maximum time between forces
+  /// "TABLE.KEY=VALUE" in the syntax of `parse_scene`, such as parts of AOL+. Applied after the fields above.
   std::vector<std::string> settings = {};
 };
 
-/// Returns the limiter of a scene with this law. Throws SceneError, naming the key, for an invalid value.
+/// Throws SceneError, naming the key, for an invalid value.
 LimiterConfig limiter_of(const FilterLaw& law);
 
 struct FilterOptions {
@@ -28,7 +27,8 @@ struct FilterOptions {
   bool json = false;      ///< one JSON object per row instead of CSV
 };
 
-/// `tendon-lab filter`: applies a law to a recorded motion, row by row, so it can be used in a pipe.
+/// Applies a law to a recorded motion, row by row, so it can be used in a pipe. The motion does not respond to the
+/// applied force, which is held until the next row.
 ///
 /// The input is a table for TableReader with the columns `t_s,x_m,wanted_n` or
 /// `t_s,x_m,y_m,z_m,wanted_x_n,wanted_y_n,wanted_z_n`. The forces act on the hand, so a wall that resists motion along
@@ -36,11 +36,9 @@ struct FilterOptions {
 /// (bound of the force, or `inf`), `energy_j` (the law's account after the last interval) and `reason` (empty if the
 /// applied force is the wanted one).
 ///
-/// The motion does not respond to the applied force. The force of a row is held until the next row.
-///
-/// A row is bad if it is rejected by TableReader or if the time does not increase. If a row is bad, it writes the file
-/// and the line to `errors` and nothing to `out`, and the previous force is held. Returns the number of bad rows.
-/// Throws std::runtime_error if the header is neither of the two or writing to `out` fails.
+/// A row that TableReader rejects, or whose time does not increase, is reported to `errors` with file and line, and the
+/// previous force is held. Returns the number of such rows. Throws std::runtime_error if the header is neither of the
+/// two or writing to `out` fails.
 int filter(const FilterOptions& options, std::istream& in, std::ostream& out, std::ostream& errors);
 
 }  // namespace tendon::lab

@@ -146,8 +146,7 @@ Curve curve(const std::string& name, const char* colour, const PairRun::Line& li
   return made;
 }
 
-/// Sets the same range for the panels of a row, so that runs can be compared. If one of them would be illegible, each
-/// panel has its own range and a note.
+/// Sets the same range for all panels of a row. If one would be illegible, each panel has its own range and a note.
 void share_range(std::span<Panel> row) {
   constexpr double kOwnScaleBeyond = 8;
   constexpr double kFar = std::numeric_limits<double>::infinity();

@@ -15,8 +15,7 @@
 
 namespace tendon::lab {
 
-/// Time series of two coupled devices. Times are in seconds since the first step of either device, in the clock of the
-/// leader.
+/// Times in seconds since the first step of either device, in the clock of the leader.
 struct PairRun {
   using Line = std::vector<std::pair<double, double>>;  ///< s, value
   struct End {
@@ -39,9 +38,8 @@ struct PairRun {
 ///
 ///     ledger = account − Σ credit + Σ withdraw    over the settlements of all previous steps
 ///
-/// so the sum of both ledgers includes payments that have been sent but not received. Energy discarded by a limiter is
-/// in neither: the sum is a lower bound of the net work put in. The ledgers are added without scaling, which is correct
-/// for equal products of position and force scale.
+/// so the sum of both ledgers includes payments in flight. Energy discarded by a limiter is in neither: the sum is a
+/// lower bound of the net work put in. It has no scaling, so position times force scale must be equal at both ends.
 ///
 /// Memory: 300 bytes a step. Thread-safe: no. Realtime-safe: no.
 class PairObserver {
@@ -79,11 +77,9 @@ class PairObserver {
   std::array<Seen, 2> ends_;
 };
 
-/// `tendon-report --pairs` for recordings written by `tendon-replay --merge`. Writes a table or JSON and a sentence
-/// about each pair to `out`. Draws a column for each of at most two pairs. The column shows the positions, the forces,
-/// and the accounts of both ends and of the pair.
-///
-/// Throws the exceptions of `report`, and std::runtime_error if a recording is not such a merge.
+/// Reports recordings written by `tendon-replay --merge`: a table or JSON, a sentence about each pair, and a column for
+/// each of at most two pairs with positions, forces, and the accounts of both ends and of the pair. Throws the
+/// exceptions of `report`, and std::runtime_error if a recording is not such a merge.
 void report_pairs(const ReportOptions& options, std::ostream& out);
 
 }  // namespace tendon::lab

@@ -45,8 +45,7 @@ PortRecord port(std::uint64_t tick, double credit, double withdraw) {
 
 TEST(PairObserver, CountsWhatIsUnderWayToThePair) {
   PairObserver observer;
-  // Hands have put 10 J into the leader and 1 J into the follower. In step 2 the leader pays 4 J, which arrive at the
-  // follower in step 4.
+  // Hands have put in 10 J and 1 J. In step 2 the leader pays 4 J, which arrive at the follower in step 4.
   for (std::uint64_t tick = 1; tick <= 6; ++tick) {
     observer.observe(kLeader, step(tick, tick <= 2 ? 10 : 6));
     observer.observe(kFollower, step(tick, tick <= 4 ? 1 : 5));
@@ -92,7 +91,7 @@ TEST(PairObserver, OneEndAloneIsNoPair) {
 
 class PairReport : public ::testing::Test {
  protected:
-  /// Writes a recording as `tendon-replay --merge` does, in which the leader has `left` J after the first of two steps.
+  /// As `tendon-replay --merge` does. The leader has `left` J after the first of two steps.
   std::filesystem::path merged(const std::string& name, double left) {
     const auto path = folder_.path() / name;
     FileSink sink(path);

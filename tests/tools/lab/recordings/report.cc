@@ -62,7 +62,7 @@ std::vector<Source> read_runs(const std::filesystem::path& recording, std::strin
   return sources;
 }
 
-/// Second pass over the recording: the plot depends on the summary.
+/// A second pass, because the plot depends on the summary.
 Trace read_trace(const Source& source, std::size_t columns) {
   const RunSummary& summary = source.run.summary;
   Trace trace(
@@ -112,7 +112,7 @@ std::vector<const Source*> choose(const std::vector<Source>& sources, const Repo
 
 std::string name_of(const Run& run) { return run.recording + (run.device.empty() ? "" : " " + run.device); }
 
-/// Describes the omitted runs: names those that violated the guarantee and counts the others.
+/// Names the omitted runs that violated the guarantee and counts the others.
 std::string others(const std::vector<Source>& sources, const std::vector<const Source*>& shown) {
   std::string text;
   std::size_t kept = 0;

@@ -11,7 +11,6 @@
 
 namespace tendon::lab {
 
-/// Options of `tendon-report`, which compares recorded runs.
 struct ReportOptions {
   std::vector<std::filesystem::path> recordings = {};  ///< one or more
   /// One per recording. Empty: "limiter on" or "limiter off", according to the recorded steps.
@@ -25,22 +24,19 @@ struct ReportOptions {
   bool check = false;
 };
 
-/// Throws std::invalid_argument if there are no recordings, or if the number of labels is neither zero nor the number
-/// of recordings.
+/// Throws std::invalid_argument without recordings, or unless there are no labels or one per recording.
 void check(const ReportOptions& options);
 
 inline constexpr std::size_t kMostColumns = 6;
 
-/// Reads the recordings, writes the table (or JSON) to `out`, and draws the picture. Each device of each recording has
-/// a column. If there are more than kMostColumns (kMostDrawings in the picture), devices that violated the guarantee
-/// come first, and the number of omitted devices is printed.
+/// Each device of each recording has a column. Beyond kMostColumns (kMostDrawings in the picture), devices that
+/// violated the guarantee come first, and the number of omitted devices is printed.
 ///
-/// Uses the valid part of a truncated or damaged recording, with a note. Throws std::invalid_argument for invalid
-/// options before reading anything. Throws std::runtime_error if a recording cannot be read, has no steps or lacks a
-/// requested device (nothing has been written then), if the picture cannot be drawn, or if `check` fails.
+/// Uses the valid part of a damaged recording, with a note. Throws std::invalid_argument for invalid options before
+/// reading anything. Throws std::runtime_error if a recording cannot be read, has no steps or lacks a requested device
+/// (nothing has been written then), if the picture cannot be drawn, or if `check` fails.
 void report(const ReportOptions& options, std::ostream& out);
 
-/// The exception of `check`: the minimum of `account` of that recording was `least` (J).
 std::runtime_error broken_promise(const std::string& recording, const std::string& account, double least);
 
 }  // namespace tendon::lab

@@ -87,7 +87,7 @@ TEST_F(Report, CheckFailsByTheRecordingThatBreaksThePromiseAfterTheTable) {
 
 class ReportOfSeveral : public Report {
  protected:
-  /// Records devices; true: with the limiter.
+  /// true: with the limiter.
   std::filesystem::path several(const std::vector<bool>& limited) {
     const auto on = toy_run(Law::kAol, 6000);
     const auto off = toy_run(Law::kNone, 6000);

@@ -159,7 +159,6 @@ void RunObserver::observe_force(const StepRecord& step) {
   if (step.force_sequence == 0) return;
   if (step.force_sequence != force_in_use_) {
     if (newest_) asked_.observe(*std::exchange(newest_, std::nullopt));
-    // The steps with the last force are excluded, because this force is constant after the engine has left.
     for (const FeltStep& felt : felt_since_) felt_.observe(felt);
     felt_since_.clear();
     force_in_use_ = step.force_sequence;

@@ -27,7 +27,7 @@ struct Spread {
   Duration p99{};
 };
 
-/// Force difference ‖wanted − applied‖ over the limited steps.
+/// ‖wanted − applied‖ over the limited steps.
 struct Difference {
   double p50 = 0;  ///< N
   double p95 = 0;  ///< N
@@ -41,7 +41,7 @@ struct RunSummary {
   std::uint64_t steps = 0;
   LocalTime start{};            ///< of the first step
   Duration span{};              ///< from the first step to the last
-  std::uint64_t overruns = 0;   ///< intervals longer than the scene's longest_hold
+  std::uint64_t overruns = 0;   ///< number of intervals that exceed the scene's longest_hold
   std::uint64_t watchdogs = 0;  ///< intervals that exceed the watchdog of the device
   Duration longest_interval{};
 
@@ -49,22 +49,19 @@ struct RunSummary {
   double energy_given_out = 0;  ///< J, max(0, max over n of −E(n)): net output
   /// True if the ledger was never below −1 nJ.
   bool passive() const noexcept { return std::max(energy_given_out, grip_energy_given_out.value_or(0)) <= kPromise; }
-  /// The same value for the account of the gripper, if any.
   std::optional<double> grip_energy_given_out;
-  /// The number of intervals that are longer than the current T of the limiter (Step::longest_hold). The limiter does
-  /// not guarantee anything for these intervals.
+  /// Intervals longer than the limiter's T at that time (Step::longest_hold), for which it guarantees nothing.
   std::uint64_t holds_beyond_bound = 0;
   /// J, minimum over all other steps of E(n) − D(n). D ≤ 0 is the energy that holds beyond the bound have drawn below
   /// zero, until the ledger has recovered. The lesser of handle and gripper; +∞ if there is no other step.
   double least_energy = std::numeric_limits<double>::infinity();
-  /// Returns true if the ledger was never below −1 nJ, except for holds that are longer than the bound. This is what
-  /// the limiter guarantees.
+  /// Returns true if the ledger was at least −1 nJ for all holds within the bound. The limiter guarantees this.
   bool kept_its_promise() const noexcept { return least_energy >= -kPromise; }
   bool limiter_on = false;
   /// Fraction of steps (0 to 1) in which T was above the scene's longest_hold because of overruns.
   double share_careful = 0;
 
-  /// J, maximum over time of Σ τ·Δθ, the work of the torques on the hand without friction. A positive value must come
+  /// J, maximum over time of Σ τ·Δθ, the work of the torques on the hand without friction. If positive, it must come
   /// from the translational part of the account or from friction. Empty: orientation is not measured.
   std::optional<double> torque_work;
 
@@ -73,7 +70,6 @@ struct RunSummary {
   double peak_force = 0;      ///< N, applied
   Vec3 axis = Vec3::UnitX();  ///< main axis, see RunObserver
 
-  // Limiting, from the first step with a fresh force to the last.
   std::uint64_t served_steps = 0;                ///< steps in this interval; 0: no fresh force arrived
   std::uint64_t limited_steps = 0;               ///< for any reason that core/base/reason.h classifies as a limit
   std::array<std::uint64_t, 32> reason_steps{};  ///< by bit of the reason
@@ -96,16 +92,14 @@ struct RunSummary {
 
 /// Computes the summary of a run from its steps in one pass and bounded memory.
 ///
-/// **Main axis.** The common direction of the requested forces, if there is one and the hand moves along it with a
-/// standard deviation of at least 0.1 mm. Otherwise the first principal component of the positions, with its largest
-/// component positive. If the direction is within 8° of an axis of the device, this axis is used. If there is no
-/// motion, the axis is x.
+/// **Main axis.** The common direction of the requested forces, if the hand moves along it with a standard deviation of
+/// at least 0.1 mm; otherwise the first principal component of the positions, with its largest component positive; x
+/// without motion. Within 8° of an axis of the device, that axis.
 ///
 /// **Contact.** Each remote force answers a motion `loop_age` before the step that uses it, so it describes the
 /// environment at *that* position regardless of delay. A force extrapolated by a model with the step's stiffness K is
 /// referred back to that position by F + K (x − x_answered), from the last step that uses it, when blending from the
-/// previous model has ended. Forces that ramp in or fade out are ignored. `find_contact` determines where the contact
-/// begins.
+/// previous model has ended. Forces that ramp in or fade out are ignored. See `find_contact`.
 ///
 /// **Operational stiffness.** The stiffness felt by the hand, independent of the requested one: the mean of the secants
 ///
@@ -115,17 +109,16 @@ struct RunSummary {
 /// largest depth while forces were fresh. The steps with the last force of a run are excluded, because this force is
 /// constant after an engine has left, until its validity ends. Source: core/PROOFS.md, "Operational stiffness".
 ///
-/// **Unstable** means that the device output net energy (the ledger is not passive) *and* the hand moved faster than
-/// voluntary motion. With v = v_slow + v_fast split by a first-order low-pass filter at 3 Hz, the latter means
-/// Σ‖v_fast‖² > Σ‖v_slow‖²; for a sine, a frequency above 3 Hz. Both are required: fast tapping on a passive wall is
-/// stable, and a strong hand may hold an active wall. A wall of 2000 N/m with 50 ms of delay bounces at 5 to 6 Hz.
+/// **Unstable.** The ledger is not passive *and* the hand moved faster than voluntary motion: with v = v_slow + v_fast
+/// split by a first-order low-pass filter at 3 Hz, Σ‖v_fast‖² > Σ‖v_slow‖²; for a sine, a frequency above 3 Hz. Both
+/// are required: fast tapping on a passive wall is stable, and a strong hand may hold an active wall. A wall of 2000
+/// N/m with 50 ms of delay bounces at 5 to 6 Hz.
 ///
 /// Memory: under 16 MB. Thread-safe: no. Realtime-safe: no.
 class RunObserver {
  public:
-  /// If `of_several` is true, the recording contains other devices. In this case, a round trip is only counted if the
-  /// datagram contains a force that was used by this device, because the numbers of devices in a datagram are those of
-  /// its session.
+  /// `of_several`: the recording has other devices. A round trip then only counts if the datagram contains a force used
+  /// by this device, because the numbers of devices in a datagram are those of its session.
   explicit RunObserver(bool of_several = false) : of_several_(of_several) {}
 
   /// Steps must come in order.
@@ -137,7 +130,7 @@ class RunObserver {
   RunSummary summary() const;
 
  private:
-  /// The statistics are exact for up to one minute at 1 kHz, or ten minutes of forces at 100 Hz.
+  /// Exact for up to one minute at 1 kHz, or ten minutes of forces at 100 Hz.
   static constexpr std::size_t kMostSamples = 65'536;
   /// This is 8 s at 1 kHz. Older answers cannot be used.
   static constexpr std::size_t kMostHistory = 8'192;
@@ -160,7 +153,7 @@ class RunObserver {
 
     void observe(double energy_now, bool beyond_bound) noexcept;
   };
-  /// Counts of steps from the first fresh force to the last, or since the last.
+  /// Counts from the first fresh force to the last, or since the last.
   struct Limits {
     std::uint64_t steps = 0;
     std::uint64_t limited = 0;
@@ -243,7 +236,6 @@ RunSummary summarise(const Steps& steps) {
   return observer.summary();
 }
 
-/// Returns whether `why` means that the applied force is not the requested one.
 constexpr bool is_limit(Reason why) noexcept { return why != Reason::kOverrun && why != Reason::kWatchdog; }
 
 }  // namespace tendon::lab

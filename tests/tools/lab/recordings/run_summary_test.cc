@@ -312,8 +312,7 @@ DatagramRecord sent_at(LocalTime at, std::uint64_t number) {
   return datagram;
 }
 
-/// A force received at 145 ms. The peer received our datagram of `sent` at 7000.0 ms and answers at 7002.5 ms of its
-/// clock.
+/// Received at 145 ms. The peer received our datagram of `sent` at 7000.0 ms and answers at 7002.5 ms of its clock.
 DatagramRecord force_of(std::uint64_t sequence, PeerTime sent, std::uint64_t number = 0) {
   DatagramRecord datagram;
   datagram.at = testing::at_ms(145);

@@ -10,7 +10,6 @@
 
 namespace tendon::lab {
 
-/// The minimum and the maximum of a series, and their order.
 struct Extremes {
   double least = std::numeric_limits<double>::infinity();
   double most = -std::numeric_limits<double>::infinity();
@@ -25,9 +24,7 @@ struct Extremes {
 };
 
 /// A run prepared for plotting: divided into columns of equal duration, each with the extremes of its values, so that
-/// no spike is lost at any resolution.
-///
-/// Thread-safe: no. Realtime-safe: no.
+/// no spike is lost at any resolution. Thread-safe: no. Realtime-safe: no.
 class Trace {
  public:
   struct Config {
@@ -36,7 +33,6 @@ class Trace {
     std::size_t columns = 1;    ///< > 0
     Vec3 axis = Vec3::UnitX();  ///< direction of the position and forces shown
   };
-  /// All members are empty for a column without steps.
   struct Column {
     Extremes position;   ///< m
     Extremes wanted;     ///< N

@@ -11,13 +11,13 @@ class App;
 
 namespace tendon::lab {
 
-/// A verb of tendon-lab. Its file defines one at namespace scope, which registers it:
+/// A verb registers itself at namespace scope:
 ///
 ///     const Verb kNetem("netem", "What is left of …", [](CLI::App& verb, int& exit) { … });
 ///
-/// The function `add` is called once. It adds the options and the callback to `verb`. The callback writes to standard
-/// output. It may set `exit` to 1 for a negative result; it throws std::invalid_argument for wrong usage (exit 2) and
-/// other exceptions for failures (exit 1). Options must outlive the program's run, so they are static in `add`.
+/// `add` is called once, to add the options and the callback. The callback writes to standard output and may set `exit`
+/// to 1 for a negative result; it throws std::invalid_argument for wrong usage (exit 2) and other exceptions for
+/// failures (exit 1). Options must outlive the program's run, so they are static in `add`.
 class Verb {
  public:
   using Add = void (*)(CLI::App& verb, int& exit);
