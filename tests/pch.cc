@@ -1,2 +1,2 @@
 // SPDX-License-Identifier: Apache-2.0
-// This file is used to compile the precompiled headers for the optimized tests (see tests/CMakeLists.txt).
+// Compiles the precompiled headers of the optimized tests (see tests/CMakeLists.txt).

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// Compares the table in SESSION.md, "When forces stop coming", with the constants of the code, and runs through its
-// stages.
+// The table in SESSION.md, "When forces stop coming", agrees with the constants of the code.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -119,7 +117,6 @@ TEST_F(Walk, EachStageIsEnteredAtItsTime) {
     for (const char* name : {"hold", "decay", "safe stop"}) {
       const Stage& next = stage(stages_, name);
       ASSERT_TRUE(next.after_validity) << name;
-      // The safe stop begins at its time, and the other stages after it.
       const Duration from = kValid + next.entered;
       const bool there = next.mode == Mode::kSafeStop ? step.force_age >= from : step.force_age > from;
       if (there) expected = next.mode;
@@ -148,7 +145,6 @@ TEST_F(Walk, NoStepOfTheForceExceedsTheSlewBound) {
 TEST_F(Walk, TheForceFollowsItsModelUntilItFadesAndComesBackOnARamp) {
   const auto at = [&](int ms) -> const Step& { return steps_[static_cast<std::size_t>(ms - 1)]; };
   const auto wall = [](int ms) { return kStiffness * depth(ms); };
-  // The current position of the hand is used for fresh and held forces, and not the position at 990 ms.
   EXPECT_NEAR(-at(1040).wanted.x(), wall(1040), 1e-9);
   EXPECT_NEAR(-at(1065).wanted.x(), wall(1065), 1e-9);
   // Decay starts v + 20 ms = 80 ms after 990 ms.

@@ -99,7 +99,7 @@ TEST(HapticController, AnOverrunIsBookedAsItWasAndFlagged) {
   EXPECT_DOUBLE_EQ(step.energy, 0.05 * 1e-3 + 0.26 * 1e-6 / 5e-3);
 }
 
-// Stores some energy, requests a force, then pauses while the hand follows the force (worst case).
+// Some energy is stored, and the hand follows the force during the pause (worst case).
 Step after_a_pause(Bench& bench, Duration pause) {
   bench.move_freely(100);
   bench.want(-6);

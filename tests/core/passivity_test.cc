@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// Passivity at the level of the control law: for every hand motion and every remote force with any delay, the ledger
-// must stay nonnegative, the force must stay within its bound, and no NaN may reach the device. ctest asks RapidCheck
-// for 10 000 seeds (see CMakeLists.txt). tests/tools/worlds adds the network.
+// For every hand motion and every remote force with any delay, the ledger stays nonnegative, the force within its
+// bound, and no NaN reaches the device. ctest asks RapidCheck for 10 000 seeds (see CMakeLists.txt). tests/tools/worlds
+// adds the network.
 #include <gtest/gtest.h>
 #include <rapidcheck.h>
 
@@ -26,12 +25,12 @@ namespace {
 
 struct Outcome {
   double least_energy = 0;
-  double worst_shortfall = 0;  // J, how much the account was below the minimum for its hold
+  double worst_shortfall = 0;  // J, the amount below the minimum for this hold
   double worst_excess = 0;     // N above the bound
   bool all_finite = true;
 };
 
-/// J per second of hold: the largest loss of the account, T (‖F‖ − f_c)₊²/(4b) for T = 1 s.
+/// J per second of hold: T (‖F‖ − f_c)₊²/(4b) for T = 1 s.
 double worst_per_second(const Vec3& force, const Friction& friction, Law law) {
   const double size = law == Law::kAolPerAxis ? force.cwiseAbs().maxCoeff() : force.norm();
   const double excess = std::max(size - friction.coulomb, 0.0);
@@ -152,13 +151,13 @@ TEST_P(Passivity, AHoldBeyondTheBoundTakesNoMoreThanIsSaid) {
   }));
 }
 
-// A searching adversary: hand and environment are a list of genes, and hill climbing from random starts maximizes the
-// energy extracted relative to the peak of the ledger.
+// A searching adversary: hill climbing over genes of hand and environment maximizes the energy extracted relative to
+// the ledger's peak.
 struct Gene {
   double follow = 0;           // factor on the worst motion of eq. (7)
   Vec3 move = Vec3::Zero();    // m, added motion
   Vec3 wanted = Vec3::Zero();  // N
-  double late = 1;             // the preceding hold relative to the configured hold
+  double late = 1;             // ratio of the previous hold to the configured one
 };
 
 class Search {
@@ -166,8 +165,7 @@ class Search {
   Search(Law law, double bound_scale, std::uint64_t seed, bool late = false)
       : law_(law), bound_scale_(bound_scale), late_(late), dice_(seed) {}
 
-  /// Returns the lowest value of the objective. It is negative if the ledger fell below zero, or below the minimum that
-  /// is possible with a hold that is too long. The scale is the peak of the ledger.
+  /// Returns the lowest objective relative to the ledger's peak. Negative: below zero or the minimum for a late hold.
   double worst() {
     double worst = 0;
     for (int start = 0; start < 20; ++start) {

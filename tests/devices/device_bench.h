@@ -8,12 +8,12 @@
 
 namespace tendon {
 
-/// A device with a simulated clock that starts at an odd time.
+/// The simulated clock starts at an odd time.
 class Bench {
  public:
   explicit Bench(SimulatedDevice::Config config) : device_(std::move(config)) { device_.read(now_); }
 
-  /// Waits for `interval` with the force that is held. Returns the position of the encoder.
+  /// Returns the position of the encoder after `interval`.
   Vec3 wait(Duration interval) {
     now_ += interval;
     return device_.read(now_)->position;

@@ -12,8 +12,8 @@
 
 namespace tendon {
 
-/// A driver, a cable and a device model in simulated time, one period of the haptic loop after another. `Bench` adds
-/// `device`, `step(force)`, which calls `drive` and `look`, and `home(force)`, which homes the device as a user would.
+/// One period of the haptic loop after another. `Bench` adds `device`, `step(force)`, which calls `drive` and `look`,
+/// and `home(force)`, which homes the device as a user would.
 template <class Bench>
 struct DriverBench {
   void drive(Device& device, const Vec3& force) {
@@ -31,7 +31,7 @@ struct DriverBench {
     for (const LocalTime end = now + time; now < end;) bench().step(force);
   }
 
-  /// Runs until the device is in `state`, homing it if necessary. Returns false after `most`.
+  /// Homes the device if necessary. Returns false after `most`.
   bool reaches(Device::State state, Duration most, const Vec3& force = Vec3::Zero()) {
     for (const LocalTime end = now + most; now < end && bench().device.state() != state;) {
       bench().step(force);

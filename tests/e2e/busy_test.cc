@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// A server whose network thread never sleeps. The test counts sleeps instead of measuring times.
+// The network thread never sleeps. Counts sleeps instead of measuring times.
 #include <gtest/gtest.h>
 
 #include <cstdint>

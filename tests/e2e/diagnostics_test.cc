@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests the diagnostics that an observer receives about the server, the network and the device. The tests do not check
-// upper bounds of times.
+// For an observer: the server, the network and the device. No upper bounds of times.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -52,7 +51,6 @@ class Guest {
   std::optional<ForceClient> client_;
 };
 
-/// Runs the clients until `done`; returns false after kPatience.
 bool turn_until(std::vector<Guest*> guests, const std::function<bool()>& done) {
   const LocalTime end = clock::now() + kPatience;
   while (!done()) {
@@ -106,7 +104,7 @@ TEST(Diagnostics, AnEngineThatSleepsOnThisMachineIsBlamedAndNeverTheNetwork) {
   Guest watcher(server.address(), [](const DeviceState&, const LinkStats&) {});
   Guest engine(server.address(), [](const DeviceState& hand) { return Touch(Vec3(-1000 * hand.position.x(), 0, 0)); });
 
-  // Exceeds short pauses of a machine, which can look like a slow network.
+  // Exceeds short pauses of a machine, which look like a slow network.
   constexpr Duration kAsleep = std::chrono::milliseconds(500);
   std::uint64_t last = 0;
   int told = 0;
@@ -155,7 +153,6 @@ back_and_forth = true
 [safety.speed_trip]
 max_m_per_s = 0.05
 )";
-  // A recording to a device file has no sibling files.
   Server server(folder.path(), write(folder.path() / "scene.toml", scene), {"--record", "/dev/null"});
   Guest watcher(server.address(), [](const DeviceState&, const LinkStats&) {});
   Guest engine(server.address(), [](const DeviceState&) { return Touch(Vec3::Zero()); });

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// Programs that discover each other through a fake Avahi. deploy/discovery/drill uses a real one.
+// With a fake Avahi. deploy/discovery/drill uses a real one.
 #include <gtest/gtest.h>
 
 #include <chrono>
@@ -29,7 +28,6 @@ class Tendond : public Process {
   Tendond(const std::filesystem::path& folder, std::vector<std::string> scenes, std::vector<std::string> environment)
       : Process(program("tendond"), std::move(scenes), folder, std::move(environment)) {}
 
-  /// Sends SIGTERM and returns the summary.
   std::string stop() {
     signal(SIGTERM);
     EXPECT_EQ(wait(), 0) << err();

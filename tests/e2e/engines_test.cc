@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests multiple engines on one device and multiple devices on one server, in separate processes.
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
@@ -16,7 +15,6 @@ namespace {
 
 using testing::ScratchFolder;
 
-/// Waits until the force along x is below −`at_least`, N.
 void wait_until_felt(Process& echo, double at_least) {
   watch_force(echo, [at_least](double force) { return force < -at_least; });
 }
@@ -31,8 +29,7 @@ TEST(Engines, TheForcesOfTwoAddUpOnOneDevice) {
   wait_until_felt(echo, 0.3);
   Client two("virtual_wall", server.address(), folder.path(), {"--channel", "two", "--stiffness-n-per-m", "150"});
   two.wait_for_line("connected");
-  // One wall of 150 N/m against a grip of 300 N/m, 15 mm deep: equilibrium at 15 mm / 3, 1.5 N. Two walls, 300 N/m in
-  // total: at 7.5 mm, 2.25 N.
+  // A wall of 150 N/m, 15 mm deep, against a grip of 300 N/m: 15 mm / 3, 1.5 N. Two walls: 7.5 mm, 2.25 N.
   wait_until_felt(echo, 1.9);
   const std::string end = server.stop();
   EXPECT_NE(end.find(R"("name":"one","forces":)"), std::string::npos) << end;
@@ -52,7 +49,7 @@ TEST(Engines, ALeaseIsTakenFromAnEngineThatHangs) {
   wait_until_felt(echo, 0.5);
   Client second("virtual_wall", server.address(), folder.path(), {"--channel", "tissue", "--take-lease"});
   second.wait_for_line("connected");
-  first.signal(SIGSTOP);  // its session remains for a minute
+  first.signal(SIGSTOP);  // the session is kept for a minute
   server.process().wait_for_line("takes device/tissue from");
   wait_until_felt(echo, 0.5);
   first.signal(SIGCONT);
@@ -137,7 +134,6 @@ TEST(Engines, EachSessionIsToldByOneNameFromItsBeginningToItsEnd) {
   EXPECT_EQ(lines[1]["client"], "virtual_wall");
   EXPECT_EQ(lines[1]["role"], "controller");
   EXPECT_EQ(lines[3]["why"], "the server is shutting down");
-  // Session names consist of the server's run and the connection.
   const std::string first = lines[0]["session"];
   const std::string second = lines[1]["session"];
   EXPECT_EQ(first.substr(0, 24), second.substr(0, 24));

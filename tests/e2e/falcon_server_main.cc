@@ -30,8 +30,7 @@ double quantile(std::vector<double>& values, double share) {
   return *at;
 }
 
-/// Latency in µs of a thread with the scheduling of the haptic thread that only sleeps: the lower bound of this
-/// machine.
+/// Latency (µs) of a thread that has the scheduling of the haptic thread and only sleeps.
 class Floor {
  public:
   Floor()
@@ -84,7 +83,7 @@ class Report {
   std::ostringstream words_;
 };
 
-/// Moves the hand into the wall, back and forth in it, and out again, with a new grip each time.
+/// Moves the hand into the wall, within the wall and out again.
 void use(FalconStage& stage, double duration_s) {
   for (const LocalTime end = clock::now() + from_seconds(duration_s); clock::now() < end;) {
     stage.arm();

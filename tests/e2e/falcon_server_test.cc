@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// tendond with a Falcon model through the real libusb, and a remote wall in its own process. The tests check the motor
-// commands at the end of the cable. falcon-server prints the rendered forces and their latency.
+// tendond with a Falcon model through the real libusb, and a remote wall in its own process, judged by the motor
+// commands at the end of the cable.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -24,8 +23,8 @@ namespace {
 
 constexpr std::uint8_t kOut = 0x02;
 
-/// Runs `claim` on its own stage. The scene's watchdogs assume that the machine does not pause, so a claim that failed
-/// after a pause is repeated, at most twice.
+/// The scene's watchdogs assume that the machine does not pause, so a claim that failed after a pause is repeated, at
+/// most twice.
 template <class Claim>
 void on_a_stage(const FalconStage::Config& config, const Claim& claim) {
   for (int left = 2;; --left) {

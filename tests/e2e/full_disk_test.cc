@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// A full disk pauses the recording, not the run. The recording continues once there is room, and the exit code reports
-// the gap.
+// Pauses the recording, not the run. It continues once there is room, and the exit code reports the gap.
 #include <gtest/gtest.h>
 
 #include <cstddef>

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// A driver process streams forces to a device and dies. The device is a socket. For usbfs, this program replaces
-// ioctl() and writes the endpoint and the bytes to that socket.
+// A driver process streams forces to a socket and dies. For usbfs, this program's ioctl() writes endpoint and bytes to
+// it.
 #include "devices/safety/guardian.h"
 
 #include <fcntl.h>
@@ -86,13 +85,11 @@ class Heard {
     if (far_ >= 0) close(far_);
     far_ = -1;
   }
-  /// Empty when all writers have closed the socket.
   std::string next() {
     std::array<char, 128> bytes{};
     const ssize_t size = read(near_, bytes.data(), bytes.size());
     return size > 0 ? std::string(bytes.data(), static_cast<std::size_t>(size)) : "";
   }
-  /// Returns `heard` if there are no more packets.
   std::string last(const std::string& heard = "") {
     std::string last = heard;
     for (std::string packet = next(); !packet.empty(); packet = next()) last = packet;
@@ -273,7 +270,7 @@ TEST(Guardian, WritesNothingWhileThereIsNoForceOrStepsCome) {
   ended_by(pid);
 }
 
-// Does not check the time, because virtual machines pause.
+// The time is not checked, because virtual machines pause.
 TEST(Guardian, SaysHowLongTheForceOutlivesADriverThatIsStopped) {
   std::vector<double> ms;
   for (int i = 0; i < 20; ++i) {
@@ -386,7 +383,6 @@ TEST(Guardian, SaysHowLongTheForceOutlivesTheDriver) {
 
 LocalTime now() { return LocalTime(std::chrono::duration_cast<Duration>(Clock::now().time_since_epoch())); }
 
-/// The result for a Falcon model in this process when its driver process is killed while it pushes.
 struct Killed {
   double pushed_for_ms = 0;
   bool pushes = true;                   ///< when no process is left that could stop it
@@ -435,7 +431,7 @@ Killed kill_the_driver_of_a_falcon(bool guarded) {
   return result;
 }
 
-// Uses the real driver, guardian and signals; the cable is a socket, and the Falcon a model.
+// The real driver, guardian and signals; the cable is a socket, and the Falcon a model.
 TEST(Guardian, AFalconWhoseDriverIsKilledIsLeftWithoutForce) {
   const auto zero = falcon::encode(falcon::kLastCommand);
   std::vector<std::uint8_t> last_word = {socket_cable::kOut};

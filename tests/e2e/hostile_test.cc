@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// Invalid datagrams to the server's port are counted without any other effect. The counters are compared with the
-// datagrams that the server recorded as arrived, so drops by the kernel do not matter.
+// Invalid datagrams are only counted. The counters are compared with the recorded datagrams, so drops by the kernel do
+// not matter.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -110,7 +109,6 @@ TEST(HostileDatagrams, AreCountedAndChangeNothing) {
   EXPECT_GE(sampled + count_in(end, "strangers_left_out"), strangers) << "and a count of the rest";
   EXPECT_GE(count_in(end, "lost"), static_cast<std::uint64_t>(kCut));  // truncated datagrams were not accepted
 
-  // There was exactly one client, which stayed connected, and its forces continued in order.
   EXPECT_EQ(count_in(end, "welcomed"), 1U);
   EXPECT_EQ(count_in(end, "refused"), 0U);
   EXPECT_EQ(wall.err().find("lost 127"), std::string::npos) << wall.err();

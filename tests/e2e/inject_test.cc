@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// tendon-inject between two programs unrelated to Tendon. No test measures a time.
+// Between two programs unrelated to Tendon. No test measures a time.
 #include <gtest/gtest.h>
 #include <poll.h>
 
@@ -104,7 +103,6 @@ TEST(Inject, AHostThatNobodyKnowsIsNamedAndFails) {
 TEST(Inject, ARunThatCouldNotKeepUpIsInvalidAndFails) {
   const ScratchFolder folder;
   UdpBatch server = UdpBatch::listening(parse_address("127.0.0.1:0"));
-  // A limit of zero is always exceeded.
   Service proxy("tendon-inject", {"--to", to_string(server.local_address()), "--max-release-error-us", "0"},
                 folder.path(), "start", "listen");
   send_through(server, proxy.address(), 3);

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// A hand, a server, a bad network and a remote wall, each in its own process, and the effects of killing one of them.
-// No test measures a time, because virtual machines pause. All claims are checked in the recordings.
+// Each part runs in its own process, and one of them is killed. No test measures a time, because virtual machines
+// pause; the claims are checked in the recordings.
 #include <gtest/gtest.h>
 
 #include <algorithm>

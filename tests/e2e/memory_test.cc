@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// Memory of a server, and of each device and session. The bounds are about 25 % above the measured values. The bound
-// for the whole server is the goal of 12 MB, which depends on the listed libraries.
+// Bounds about 25 % above the measured values; for the whole server the goal of 12 MB, which depends on the listed
+// libraries.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -23,7 +22,6 @@ namespace {
 
 constexpr std::int64_t kMegabyte = 1 << 20;
 
-/// A row of /proc/PID/status, converted to bytes.
 std::int64_t bytes(pid_t process, const std::string& row) {
   std::ifstream status("/proc/" + std::to_string(process) + "/status");
   for (std::string line; std::getline(status, line);) {
@@ -52,7 +50,6 @@ std::set<std::string> libraries(pid_t process) {
   return names;
 }
 
-/// Does not record and has run some hundred steps.
 class Fleet {
  public:
   explicit Fleet(std::size_t count) {
@@ -88,8 +85,8 @@ TEST(Memory, OfAServerWithADeviceIsSmall) {
 
 TEST(Memory, HasNoLibraryThatTheSceneDoesNotNeed) {
   Fleet one(1);
-  // Libraries that every scene needs: language runtimes, the scene file, the protocol and its cryptography, the log.
-  // USB and discovery in a scene also load libusb and libsystemd with seven dependencies.
+  // For every scene: language runtimes, the scene file, the protocol and its cryptography, the log. USB and discovery
+  // also load libusb and libsystemd with seven dependencies.
   const std::set<std::string> needed = {"ld-linux-x86-64", "libc",        "libm", "libgcc_s",  "libstdc++",
                                         "libtomlplusplus", "libprotobuf", "libz", "libsodium", "libfmt"};
   for (const std::string& library : libraries(one.pid())) EXPECT_TRUE(needed.contains(library)) << library;

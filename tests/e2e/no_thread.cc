@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// Preloaded library: refuses the n-th call of pthread_create, where n is TENDON_REFUSED_THREAD.
+// Preloaded: refuses the n-th call of pthread_create, n = TENDON_REFUSED_THREAD.
 #include <dlfcn.h>
 #include <pthread.h>
 

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// A proxy (tendon-fem serve) with a hand and with faulty workers. No test measures a time.
+// tendon-fem serve with a hand and with faulty workers. No test measures a time.
 #include <gtest/gtest.h>
 #include <signal.h>
 
@@ -21,14 +20,13 @@ namespace {
 
 using testing::ScratchFolder;
 
-/// kPressingHand with forces that fade so fast that a gap of 0.5 s, the minimum of a proxy, passes through every stage.
+/// Forces fade so fast that a gap of 0.5 s, the minimum of a proxy, passes through every stage.
 std::string pressing_hand() {
   std::string text(kPressingHand);
   const auto force = text.find("[force]");
   return text.replace(force, std::string::npos, "[force]\nhold_ms = 100\nsafe_stop_ms = 200\n");
 }
 
-/// The result of a proxy with the worker `fake_worker WAY`.
 struct Outcome {
   std::string out;
   std::string err;

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// Recordings are not overwritten, cannot be filled by unauthenticated senders, and suffice to replay the run.
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
@@ -34,7 +32,7 @@ void wait_for_tick(Process& echo, std::uint64_t tick) {
   }
 }
 
-/// Returns the number of bitwise identical steps of tendon-replay, and expects no others.
+/// Steps that are bitwise identical in tendon-replay; there must be no others.
 std::uint64_t replayed(const std::filesystem::path& file) {
   Process replay(program("tendon-replay"), {file.string(), "--json"}, file.parent_path());
   EXPECT_EQ(replay.wait(), 0) << replay.out() << replay.err();
@@ -88,7 +86,6 @@ TEST(Recordings, WhatIsNoRecordingIsRefusedBeforeAnythingRuns) {
   EXPECT_EQ(content_of(scene), content_of(demo_scene()));
 }
 
-// The README's example far-off.mcap.
 TEST(Recordings, ARunWithoutALimiterReplaysBitForBit) {
   const ScratchFolder folder;
   const auto file = folder.path() / "far-off.mcap";

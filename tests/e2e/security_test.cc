@@ -15,7 +15,7 @@ namespace {
 
 using testing::ScratchFolder;
 
-/// A server with keys for `wall` and for the observer `screen`, which listens on all addresses.
+/// Keys for `wall` and for the observer `screen`; listens on all addresses.
 class Lab {
  public:
   Lab() {

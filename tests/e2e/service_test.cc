@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// tendond under a service manager: the test receives its datagrams of sd_notify(3).
+// The test receives the datagrams of sd_notify(3).
 #include <gtest/gtest.h>
 #include <sys/socket.h>
 #include <sys/un.h>

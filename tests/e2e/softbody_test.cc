@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// The reference physics engine in its own process, with a hand that presses into the body.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -34,8 +32,8 @@ TEST(Softbody, AHandFeelsASoftBlockAsStiffAsTheSceneMakesIt) {
 
   const Recording recording = read_recording(file);
   expect_passive(recording, scene);
-  // The stiffness of the block is 457.9 N/m. The local model of each force lets the server follow the hand, so this
-  // stiffness is expected at every depth, except that the first forces are ramped in and late forces fade.
+  // 457.9 N/m at every depth, because the server follows the hand by each force's local model; except that the first
+  // forces are ramped in and late forces fade.
   double peak = 0;
   std::size_t deep = 0;
   std::size_t as_stiff = 0;
@@ -52,7 +50,7 @@ TEST(Softbody, AHandFeelsASoftBlockAsStiffAsTheSceneMakesIt) {
   EXPECT_GT(as_stiff, deep / 2);
 }
 
-/// If two threads must not factorize concurrently, the engine reports it and still answers.
+/// Two threads may be unable to factorize concurrently; the engine reports it and still answers.
 TEST(Softbody, ANearFieldAndACutAreMadeBesideTheAnswers) {
   const ScratchFolder folder;
   std::ifstream liver(demo_scene().replace_filename("liver_near.toml"));
@@ -90,7 +88,6 @@ towards_hand = [-1, 0, 0]
     if (body.err().find("this OpenBLAS only supports one thread") != std::string::npos) continue;
     if (scene.ends_with("near.toml")) {
       EXPECT_NE(body.out().find(R"({"answers":{"linear":)"), std::string::npos) << body.out();
-      // The server's summary counts the solver paths and the largest error estimate.
       EXPECT_GT(number_in(end, "worst_error_n"), 0) << end;
       const auto answered_by = [&](const std::string& way) {
         return end.find(R"("ways":{")" + way) != std::string::npos;

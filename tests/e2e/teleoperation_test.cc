@@ -11,8 +11,8 @@
 #include "tests/e2e/stage/stage.h"
 #include "tests/server/scratch_folder.h"
 
-// A hand that leads the device of another server, in separate processes. tests/server/clients/couple_test.cc and
-// leaders_test.cc cover each method, whole handles and several leaders in virtual time.
+// In separate processes. tests/server/clients/couple_test.cc and leaders_test.cc cover each method, whole handles and
+// several leaders in virtual time.
 
 namespace tendon::e2e::teleoperation_test {
 namespace {
@@ -60,12 +60,11 @@ TEST(Teleoperation, AHandLeadsTheDeviceOfAnotherServerThroughABadNetwork) {
     return high - low;
   };
   EXPECT_GT(spread(hand), 0.01);
-  // The wall behind it is 8 mm away. The range toward the other side depends on where the hand engaged and on how far
-  // pauses of the machine have softened the spring.
+  // The wall is 8 mm away. Toward the other side it depends on where the hand engaged and on how far pauses of the
+  // machine have softened the spring.
   EXPECT_GT(spread(tool), 0.004) << "it follows";
 }
 
-/// The control experiment: shows that the limiters are necessary.
 TEST(Teleoperation, WithoutLimitersTheSamePairGivesOutEnergyThatNobodyPutIn) {
   const testing::ScratchFolder folder;
   const auto led = folder.path() / "leader.mcap";

@@ -14,7 +14,6 @@
 namespace tendon::e2e::threads_test {
 namespace {
 
-/// Returns the threads, waiting until they are the expected ones.
 std::set<std::string> threads_when(const std::set<std::string>& expected, Server& server) {
   std::set<std::string> threads;
   for (const auto end = std::chrono::steady_clock::now() + kPatience;
@@ -80,7 +79,6 @@ TEST(Threads, OfAServerAreThoseOfThePage) {
   server.process().wait_for_line("listens on");
   const std::set<std::string> page = threads_of_the_page();
   ASSERT_TRUE(page.contains("haptic-N"));
-  // The server listens before its threads have started.
   const std::set<std::string> expected = {"haptic-0", "log", "network", "output", "tendond"};
   const std::set<std::string> threads = threads_when(expected, server);
   EXPECT_EQ(threads, expected);

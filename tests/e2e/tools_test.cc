@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// The shipped tools with invalid files and with readers that close the pipe.
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 #include <unistd.h>

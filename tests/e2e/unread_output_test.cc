@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// Programs whose output is not read, either from a full pipe or from a terminal stopped with Ctrl-S.
+// From a full pipe, or from a terminal stopped with Ctrl-S.
 #include <fcntl.h>
 #include <gtest/gtest.h>
 #include <poll.h>
@@ -28,7 +27,6 @@ using namespace std::chrono_literals;
 
 constexpr auto kEnd = 5s;
 
-/// Reads only when the test calls `read`.
 class Reader {
  public:
   virtual ~Reader() = default;
@@ -96,7 +94,6 @@ class StoppedTerminal : public Reader {
   int slave_ = -1;
 };
 
-/// Returns the arguments for /bin/sh to redirect a stream of a program.
 std::vector<std::string> redirected(const std::string& stream, const Reader& reader, const std::string& name,
                                     const std::vector<std::string>& arguments) {
   std::vector<std::string> words = {"-c", "exec \"$@\" " + stream + ">\"$0\"", reader.path(), program(name).string()};

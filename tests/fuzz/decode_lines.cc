@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// decode_lines: reads datagrams, one per line in hexadecimal digits, and prints one line for each with the values that
-// C++ decodes. A client in another language prints the same for comparison (tests/clients/python/differential.py).
-//
-// Integers are decimal, floating-point numbers are the 16 hexadecimal digits of their bits, strings and bytes are
-// hexadecimal digits. Vectors and matrices are printed row by row. "-" means rejected.
+// Reads datagrams, one per line in hexadecimal digits, and prints the values that C++ decodes, to compare with clients
+// in other languages (tests/clients/python/differential.py). Integers are decimal, floating-point numbers the 16
+// hexadecimal digits of their bits, strings and bytes hexadecimal digits, vectors and matrices row by row. "-" means
+// rejected.
 #include <bit>
 #include <cstddef>
 #include <cstdint>
@@ -63,7 +62,7 @@ class Line {
   }
   Line& operator<<(const Vec3& v) { return *this << v.x() << v.y() << v.z(); }
   Line& operator<<(const Quat& q) { return *this << q.w << q.x << q.y << q.z; }
-  /// Adding zero turns −0 into 0, because the sign of k · 0 varies.
+  /// −0 becomes 0, because the sign of k · 0 varies.
   Line& operator<<(const Mat3& m) {
     for (int row = 0; row < 3; ++row) *this << Vec3(m.row(row).transpose() + Vec3::Zero());
     return *this;

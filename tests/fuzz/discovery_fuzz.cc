@@ -6,8 +6,7 @@
 #include "protocol/discovery.h"
 #include "tests/fuzz/target.h"
 
-// An untrusted instance name and TXT record. A name is rejected or survives writing and parsing unchanged; a parsed TXT
-// record can be written and parsed again.
+// A name is rejected or survives writing and parsing unchanged; a parsed TXT record can be written and parsed again.
 
 using namespace tendon;
 

@@ -21,7 +21,6 @@ class Cable final : public usb::Pipe {
   bool write(std::span<const std::uint8_t> bytes) noexcept override {
     if (full) return false;
     if (bytes.size() != falcon::kPacketBytes) return true;
-    // Torques have the encoding of encoders.
     const auto packet = falcon::decode(bytes.first<falcon::kPacketBytes>());
     fuzz::require(packet.has_value());
     for (const std::int16_t torque : packet->encoders) {
@@ -39,7 +38,7 @@ class Cable final : public usb::Pipe {
       std::transform(noise.begin(), noise.end(), packet.begin(), std::to_integer<std::uint8_t>);
       return noise.size();
     }
-    // Usually a reply of a homed device near its previous position.
+    // Usually a homed device near its previous position.
     std::array<std::uint8_t, falcon::kPacketBytes> reply =
         falcon::encode({.torque = {static_cast<std::int16_t>(decision), 0, static_cast<std::int16_t>(-decision)}});
     reply[13] = static_cast<std::uint8_t>('A' + (decision % 16 == 0 ? 0x30 : 0x70));

@@ -4,8 +4,8 @@
 #include "devices/falcon/packet.h"
 #include "tests/fuzz/target.h"
 
-// A Falcon's output in arbitrary fragments. The parsed replies equal those found by scanning the whole stream for
-// 16-byte replies. Every byte belongs to a reply, is skipped, or may begin the next reply.
+// In arbitrary fragments. The replies equal those found by scanning the whole stream for 16-byte replies. Every byte
+// belongs to a reply, is skipped, or may begin the next reply.
 
 using namespace tendon;
 using namespace tendon::falcon;

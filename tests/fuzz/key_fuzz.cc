@@ -7,8 +7,8 @@
 #include "protocol/secrets/client_key.h"
 #include "tests/fuzz/target.h"
 
-// The text of a key file and its permissions. A file is rejected with a message that does not contain the key, or
-// accepted as a key that only its owner can read, that is not weak, and that survives writing and parsing.
+// A file is rejected with a message that does not contain the key, or accepted as a key that only its owner can read,
+// that is not weak, and that survives writing and parsing.
 
 using namespace tendon;
 

@@ -4,8 +4,7 @@
 #include "tests/fuzz/target.h"
 #include "tests/protocol/wire/told.h"
 
-// Invalid content from an authenticated peer: the input is sealed with the peer's key and given to a session. The fast
-// parser and the one for fields in arbitrary order agree.
+// Sealed with the peer's key and given to a session. The fast parser and the one for fields in arbitrary order agree.
 
 using namespace tendon;
 

@@ -19,7 +19,7 @@ void require_same_again(const RecordingReader::Record& record, const SolverPaths
   if (const auto* scene = std::get_if<SceneRecord>(&record)) {
     fuzz::require(recording::decode_scene(recording::encode(*scene)) == *scene);
   } else if (const auto* step = std::get_if<StepRecord>(&record)) {
-    // Compares bytes, because NaN differs from itself.
+    // The bytes are compared, because NaN differs from itself.
     const auto bytes = recording::encode(*step, ways.name_of(step->force_way));
     SolverPaths own;
     const StepRecord again = recording::decode_step(bytes, step->hand.at, own);

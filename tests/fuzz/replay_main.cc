@@ -8,7 +8,7 @@
 #include <iterator>
 #include <vector>
 
-// Runs a fuzz target over the files of a folder without libFuzzer, for any compiler and sanitizer.
+// Runs a target over the files of a folder without libFuzzer, for any compiler and sanitizer.
 
 // NOLINTNEXTLINE(readability-identifier-naming): libFuzzer's name
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size);

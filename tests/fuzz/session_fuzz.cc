@@ -6,9 +6,8 @@
 #include "protocol/session.h"
 #include "tests/fuzz/target.h"
 
-// Runs two sessions over a simulated network. The input determines which datagrams are lost, repeated, reordered,
-// damaged or delayed. Checks that the received data was sent by the peer, that requests arrive once and in order, and
-// that a session only ends due to a timeout, a Bye or its age.
+// Two sessions over a network that loses, repeats, reorders, damages or delays. Received data was sent by the peer,
+// requests arrive once and in order, and a session only ends due to a timeout, a Bye or its age.
 
 using namespace tendon;
 

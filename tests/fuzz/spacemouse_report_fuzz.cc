@@ -5,8 +5,8 @@
 #include "devices/spacemouse/spacemouse_device.h"
 #include "tests/fuzz/target.h"
 
-// A packet is accepted only if its id and length belong to a report, and decodes to the values of its bytes. For every
-// cap position, the speed of the simulated handle stays within the scene's limit.
+// A packet is accepted only if its id and length belong to a report. For every cap position, the speed of the simulated
+// handle stays within the scene's limit.
 
 using namespace tendon;
 using spacemouse::Axes;
@@ -27,7 +27,6 @@ void append(std::vector<std::uint8_t>& bytes, const std::optional<Axes>& axes) {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const std::vector<std::uint8_t> bytes(data, data + size);  // of exactly that size, so that the sanitizer detects
-                                                             // overruns
   const auto report = spacemouse::parse(bytes);
   const int id = size > 0 ? bytes[0] : -1;
   const bool motion = (id == 1 && (size == 7 || size == 13)) || (id == 2 && size == 7);

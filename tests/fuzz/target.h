@@ -10,7 +10,7 @@
 #include <streambuf>
 #include <string_view>
 
-// Helpers of the fuzz targets. A violated property aborts the process, which libFuzzer reports.
+// A violated property aborts the process, and libFuzzer reports it.
 
 namespace tendon::fuzz {
 
@@ -22,7 +22,6 @@ inline std::string_view text(std::span<const std::byte> bytes) {
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 
-/// A seekable stream over the input, without a copy.
 class InputBuffer : public std::streambuf {
  public:
   explicit InputBuffer(std::span<const std::byte> bytes) {

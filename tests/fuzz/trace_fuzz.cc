@@ -9,8 +9,7 @@
 #include "tests/tools/injector/traces/trace.h"
 #include "tests/tools/injector/traces/trace_player.h"
 
-// A recorded network is rejected with file and line, or it survives writing and parsing, can be replayed, and has no
-// release before its arrival.
+// Rejected with file and line, or survives writing and parsing, can be replayed, and has no release before its arrival.
 
 using namespace tendon;
 using namespace tendon::injector;

@@ -7,8 +7,8 @@
 #include "tests/clients/bridge/vrpn/program.h"
 #include "tests/fuzz/target.h"
 
-// Data of a VRPN program in TCP fragments and datagrams. Rendered forces are finite, answers can be parsed, and stored
-// data stays within the limits.
+// TCP fragments and datagrams. Rendered forces are finite, answers can be parsed, and stored data stays within the
+// limits.
 
 using namespace tendon;
 using namespace tendon::bridge;

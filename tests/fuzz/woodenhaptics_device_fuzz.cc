@@ -6,9 +6,9 @@
 #include "devices/woodenhaptics/woodenhaptics_device.h"
 #include "tests/fuzz/target.h"
 
-// The input decides what a WoodenHaptics' cable returns, when it accepts data and when it is disconnected. Current is
-// sent only to a homed device and within the motor limits, the counters are set only after the button was pressed, and
-// the result of `apply` is finite.
+// The input decides what the cable returns and accepts, and when it is disconnected. Current is sent only to a homed
+// device and within the motor limits, the counters are set only after the button was pressed, and the result of `apply`
+// is finite.
 
 using namespace tendon;
 

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// Numerical cases: rounding, compiler optimizations, denormals, and NaN.
+// Rounding, compiler optimizations, denormals, and NaN.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -157,7 +156,7 @@ TEST(HardArithmetic, DenormalsAreOffInHapticStepsAndSoftBodyAnswers) {
   EXPECT_EQ(device.calls, 200);
   EXPECT_EQ(device.flushed, 200);
 
-  // The tool does not move, and the oscillation of the block decays until the force is smaller than 1e-308.
+  // The block's oscillation decays until the force is smaller than 1e-308.
   std::string scene = softbody::testing::with("\"condensed\"", "\"linear\"");
   const auto put = [&](std::string_view old, std::string_view by) { scene.replace(scene.find(old), old.size(), by); };
   put("[\"contact\"]", "[\"contact\", \"inertia\", \"damping\"]\nstep_ms = 2\ndamping_per_s = 60");
@@ -229,7 +228,6 @@ struct Twin {
     config.loop.control.max_slew = 1000;
     return config;
   }
-  /// Dynamic, so that the body has a state that an invalid position could corrupt.
   static std::string scene() {
     std::string scene = softbody::testing::with("\"condensed\"", "\"linear\"");
     const std::string_view effects = "[\"contact\"]";
@@ -307,7 +305,6 @@ TEST(HardArithmetic, NaNIsCountedAndLeavesServerAndEngineAsTheyWere) {
     refused += more_by_server + more_by_engine;
     compared += spoilt.bits.size();
 
-    // The smallest denormal is a valid number.
     const auto before = spoilt.world.server().stats().controller;
     ForceCommand command;
     command.sequence = 1'000'001;

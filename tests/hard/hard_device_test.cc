@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// Estimators, clocks and devices that break the loop of hand, device, network and engine (loop_case.h).
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -119,8 +117,7 @@ TEST(HardLoop, AnEstimatorThatHasLongSeenNothingNewDoesNotWindUp) {
               without("cap of 1e30 in place of 2e8", kWithin, [](std::uint64_t seed) { return wind_up(seed, 1e30); })});
 }
 
-/// Returns the lowest energy (J) of the account. The adversary moves in the direction of the force if it can gain
-/// energy from the controller.
+/// J, of the account. The adversary moves along the force if it can gain energy from the controller.
 double left_by_adversary(const Case& set, const Friction& friction) {
   AdversaryDevice device({.friction = friction}, set.world.seed);
   WatchedDevice port(device, {.friction = friction});
@@ -181,11 +178,10 @@ Observed wrap(std::uint64_t seed, bool guarded) {
   if (guarded) set.control().max_speed = 10;
   Bench bench(set);
   bench.run(milliseconds(1200));
-  // The encoder wraps where the hand leaves the wall, from 5 mm to 205 mm.
+  // The encoder wraps where the hand leaves the wall.
   bench.encoder.range = 0.2;
   bench.encoder.middle = Vec3(0.105, 0, 0);
   bench.run(milliseconds(2100));
-  // The operator moves the handle to its home and re-arms.
   bench.encoder.range.reset();
   bench.run(milliseconds(50));
   bench.world.client(bench.engine).rearm();
@@ -287,7 +283,6 @@ Observed clock_goes_back(std::uint64_t seed, bool decay) {
   if (!decay) set.control().hold.hold = set.control().hold.safe_stop = seconds(100);
   Bench bench(set);
   bench.run(milliseconds(1500));
-  // The time stamps of the device jump back as well.
   bench.encoder.behind = milliseconds(50);
   bench.run(milliseconds(300));
   bench.encoder.behind = Duration::zero();

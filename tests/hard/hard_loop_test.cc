@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// Engines and networks that break the loop of hand, device, network and engine (loop_case.h).
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
@@ -55,7 +53,7 @@ Observed bad_network(std::uint64_t seed, bool limiter, bool decay) {
       bench.world.now());
   bench.run(seconds(2));
   bench.world.network().change(Case::weather("loss=100%", "loss=100%"), bench.world.now());
-  // Datagrams already under way still arrive, at most 350 ms later.
+  // Datagrams in flight arrive at most 350 ms later.
   bench.expect_of_steps(no_force_from(bench.world.now() + milliseconds(350) + kSilence));
   bench.run(milliseconds(1800));
   bench.expect_of_steps({});
@@ -192,12 +190,10 @@ TEST(HardLoop, ContactThatChattersOnAnEdgeStaysPassive) {
 
 Observed pull_through(std::uint64_t seed, bool limiter) {
   Case set(seed);
-  // A plate of 8 mm that pushes toward the nearer side. A hand that has touched it sticks to it up to a distance of 5
-  // mm.
+  // 8 mm, pushes toward the nearer side. A hand that has touched it sticks to it up to a distance of 5 mm.
   set.physics = [n = set.into, k = set.stiffness, stuck = false](const DeviceState& hand) mutable -> Touch {
     const double depth = hand.position.dot(n);
     const double out = depth < 0.004 ? depth : depth - 0.008;  // distance to the nearer side; > 0 is inside near the
-                                                               // first side
     stuck = stuck ? std::abs(out) < 0.005 : depth > 0 && depth < 0.008;
     return stuck ? Vec3(-k * out * n) : Vec3(0, 0, 0);
   };

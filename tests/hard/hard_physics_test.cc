@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// Cases that break the physics of soft bodies: element, solver and time step. Figures of other programs refer to the
-// pressed block B1 (tests/clients/softbody/pressed_block.h).
+// Soft bodies: element, solver and time step. Figures of other programs refer to B1
+// (tests/clients/softbody/pressed_block.h).
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
@@ -87,7 +86,7 @@ TEST(HardPhysics, ANearlyIncompressibleBlockDoesNotLock) {
           .without = "tet4, which the warning names: +" + text(locked, 4) + " %"});
 }
 
-/// B1 with its free nodes mirrored below the floor, or at random positions.
+/// B1's free nodes are mirrored below the floor, or at random positions.
 VectorXd turned_inside_out(const Solid& solid, bool scattered, std::uint64_t seed) {
   Dice dice(seed);
   VectorXd u = VectorXd::Zero(solid.size());
@@ -188,7 +187,7 @@ TEST(HardPhysics, AnElementWithoutVolumeIsNamedAndASliverStepRefused) {
     const Fixed fixed = fix_where(read, [](const Vec3& node) { return node.z() < -0.005; });
     return Solid(std::move(read), Element::kTet4, {.young = 1e4, .poisson = 0.45}, Law::kLinear, fixed);
   };
-  const double thin = 6 * 3.6e-6;  // its volume is 3.6e-6 of the cube of its edges
+  const double thin = 6 * 3.6e-6;  // ratio of its volume to the cube of its edges: 3.6e-6
   const Solid sliver = solid(thin);
   const double limit = largest_step(sliver, 1000);
   // The mass of its top is proportional to h and the stiffness to 1/h, so 2/ω is proportional to h.
@@ -230,7 +229,7 @@ TEST(HardPhysics, StiffnessesAMillionTimesApartAreSolvedAsAnotherSolverDoes) {
   const Solid whole = pressed_block(Element::kTet4, 8, 0.45);
   SymmetricMatrix stiffness = whole.pattern();
   whole.stiffness(VectorXd::Zero(whole.size()), Elastic::Curvature::kExact, stiffness);
-  // The half x > 0 is a million times as stiff: adds its elements 999 999 times.
+  // The half x > 0 is a million times as stiff: its elements count 999 999 times more.
   Mesh half = whole.mesh();
   half.elements.clear();
   for (int e = 0; e < whole.mesh().element_count(); ++e) {
@@ -450,7 +449,6 @@ TEST(HardPhysics, ACutUnderLoadPutsInNoEnergyAndTheBodyGivesWayWithEach) {
               "new nodes begin at rest instead of where their twins are: " + text(forgotten, 3) + " times the energy"});
 }
 
-/// All nodes of B1 after a rigid rotation.
 VectorXd turned(const Mesh& mesh, double degrees) {
   const Mat3 turn = Eigen::AngleAxisd(degrees * 3.14159265358979323846 / 180, Vec3(1, 2, 3).normalized()).matrix();
   VectorXd u(3 * static_cast<Eigen::Index>(mesh.nodes.size()));

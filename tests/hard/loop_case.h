@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Cases that break the loop of hand, device, network and engine. Each case runs the whole server with AOL+, a real
-// client, a virtual clock, a hand that moves in contact and then rests, and a disturbance. An observer at the device's
-// port keeps its own energy account. For every case and seed:
+// Cases that break the loop of hand, device, network and engine: the whole server with AOL+, a real client, a virtual
+// clock, a hand that moves in contact and then rests, and a disturbance. An observer at the device's port keeps its own
+// energy account. For every case and seed:
 //
-//     passive   E ≥ −1e-9 J at every step, E = Σ [−F·Δx + f_c ‖Δx‖ + b ‖Δx‖²/T] with the actual force and motion,
-//               and the hand never receives more energy than it gave (∫ F_hand·dx ≥ 0)
-//     bounded   ‖F‖ ≤ 8 N; the force grows by at most 1000 N/s · T per step (the limiter may cut faster)
-//     quiet     ‖v‖ ≤ 5 mm/s permanently, from a stated time after the end of the disturbance
+// passive   E ≥ −1e-9 J at every step, E = Σ [−F·Δx + f_c ‖Δx‖ + b ‖Δx‖²/T] with the actual force and motion,
+//           and the hand never receives more energy than it gave (∫ F_hand·dx ≥ 0)
+// bounded   ‖F‖ ≤ 8 N; the force grows by at most 1000 N/s · T per step (the limiter may cut faster)
+// quiet     ‖v‖ ≤ 5 mm/s permanently, from a stated time after the end of the disturbance
 //
 // The same run without the protection under test must violate at least one of these.
 
@@ -62,7 +62,6 @@ inline std::uint64_t seeds() {
   return count == nullptr ? kSeeds : std::strtoull(count, nullptr, 10);
 }
 
-/// An encoder with several faults, in front of the true position.
 class Encoder final : public Device {
  public:
   explicit Encoder(Device& truth) : truth_(truth) {}
@@ -114,7 +113,7 @@ struct Observed {
   }
 };
 
-/// Names the first exceeded bound, or returns an empty string.
+/// Names the first exceeded bound, or is empty.
 inline std::string broken(const Observed& seen, Duration quiet_within) {
   std::string text;
   const auto say = [&text](const std::string& what) { text += (text.empty() ? "" : ", ") + what; };
@@ -160,7 +159,6 @@ inline std::string without(const std::string& what, Duration quiet_within, Run r
   return what + ": " + text;
 }
 
-/// A hand that presses on a wall: the common start of all cases, which each case modifies.
 struct Case {
   explicit Case(std::uint64_t seed) : dice(seed), into(dice.direction()), stiffness(dice.within(1000, 2500)) {
     across = into.cross(dice.direction()).normalized();
@@ -238,7 +236,6 @@ class Bench {
   }
 
   void run(Duration duration) { world.run_for(duration); }
-  /// From now on the hand must become quiet.
   void disturbance_is_over() { over_ = world.now(); }
   /// Adds a check of every step, which returns the violation or an empty string.
   void expect_of_steps(std::function<std::string(const StepRecord&)> promise) { promise_ = std::move(promise); }

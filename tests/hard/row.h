@@ -14,8 +14,8 @@ struct Row {
   std::string without;                ///< the result if the protection is disabled
 };
 
-/// Fails the running test if README.md has no line with the same `hard` and `oracle`. If $TENDON_HARD_ROWS is set,
-/// writes the row to $TENDON_HARD_ROWS/Suite.Test.json, from which `tests/hard/table` writes README.md.
+/// Fails the running test if README.md has no line with the same `hard` and `oracle`. $TENDON_HARD_ROWS: writes the row
+/// to $TENDON_HARD_ROWS/Suite.Test.json, from which `tests/hard/table` writes README.md.
 void report(const Row& row);
 
 }  // namespace tendon::hard

@@ -13,7 +13,7 @@
 #include "protocol/wire/codec.h"
 #include "protocol/wire/handshake_codec.h"
 
-// One example of each message. protocol/vectors/golden.md shows them.
+// Shown in protocol/vectors/golden.md.
 
 namespace tendon::examples {
 
@@ -32,7 +32,6 @@ inline std::string hex(std::span<const std::byte> bytes, std::string_view betwee
   return out;
 }
 
-/// Returns the 16 bytes first, first + 1, …
 inline std::array<std::byte, 16> sixteen(unsigned first) {
   std::array<std::byte, 16> out;
   for (std::size_t i = 0; i < out.size(); ++i) out[i] = static_cast<std::byte>(first + i);
@@ -65,8 +64,7 @@ inline ForceCommand force() {
           .valid_for = std::chrono::milliseconds(20)};
 }
 
-/// This is an answer with all fields. The tool is 2 mm deep in a surface with the normal −x, and the table has the
-/// forces at other depths.
+/// All fields: the tool is 2 mm deep in a surface with the normal −x, and the table has the forces at other depths.
 inline ForceCommand force_with_all() {
   ForceCommand all = force();
   all.sequence = 101;
@@ -128,7 +126,7 @@ inline DeviceState state_with_wanted() {
   return diagnosed;
 }
 
-/// Armed before, now tripped. Three of its steps were not counted.
+/// Armed before, now tripped. Three steps were not counted.
 inline DeviceReport device_report() {
   DeviceReport report{.number = 7,
                       .until = PeerTime{Duration{1'000'000'000}},
@@ -151,7 +149,7 @@ inline PeerReport peer_report() {
   return {.device = 1, .channel = 1, .name = "wall", .state_one_in = 4, .forces_refused = true, .link = report()};
 }
 
-/// The same report for an engine that reports the accuracy of its forces.
+/// The engine reports the accuracy of its forces.
 inline PeerReport peer_report_with_way() {
   PeerReport told = peer_report();
   told.error = 0.125;
@@ -175,9 +173,9 @@ inline Welcome welcome() {
           .server = "tendond"};
 }
 
-// A server with two devices, the second of which has two channels.
+// Two devices, the second of which has two channels.
 
-/// Observes the first device and claims the channel "tissue" of the second.
+/// Observes the first device and claims "tissue" of the second.
 inline Hello hello_with_claims() {
   Hello hello = examples::hello();
   hello.features.emplace_back(kFeatureChannels);
@@ -239,15 +237,13 @@ inline DeviceDescription description() {
 
 // Sent to a client with the feature "handle".
 
-/// The buttons "right" and "left" of a Falcon are pressed.
 inline DeviceState state_with_buttons() {
   DeviceState state = examples::state();
   state.buttons = 0b1001;
   return state;
 }
 
-/// This is a handle with all of its parts. It is rotated by 106° about y. It moves, and the fingers close on something
-/// soft.
+/// All parts: rotated by 106° about y, moving, and the fingers close on something soft.
 inline DeviceState state_with_handle() {
   DeviceState state = examples::state();
   state.buttons = 1;
@@ -314,7 +310,7 @@ inline SetOutput vibration() {
 
 // Sent between peers with the feature "teleoperation".
 
-/// The leader pulls its follower by 2 mm. There is no measured contact.
+/// The leader pulls by 2 mm. No measured contact.
 inline PortFrame port() {
   PortFrame port;
   port.device = 1;
@@ -356,7 +352,7 @@ inline PortFrame port_by_model() {
   return port;
 }
 
-/// The other end makes half of the motion. It is rotated by 106° about y.
+/// The motion of the other end is scaled by 1/2 and rotated by 106° about y.
 inline Couple couple() {
   return {.device = 1,
           .channel = 1,
@@ -389,8 +385,7 @@ inline PortFrame port_with_all() {
   return port;
 }
 
-/// Whole handles with an absolute map in rate control: the follower's speed is proportional to the leader's
-/// displacement.
+/// Whole handles with an absolute map in rate control.
 inline Couple couple_with_all() {
   Couple couple = examples::couple();
   couple.method = CouplingMethod::kRate;
@@ -490,7 +485,6 @@ struct Named {
   Bytes bytes;
 };
 
-/// One complete datagram of each type, and for type Data of each frame.
 inline std::vector<Named> datagrams() {
   const Control control{.id = 7, .request = SetStateRate{.hz = 500}};
   const ControlAck ack{.id = 7, .code = Code::kOk, .detail = "500 Hz"};

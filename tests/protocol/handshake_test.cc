@@ -23,7 +23,7 @@ Address address(std::uint8_t host, std::uint16_t port) {
   return a;
 }
 
-/// A is a client, and Z is the server side of its handshake.
+/// A is a client, Z the server side.
 class Handshake : public ::testing::Test {
  protected:
   static ClientHandshake::Config client_config() {
@@ -47,7 +47,6 @@ class Handshake : public ::testing::Test {
     return {answer_.begin(), answer_.begin() + static_cast<std::ptrdiff_t>(size)};
   }
 
-  /// Returns a Hello with a cookie that Z issued at `now_`.
   Bytes hello_with_cookie() {
     ClientHandshake client(client_config(), now_);
     const auto retry = knock(hello_of(client));

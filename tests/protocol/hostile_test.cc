@@ -9,7 +9,7 @@
 #include "tests/protocol/examples.h"
 #include "tests/support/property_cases.h"
 
-// Invalid bytes must never crash a receiver or yield a value out of bounds, and must always be counted.
+// Must never crash a receiver or yield a value out of bounds, and must always be counted.
 
 namespace tendon::hostile_test {
 namespace {
@@ -74,7 +74,6 @@ class Target {
   Session session_;
 };
 
-/// Passes the datagram to every parser of unauthenticated bytes.
 bool take_everywhere(const Bytes& datagram) {
   std::array<std::byte, kMaxDatagram> buffer;
   ClientHandshake client({.hello = examples::hello(), .random = examples::random()}, LocalTime{});
@@ -97,7 +96,7 @@ TEST(HostileBytes, EveryTruncationOfEveryDatagramIsCounted) {
 }
 
 TEST(HostileBytes, EveryCorruptionOfOneByteIsCounted) {
-  // The short run changes only one bit or all bits of a byte.
+  // The short run changes only one bit or all bits.
   const bool every_value = property_cases() >= 10'000;
   for (const auto& [name, bytes] : examples::datagrams()) {
     const bool padded = bytes.size() == kMaxDatagram;

@@ -12,14 +12,14 @@ using std::chrono::milliseconds;
 using std::chrono::minutes;
 using std::chrono::seconds;
 
-/// Long timeout: half an hour of 50 % loss includes two seconds without a datagram.
+/// Half an hour of 50 % loss includes two seconds without a datagram.
 Session::Config patient() {
   Session::Config config;
   config.timeout = seconds(60);
   return config;
 }
 
-/// A requests the rates 1, 2, 3 … whenever possible. Z answers each with the rate as detail.
+/// A requests the rates 1, 2, 3 … as soon as possible. Z answers with the rate as detail.
 struct Conversation {
   explicit Conversation(World& the_world) : world(the_world) {
     world.on_z = [this](const Session::Event& event) {

@@ -11,8 +11,6 @@
 namespace tendon::session_test {
 namespace {
 
-// ---- requests ----
-
 TEST_F(TwoEnds, ARequestIsDeliveredOnceHoweverOftenItComes) {
   const auto id = a_.request(SetStateRate{.hz = 250});
   ASSERT_TRUE(id.has_value());
@@ -99,7 +97,7 @@ TEST_F(TwoEnds, ASeventeenthOpenRequestIsRefused) {
   events(z_);
   z_.answer(1, Code::kOk, "");
   deliver(a_, now_, pull(z_, now_));
-  EXPECT_FALSE(a_.request(Rearm{}).has_value());  // the answer was received but not taken
+  EXPECT_FALSE(a_.request(Rearm{}).has_value());  // the answer was received but not used
   EXPECT_EQ(events(a_).size(), 1U);
   EXPECT_EQ(a_.request(Rearm{}), limits::kRequestWindow + 1);
 }

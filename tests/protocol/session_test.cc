@@ -11,8 +11,6 @@
 namespace tendon::session_test {
 namespace {
 
-// ---- state and force ----
-
 TEST_F(TwoEnds, AForceAndAStateArriveAsTheyWereSent) {
   a_.send(force(7));
   z_.send(state(8));
@@ -337,8 +335,6 @@ TEST_F(TwoEnds, ReportsOfAllDevicesAndChannelsLeaveInAsManyDatagramsAsTheyNeed) 
   EXPECT_TRUE(pull(z_, now_).empty());
 }
 
-// ---- round trip ----
-
 TEST_F(TwoEnds, TheRoundTripDoesNotCountTheTimeThatThePeerTook) {
   const auto there = pull(a_, now_);  // T1
   now_ += milliseconds(3);
@@ -361,7 +357,7 @@ TEST_F(TwoEnds, AnImpossibleEchoIsCountedAndTheRestIsRead) {
   const Duration opened = kOpened.time_since_epoch();
   const Duration written = milliseconds(1000);  // examples::data writes at 1000.1 ms of the peer's clock
   const OutgoingEcho impossible[] = {
-      echoing(opened, written, 1),                    // A has not sent this packet
+      echoing(opened, written, 1),                    // this packet has not been sent by A
       echoing(opened - Duration{1}, written, 0),      // sent before the session
       echoing(opened + Duration{1}, written, 0),      // sent in the future
       echoing(opened, written + milliseconds(1), 0),  // received after the echo was written
@@ -392,8 +388,6 @@ TEST_F(TwoEnds, EachEndLearnsWhatWasLostInWhichDirection) {
   EXPECT_EQ(a_.stats().lost, 0U);
   EXPECT_EQ(z_.stats().lost_outgoing, 0U);
 }
-
-// ---- silence and the end ----
 
 TEST_F(TwoEnds, WhoSpeaksNeedsNoKeepAlives) {
   for (int i = 0; i < 100; ++i) {
@@ -457,8 +451,6 @@ TEST_F(TwoEnds, AfterTheEndNothingIsBelieved) {
   EXPECT_EQ(z_.stats().datagrams_received, 0U);
 }
 
-// ---- what is dropped ----
-
 TEST_F(TwoEnds, AReplayedDatagramIsCountedAndNothingElse) {
   a_.request(Rearm{});
   a_.send(force(1));
@@ -470,7 +462,7 @@ TEST_F(TwoEnds, AReplayedDatagramIsCountedAndNothingElse) {
   EXPECT_EQ(z_.stats().duplicated, 5U);
   EXPECT_EQ(z_.stats().datagrams_received, 1U);
   z_.tick(now_ + seconds(2));
-  EXPECT_FALSE(z_.open());  // this must not keep the session alive
+  EXPECT_FALSE(z_.open());  // the session must not be kept alive by this
 }
 
 TEST_F(TwoEnds, ADatagramOfAnotherConversationIsMalformed) {

@@ -42,7 +42,6 @@ inline std::vector<Session::Event> events(Session& session) {
   return out;
 }
 
-/// Returns the only event, which must be an `Event`.
 template <class Event>
 Event only(Session& session) {
   const std::vector<Session::Event> all = events(session);
@@ -65,7 +64,6 @@ inline DeviceState state(std::uint64_t tick) {
   return state;
 }
 
-/// Returns a Data datagram with a hand-written body.
 inline Bytes raw(std::uint64_t packet_number, const RawProtobuf& body) {
   Bytes bytes = examples::data(packet_number, {});
   bytes.resize(kHeaderSize);

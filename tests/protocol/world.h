@@ -13,7 +13,6 @@
 
 namespace tendon {
 
-/// Impairments of one network direction, bad by default.
 struct Weather {
   Duration delay = std::chrono::milliseconds(20);
   Duration jitter = std::chrono::milliseconds(10);  ///< uniform in [0, jitter), so datagrams overtake each other
@@ -22,7 +21,6 @@ struct Weather {
 };
 inline Weather perfect(Duration delay) { return {.delay = delay, .jitter = {}, .loss = 0, .duplicate = 0}; }
 
-/// One network direction that delays, loses, duplicates and reorders datagrams, deterministically for each seed.
 class BadNetwork {
  public:
   BadNetwork(const Weather& weather, std::uint64_t seed) : weather_(weather), random_(seed) {}
@@ -52,8 +50,7 @@ class BadNetwork {
   std::multimap<LocalTime, std::vector<std::byte>> in_flight_;
 };
 
-/// Two sessions, A (the client) and Z (the server), on a network in virtual time, which jumps to the next due event. Z
-/// has a different clock.
+/// A is the client, Z the server, which has a different clock. Virtual time jumps to the next due event.
 class World {
  public:
   /// Z's clock minus A's. Nothing may depend on it.
@@ -63,7 +60,6 @@ class World {
       : World(weather, weather, seed, config) {}
   World(const Weather& there, const Weather& back, std::uint64_t seed, const Session::Config& config)
       : a(config, at_a()), z(config, at_z()), a_to_z(there, 2 * seed), z_to_a(back, 2 * seed + 1) {}
-  /// Suite 1, with the keys of A.
   World(const Weather& there, const Weather& back, std::uint64_t seed, const Session::Config& config,
         const SessionKeys& keys)
       : a(config, keys, at_a()),
@@ -71,7 +67,7 @@ class World {
         a_to_z(there, 2 * seed),
         z_to_a(back, 2 * seed + 1) {}
 
-  /// Runs all due turns until `end`. Calls `each_turn` before sending.
+  /// Calls `each_turn` before sending.
   void run(
       Duration length, const std::function<void()>& each_turn = [] {}) {
     const LocalTime end = now + length;

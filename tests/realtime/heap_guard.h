@@ -5,11 +5,9 @@
 
 namespace tendon {
 
-/// Counts the heap calls of the calling thread during its lifetime: malloc, calloc, realloc, free, aligned_alloc,
-/// posix_memalign, memalign, and everything that calls them (new, delete, std::string). Used to show that the haptic
-/// thread makes none.
-///
-/// Interposes glibc's malloc in this executable. Link heap_guard.cc to use it, but not in sanitizer builds.
+/// Counts heap calls of the calling thread: malloc, calloc, realloc, free, aligned_alloc, posix_memalign, memalign, and
+/// what calls them (new, delete, std::string). Link heap_guard.cc, which interposes glibc's malloc in this executable,
+/// but not in sanitizer builds.
 class HeapGuard {
  public:
   HeapGuard();

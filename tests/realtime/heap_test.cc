@@ -46,8 +46,8 @@ TEST(HeapGuard, SeesAlignedHeapCalls) {
   EXPECT_EQ(posix_memalign(&block, 3, 100), EINVAL);
 }
 
-// The complete haptic thread: device, velocity estimator, controller with all limiters active, mailboxes, faults and
-// rearms, with the recording ring full and not full.
+// Device, velocity estimator, controller with all limiters active, mailboxes, faults and rearms, with the recording
+// ring full and not full.
 TEST(HapticLoop, AMillionStepsMakeNoHeapCall) {
   SimulatedDevice::Config hand = find_device_profile("falcon")->device();
   hand.hand =

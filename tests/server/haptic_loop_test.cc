@@ -30,7 +30,6 @@ class Handle final : public Device {
   DeviceInfo info_{.name = "handle", .max_force = 8};
 };
 
-/// A loop around any device with an engine that always pushes.
 struct Pushed {
   explicit Pushed(Device& device) : loop(config(), device, *mail) {}
 
@@ -113,7 +112,6 @@ TEST(HapticLoop, TheButtonsAreInTheRecordAndTheStateOfTheirStep) {
   EXPECT_EQ(pushed.steps(1).buttons, 0U);
 }
 
-/// A device with a circling hand, with or without joints.
 SimulatedDevice::Config circling(bool jointed) {
   SimulatedDevice::Config config;
   config.mass = 0.1;
@@ -199,7 +197,6 @@ TEST(HapticLoop, ASafetyFaultFreezesTheFlightRecorderAtItsStep) {
   EXPECT_EQ(world.mail->flight[399].applied, Vec3(-2, 0, 0));
   EXPECT_EQ(world.mail->flight[400].applied, Vec3(0, 0, 0));
 
-  // Recording resumes after the flight was written.
   world.mail->flight.thaw();
   world.steps(5);
   EXPECT_FALSE(world.mail->flight.frozen());
@@ -264,8 +261,7 @@ TEST(HapticLoop, OfTwoOrdersTheLaterOneCounts) {
   EXPECT_EQ(world.steps(400).applied, Vec3(-2, 0, 0));
 }
 
-/// Returns the applied force of a loop whose engine (number 7) pushes with 2 N and sends its last force and its release
-/// in one period.
+/// The engine (number 7) pushes with 2 N and sends its last force and its release in one period.
 Vec3 applied_after_release(bool again) {
   Handle handle;
   Pushed pushed(handle);

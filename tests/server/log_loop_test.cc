@@ -24,7 +24,6 @@ class LogLoopTest : public Servers {
     for (const auto& notice : log().take_notices()) all.push_back(notice.text);
     return all;
   }
-  /// Starts a server that records in `folder`.
   void record(const testing::ScratchFolder& folder) {
     Scene scene = device_named("left");
     scene.recording = Scene::Recording{.path = folder.path() / "run.mcap"};

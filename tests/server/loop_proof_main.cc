@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// Haptic steps whose instructions loop_proof_test.cc counts: a point, a handle that rotates and grips, and a point that
-// reports its joints. Prints one line each. Callgrind counts within `step_in_turn` and writes a file at each return.
+// For loop_proof_test.cc, with one line each. Callgrind counts within `step_in_turn` and writes a file at each return.
 #include <iostream>
 #include <memory>
 #include <string_view>
@@ -42,7 +40,7 @@ class Handle final : public Device {
     }
     return sample;
   }
-  /// As in the Falcon driver, which computes the pose in `read`.
+  /// The Falcon driver computes the pose in `read`.
   Joints joints(const Motion& hand) const noexcept override {
     return Joints::three(pose_->angles, pose_->jacobian * hand.velocity);
   }
@@ -90,7 +88,7 @@ RemoteForce answer(std::uint64_t sequence, LocalTime now, bool whole) {
 
 }  // namespace
 
-/// Callgrind finds this function by its name, so it must be neither inlined nor mangled.
+/// Neither inlined nor mangled, for callgrind.
 extern "C" [[gnu::noinline]] void step_in_turn(HapticLoop& loop, Mailboxes& mail, bool whole, LocalTime& now,
                                                std::uint64_t steps) {
   for (std::uint64_t i = 0; i < steps; ++i) {

@@ -9,7 +9,7 @@
 
 namespace tendon::testing {
 
-/// A new folder, deleted with its contents at the end of the test.
+/// The folder is deleted at the end of the test.
 class ScratchFolder {
  public:
   ScratchFolder() {

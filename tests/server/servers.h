@@ -23,7 +23,7 @@ inline Scene device_named(const std::string& name, const std::string& more = "")
   return parse_scene(head + name + "\"\n" + more, "s.toml", {});
 }
 
-/// A server in virtual time, whose loops the test calls.
+/// Runs a server in virtual time. The test calls the loops.
 class Servers : public ::testing::Test {
  protected:
   /// Starts a server with these devices and a network loop for each of `networks` links.
@@ -52,7 +52,7 @@ class Servers : public ::testing::Test {
   const Address server_ = parse_address("127.0.0.1:47100");
   std::optional<HandleDescription> handle_;  ///< of the last device
   Wire wire_;
-  std::deque<End> ends_;  ///< of the server, one for each network loop
+  std::deque<End> ends_;  ///< the server has one for each network loop
   std::deque<SimulatedDevice> devices_;
   std::optional<Assembly> assembly_;
 };

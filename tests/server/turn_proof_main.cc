@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// Code whose cost turn_proof_test.cc counts: a state from its mailbox to an engine and the force back to its mailbox,
-// through the network loop of the server and a client. Both busy-poll, unencrypted and without sockets. Prints one
-// line: clock readings, link polls and datagrams of the longer run. Callgrind counts within `exchange_in_turn` and
-// writes a file at each return.
+// For turn_proof_test.cc: a state from its mailbox to an engine and the force back, through the network loop of the
+// server and a client, busy-polling, unencrypted and without sockets. Prints clock readings, link polls and datagrams
+// of the longer run. Callgrind counts within `exchange_in_turn` and writes a file at each return.
 #include <algorithm>
 #include <array>
 #include <cstdlib>
@@ -19,7 +17,6 @@ using namespace tendon;
 
 namespace {
 
-/// A clock that advances at each reading and counts the readings.
 struct Clock {
   LocalTime now{std::chrono::seconds(1)};
   std::uint64_t readings = 0;
@@ -70,7 +67,6 @@ class MemoryLink final : public Link {
   Address peer_;
 };
 
-/// Alternates the network threads of the server and the client.
 class Pair {
  public:
   Pair() {
@@ -93,7 +89,7 @@ class Pair {
     state.force_age = std::chrono::milliseconds(7);
     state.mode = Mode::kActive;
     mail_->state.put();
-    // Each end polls once without a result, and then it finds a datagram.
+    // The first poll of each end has no result. The second poll finds a datagram.
     LocalTime at_client = clock_.now;
     LocalTime at_server = clock_.now;
     client_busy_.look(at_client);
@@ -109,7 +105,7 @@ class Pair {
   std::uint64_t readings() const noexcept { return clock_.readings; }
   std::uint64_t looks() const noexcept { return server_link_.looks + client_link_.looks; }
   std::uint64_t sent() const noexcept { return server_link_.sent + client_link_.sent; }
-  std::uint64_t forces = 0;  ///< forces that answered the state of their turn
+  std::uint64_t forces = 0;  ///< number of forces that answered the state of the turn
 
  private:
   static NetworkLoop::Config server_config(Mailboxes& mail) {
@@ -145,7 +141,7 @@ class Pair {
 
 }  // namespace
 
-/// Callgrind finds this function by its name, so it must be neither inlined nor mangled.
+/// Neither inlined nor mangled, for callgrind.
 extern "C" [[gnu::noinline]] void exchange_in_turn(Pair& pair, std::uint64_t times) {
   for (std::uint64_t i = 0; i < times; ++i) pair.exchange();
 }

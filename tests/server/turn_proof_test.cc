@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// Cost of the loops from a state in its mailbox to the force in the other one, without system calls: callgrind
-// instructions, clock readings, and link polls, each of which would be a system call.
+// From a state in its mailbox to the force in the other one: callgrind instructions, clock readings, and link polls,
+// each of which would be a system call.
 #include <gtest/gtest.h>
 
 #include <cstdint>

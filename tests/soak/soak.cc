@@ -62,12 +62,12 @@ std::vector<std::string> operator+(std::vector<std::string> words, const std::ve
 
 constexpr int kVisitors = 8;
 constexpr VitalSigns kGrowth{.resident = std::size_t{1} << 20};
-/// The proxy keeps a socket and statistics for each recent engine, so their number varies.
+/// A socket and statistics for each recent engine, so their number varies.
 constexpr VitalSigns kProxyGrowth{.resident = std::size_t{4} << 20, .files = 8};
 /// The index of a recording is held in memory until the end: four chunks per second, about 200 bytes each.
 constexpr std::size_t kIndexBytesPerSecond = 1024;
 
-/// A program whose output goes to the file `log`. It is a failure if it ends before stop().
+/// A program whose output goes to the file `log`. It must not exit before stop().
 class Program {
  public:
   Program(const std::string& name, const std::vector<std::string>& arguments, const std::filesystem::path& folder,
@@ -96,7 +96,6 @@ class Program {
     }
     throw std::runtime_error(name_ + " did not say " + text + "; see " + log_.string());
   }
-  /// As line(), without waiting.
   std::optional<std::string> said(const std::string& text) const {
     std::ifstream file(log_);
     for (std::string line; std::getline(file, line);) {
@@ -111,7 +110,7 @@ class Program {
   std::unique_ptr<e2e::Process> process_;
 };
 
-/// A small tmpfs, which a recording fills quickly. Empty without the right to mount.
+/// A small tmpfs. Empty without the right to mount.
 class SmallDisk {
  public:
   explicit SmallDisk(std::filesystem::path path) : path_(std::move(path)) {
@@ -203,7 +202,7 @@ class Run {
     const LocalTime start = clock::now();
     const LocalTime end = start + config_.duration;
     const Address server = parse_address(address(*server_));
-    // The visitors finish a little early, so that the last sample shows an idle server.
+    // A little early, so that the last sample shows an idle server.
     Reconnecting visitors(server, config_.reconnects, config_.duration * 9 / 10, kVisitors);
     Watching watcher(server);
     LocalTime next_look = start;
@@ -247,7 +246,6 @@ class Run {
   Program* watch(const std::string& name, std::unique_ptr<Program> program, const VitalSigns& growth) {
     return watched_.emplace_back(name, std::move(program), growth).program.get();
   }
-  /// Starts a server in its own folder with a manipulated wall clock.
   Program* tendond(const std::string& name, const std::vector<std::string>& more, const VitalSigns& growth) {
     const std::filesystem::path folder = config_.folder / name;
     std::filesystem::create_directories(folder);
@@ -322,8 +320,7 @@ class Run {
                                     .threads = watched.looks.back().threads});
       }
       const int code = watched.program->stop();
-      // Exit code 1 is allowed: under this load the proxy misses release times, and the full disk loses data. Both
-      // programs report it.
+      // Exit code 1 is allowed: under this load the proxy misses release times, and the full disk loses data.
       const bool may_miss = watched.program.get() == proxy_ || watched.program.get() == full_;
       if (code != 0 && !(code == 1 && may_miss)) {
         broken(watched.name + ": exit code " + std::to_string(code));
@@ -347,7 +344,7 @@ class Run {
   std::string scene_;
   std::string clock_file_;
   std::vector<Watched> watched_;
-  Program* server_ = nullptr;  ///< owned by `watched_`, as the next ones
+  Program* server_ = nullptr;  ///< owned by `watched_`, like the next pointers
   Program* proxy_ = nullptr;
   Program* full_ = nullptr;  ///< null if no disk could be mounted
   std::unique_ptr<Program> engine_;

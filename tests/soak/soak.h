@@ -45,12 +45,12 @@ struct Report {
   std::vector<std::string> broken;
   double duration_s = 0;
   std::uint64_t steps = 0;
-  std::uint64_t overruns = 0;  ///< intervals of more than two periods
+  std::uint64_t overruns = 0;  ///< number of intervals that exceed two periods
   double longest_interval_ms = 0;
   std::uint64_t engines_killed = 0;
   std::uint64_t forces = 0;
   std::uint64_t sessions = 0;
-  std::uint64_t vain = 0;  ///< visitors that received no state within 10 s
+  std::uint64_t vain = 0;  ///< number of visitors without a state after 10 s
   std::uint64_t states_watched = 0;
   double longest_silence_ms = 0;  ///< longest interval between two states at the watcher
   std::uint64_t clock_steps = 0;
@@ -60,11 +60,11 @@ struct Report {
   std::vector<ProgramReport> programs;
 };
 
-/// `progress` is called with the elapsed share of the run, in [0, 1]. Throws std::runtime_error if a program does not
-/// start or if the folder is not empty.
+/// `progress`: elapsed share of the run, in [0, 1]. Throws std::runtime_error if a program does not start or if the
+/// folder is not empty.
 Report run(const Config& config, const std::function<void(double)>& progress);
 
-/// Returns {"event":"soak", …} with all fields of the report.
+/// {"event":"soak", …} with all fields of the report.
 std::string to_json(const Config& config, const Report& report);
 std::string to_text(const Report& report);
 

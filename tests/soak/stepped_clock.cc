@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// For LD_PRELOAD: offsets a program's wall clock by the number of nanoseconds (text) in the file that
-// TENDON_CLOCK_STEP names. Setting the machine's own clock would affect every program on it.
+// LD_PRELOAD: offsets a program's wall clock by the nanoseconds (text) in the file that TENDON_CLOCK_STEP names.
 #include <fcntl.h>
 #include <sys/syscall.h>
 #include <unistd.h>

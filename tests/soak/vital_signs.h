@@ -20,12 +20,11 @@ struct VitalSigns {
 /// Returns nullopt if the process does not exist.
 std::optional<VitalSigns> vital_signs(pid_t process);
 
-/// Checks that a process does not grow. The first fifth of the samples is warm-up; flat means
+/// The first fifth of the samples is warm-up; flat means
 ///
 ///     max(last two fifths) ≤ max(second and third fifth) + `growth`
 ///
-/// Returns a sentence that names the first value that grows. Returns nullopt if none does or if there are fewer than
-/// ten samples.
+/// Returns a sentence about the first value that grows. nullopt if none does or with fewer than ten samples.
 std::optional<std::string> not_flat(const std::string& name, const std::vector<VitalSigns>& looks,
                                     const VitalSigns& growth);
 

@@ -6,8 +6,7 @@
 
 namespace tendon {
 
-/// A random valid answer (core/remote/answer.h) of an engine whose tool is at `position`: of a wall at x = 0 or without
-/// a surface.
+/// Valid (core/remote/answer.h), with the tool at `position`: of a wall at x = 0 or without a surface.
 inline Contact any_contact(Dice& dice, const Vec3& position) {
   Contact contact{.normal = -Vec3::UnitX(), .gap = -position.x()};
   if (dice.chance(0.3)) contact = {.normal = dice.direction(), .gap = dice.within(-0.01, 0.01)};

@@ -14,13 +14,12 @@ namespace tendon::testing {
 
 struct Counted {
   std::string line;
-  double instructions = 0;  ///< the difference between a longer and a shorter run
+  double instructions = 0;  ///< difference between the longer run and the shorter run
 };
 
-/// Runs `program argument` under callgrind. For every line that it prints, the program calls its extern "C" function
-/// `function` twice, first for the shorter run. Only instructions within that function are counted.
-///
-/// Throws std::runtime_error if the program fails or valgrind is missing.
+/// For every line that it prints, `program` calls its extern "C" `function` twice, first for the shorter run. Only
+/// instructions within that function are counted. Throws std::runtime_error if the program fails or valgrind is
+/// missing.
 inline std::vector<Counted> count_instructions(const std::string& program, const std::string& argument,
                                                const std::string& function) {
   const ScratchFolder folder;

@@ -14,10 +14,8 @@
 
 namespace tendon::testing {
 
-/// A D-Bus system bus with a fake avahi-daemon, in a thread of the test, on its own socket. Implements the calls that
-/// Tendon makes, with answers chosen by the test.
-///
-/// Thread-safe: yes.
+/// A D-Bus system bus with a fake avahi-daemon, in its own thread and on its own socket. The test chooses the answers
+/// to Tendon's calls. Thread-safe: yes.
 class FakeAvahi {
  public:
   struct Service {
@@ -45,12 +43,10 @@ class FakeAvahi {
 
   void put(const std::string& name, const Service& service);
   void take(const std::string& name);
-  /// Reserves a name for another host.
   void occupy(const std::string& name);
   /// While `absent`, avahi-daemon is not running: every call fails with ServiceUnknown.
   void set_absent(bool absent);
   void set_silent(bool silent) { silent_ = silent; }
-  /// Simulates a restart of avahi-daemon.
   void come_back();
 
   std::vector<Announced> announced();

@@ -7,9 +7,9 @@
 
 namespace tendon {
 
-/// Checks that `file` can be written. Throws std::runtime_error with the name of the file if the folder does not exist,
-/// or if the file exists but was not written by this tool: it is not a regular file, or it is not empty and does not
-/// start with one of the `beginnings`. Always allows /dev/null and /dev/stdout.
+/// Throws std::runtime_error with the name of the file if the folder does not exist, or if the file is not one of this
+/// tool: not a regular file, or neither empty nor beginning with one of the `beginnings`. Always allows /dev/null and
+/// /dev/stdout.
 void expect_replaceable(const std::filesystem::path& file, std::initializer_list<std::string_view> beginnings);
 
 }  // namespace tendon

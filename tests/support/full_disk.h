@@ -7,7 +7,7 @@
 
 namespace tendon::testing {
 
-/// A full disk: limits every file of this process to `bytes`.
+/// Limits every file of this process to `bytes`.
 class FullDisk {
  public:
   explicit FullDisk(rlim_t bytes) : handler_(std::signal(SIGXFSZ, SIG_IGN)) {

@@ -7,7 +7,7 @@
 
 namespace tendon::testing {
 
-/// For tests that count instructions (callgrind.h). Skips them if valgrind is missing.
+/// Skips tests with callgrind.h if valgrind is missing.
 class InstructionTest : public ::testing::Test {
  protected:
   void SetUp() override {

@@ -12,8 +12,8 @@
 
 namespace tendon {
 
-/// A JSON object on one line, with members in the order of their addition. Non-finite numbers become null; invalid
-/// UTF-8 becomes U+FFFD. All tools write JSON with this class, which includes nlohmann's header in json_line.cc only.
+/// One line, with members in the order of their addition. Non-finite numbers become null; invalid UTF-8 becomes U+FFFD.
+/// Only json_line.cc includes nlohmann's header.
 class JsonLine {
  public:
   JsonLine();
@@ -52,7 +52,6 @@ class JsonLine {
   std::unique_ptr<nlohmann::ordered_json> members_;
 };
 
-/// Rounds `value` to `decimals` decimals for JsonLine.
 double with_decimals(double value, int decimals);
 
 }  // namespace tendon

@@ -10,8 +10,7 @@
 
 namespace tendon {
 
-/// Adds `--units` and `--from` to a program or verb with SweptWork. `units` describes the available units in the help,
-/// for example "0 to 17: the rows of the table".
+/// `--units` and `--from` for SweptWork. `units`: for the help, for example "0 to 17: the rows of the table".
 inline void add_part_options(CLI::App& verb, Part& part, const std::string& units) {
   part.progress = isatty(STDERR_FILENO) != 0;
   CLI::Option* const these =

@@ -16,8 +16,7 @@ struct PlainUsage {
   std::vector<std::string_view> options{};
 };
 
-/// Handles --help and --version, and rejects unknown options and extra arguments. Returns the exit code, or nullopt if the
-/// program should run.
+/// Handles --help and --version, and rejects unknown options and extra arguments. nullopt: run the program.
 inline std::optional<int> answer(const PlainUsage& usage, int argc, char** argv) {
   std::size_t arguments = 0;
   for (int i = 1; i < argc; ++i) {

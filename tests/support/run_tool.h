@@ -12,10 +12,8 @@
 
 namespace tendon {
 
-/// Parses the command line and calls `body`, which returns the exit code.
-///
-/// Errors are printed to stderr as a single line with the name of the tool. Exit codes: 0 success; 1 failure, for
-/// example a file that cannot be read; 2 for wrong usage, including invalid values and scenes.
+/// Calls `body`, which returns the exit code. Errors are one line on stderr with the name of the tool. Exit codes: 0
+/// success; 1 failure, for example a file that cannot be read; 2 for wrong usage, including invalid values and scenes.
 template <class Body>
 int run_tool(CLI::App& app, int argc, char** argv, const Body& body) {
   constexpr int kFailed = 1;

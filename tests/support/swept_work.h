@@ -23,15 +23,14 @@
 
 namespace tendon {
 
-/// The part of the work that is done by this process. If neither `units` nor `from` is set, the process runs all units.
-/// The options are defined in part_options.h.
+/// Of this process: all units if neither `units` nor `from` is set (part_options.h).
 struct Part {
   std::optional<Units> units{};                 ///< the units of this shard
   std::optional<std::filesystem::path> from{};  ///< the file with the results of the shards
   bool progress = false;
 };
 
-/// Work that can be swept. A program defines a unit and how its outcome is written and read; outcomes() does the rest.
+/// A program defines a unit and how its outcome is written and read; outcomes() does the rest.
 template <class Outcome>
 struct SweptWork {
   std::string_view what;    ///< plural name of the units, for example "situations"
@@ -39,12 +38,12 @@ struct SweptWork {
   std::function<Outcome(std::uint64_t unit)> run{};
   /// One or more lines without the unit's number. They must contain everything that the evaluation needs.
   std::function<std::vector<JsonLine>(std::uint64_t unit, const Outcome& outcome)> lines{};
-  /// Parses the result of lines(). May throw any exception for other input.
+  /// May throw any exception for input that is not from lines().
   std::function<Outcome(std::uint64_t unit, const std::vector<nlohmann::json>& lines)> read{};
   std::function<void(const Outcome& outcome, ShardEnd& end)> count{};
 };
 
-/// A number of a line; NaN where JsonLine wrote null.
+/// NaN where JsonLine wrote null.
 inline double number_of(const nlohmann::json& line, const std::string& key) {
   const nlohmann::json& value = line.at(key);
   return value.is_null() ? std::numeric_limits<double>::quiet_NaN() : value.get<double>();
@@ -61,7 +60,7 @@ std::string text_of(const SweptWork<Outcome>& work, std::uint64_t unit, const Ou
   return text;
 }
 
-/// Throws std::invalid_argument if the lines differ from the output of lines() for the parsed outcome.
+/// Throws std::invalid_argument if the lines are not those of the parsed outcome.
 template <class Outcome>
 Outcome outcome_of(const SweptWork<Outcome>& work, std::uint64_t unit, const std::string& text) {
   const std::string name = "unit " + std::to_string(unit) + " of the " + std::string(work.what) + ": ";
@@ -82,10 +81,9 @@ Outcome outcome_of(const SweptWork<Outcome>& work, std::uint64_t unit, const std
 
 }  // namespace swept
 
-/// Returns all outcomes in the order of their units, computed by this process or parsed from the lines of a sweep.
-/// Returns nullopt for a shard, whose lines are then on `out`. Calls `each` with each outcome as it becomes available.
-/// Throws std::invalid_argument if the units do not exist or a line is not the output of this program with these
-/// arguments. Passes exceptions of the work on.
+/// Returns all outcomes in the order of the units, computed here or read from the lines of a sweep; nullopt for a
+/// shard, whose lines are then on `out`. Calls `each` as each outcome becomes available. Throws std::invalid_argument
+/// if the units do not exist or a line is not of this program with these arguments. Passes exceptions of the work on.
 template <class Outcome>
 std::optional<std::vector<Outcome>> outcomes(const SweptWork<Outcome>& work, const Part& part, std::ostream& out,
                                              const std::function<void(const Outcome& outcome)>& each = {}) {

@@ -55,7 +55,6 @@ void join(std::vector<std::pair<std::string, Value>>& sums, const std::vector<st
   }
 }
 
-/// Returns the figure with this name, initialized with `first` if it is new.
 template <class Value>
 Value& named(std::vector<std::pair<std::string, Value>>& figures, std::string_view name, Value first) {
   const auto found = std::ranges::find(figures, name, &std::pair<std::string, Value>::first);

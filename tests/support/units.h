@@ -16,11 +16,9 @@
 namespace tendon {
 
 // Work that `tendon-sweep` can split into shards. The program numbers its work in units (a seed, a situation with all
-// laws) and accepts `--units FIRST:COUNT --json`. It runs all of them, because a broken promise is a result. It prints
-// lines {"unit":17,…} in the order of the units and one end line. The output must depend only on the units and the
-// program, not on time, host, number of threads or order.
-//
-// swept_work.h implements this for work with lines for every unit.
+// laws) and accepts `--units FIRST:COUNT --json`. It runs all of them, because a broken promise is a result, and prints
+// lines {"unit":17,…} in their order and one end line. The output must depend only on the units and the program, not on
+// time, host, number of threads or order. swept_work.h implements this.
 
 struct Units {
   std::uint64_t first = 0;
@@ -29,8 +27,8 @@ struct Units {
   bool operator==(const Units&) const = default;
 };
 
-/// Parses "FIRST:COUNT". Throws std::invalid_argument with the expected format unless COUNT ≥ 1 and the last unit fits
-/// into 64 bits.
+/// "FIRST:COUNT". Throws std::invalid_argument with the expected format unless COUNT ≥ 1 and the last unit fits into 64
+/// bits.
 Units parse_units(std::string_view text);
 
 /// The sum modulo 2¹²⁸ of XXH3's 128-bit hash of each unit's whole outcome, with the unit's number as the seed. It does
@@ -42,13 +40,12 @@ class UnitDigest {
   void add(const UnitDigest& other) noexcept;
   /// 32 hexadecimal digits: the sum.
   std::string text() const;
-  /// 16 hexadecimal digits.
   std::string moment() const;
-  /// Parses the output of text() and moment(). Throws std::invalid_argument if the input is malformed.
+  /// Throws std::invalid_argument if the input is malformed.
   static UnitDigest parse(std::string_view text, std::string_view moment);
 
-  /// Returns the unit in which two digests of the same units differ. Returns nullopt if they are equal or several units
-  /// differ. A wrong answer has a probability of `units.count`/2⁶⁴.
+  /// Returns the unit if two digests of the same units differ in one unit, and nullopt otherwise. The probability that
+  /// the result is wrong is `units.count`/2⁶⁴.
   std::optional<std::uint64_t> differs_at(const UnitDigest& other, const Units& units) const noexcept;
 
   bool operator==(const UnitDigest&) const = default;
@@ -59,8 +56,7 @@ class UnitDigest {
   std::uint64_t moment_ = 0;
 };
 
-/// The end of a shard or of merged shards, with integer totals and extremes. It has no floating-point sums, because
-/// their last bit would depend on the partition.
+/// All totals and extremes are integers, because the last bit of floating-point sums would depend on the partition.
 ///
 ///     {"kind":"end","first":1,"count":500,"totals":{…},"least":{…},"largest":{…},"digest":"…","moment":"…"}
 struct ShardEnd {
@@ -70,15 +66,15 @@ struct ShardEnd {
   std::vector<std::pair<std::string, double>> largest{};
   UnitDigest digest{};
 
-  /// Adds one unit's contribution to a figure. All units of a program must use the same names and finite numbers.
+  /// All units of a program must use the same names and finite numbers.
   void count(std::string_view name, std::uint64_t number);
   void lower(std::string_view name, double value);
   void raise(std::string_view name, double value);
 
-  /// Appends the next shard. Throws std::invalid_argument if it is not contiguous or has different names.
+  /// Throws std::invalid_argument if the shard is not contiguous or has different names.
   void add(const ShardEnd& next);
   std::string line() const;
-  /// Parses the output of line(). Throws std::invalid_argument if the input is malformed.
+  /// Throws std::invalid_argument if the input is malformed.
   static ShardEnd parse(std::string_view line);
 
   /// Throws std::invalid_argument for an unknown name.
@@ -86,22 +82,21 @@ struct ShardEnd {
   double least_of(std::string_view name) const;
 };
 
-/// Returns the unit of a line that begins with {"unit":17,…}, or nullopt for other lines.
+/// nullopt for lines other than {"unit":17,…}.
 std::optional<std::uint64_t> unit_of(std::string_view line);
 
-/// Runs `units` out of the units 0 to `all` − 1 and prints their lines and the end line. `run` returns a unit's lines,
-/// each with '\n', and counts it; the digest covers these lines. Throws std::invalid_argument if the units do not
-/// exist, and std::runtime_error if `out` fails.
+/// Runs `units` out of the units 0 to `all` − 1. `run` returns a unit's lines, each with '\n', and counts it; the
+/// digest covers these lines. Throws std::invalid_argument if the units do not exist, and std::runtime_error if `out`
+/// fails.
 void write_shard(const Units& units, std::uint64_t all,
                  const std::function<std::string(std::uint64_t unit, ShardEnd& end)>& run, std::ostream& out);
 
-/// Reads the lines of a shard or of merged shards and calls `take` for all but the end line. Throws
-/// std::invalid_argument that names the line if `take` throws, or if the end line is missing or not the last.
+/// Calls `take` for all but the end line. Throws std::invalid_argument that names the line if `take` throws, or if the
+/// end line is missing or not the last.
 ShardEnd read_to_end(std::istream& lines, const std::function<void(const std::string& line)>& take);
 
-/// Returns the lines of each of the units 0 to `all` − 1, as printed by write_shard in one shard or in merged shards.
-/// Throws std::invalid_argument that names the line or unit unless each is present once and the digest of the end line
-/// matches.
+/// The lines of each of the units 0 to `all` − 1, of one shard or of merged shards. Throws std::invalid_argument that
+/// names the line or unit unless each is present once and the digest of the end line matches.
 std::vector<std::string> read_shards(std::istream& lines, std::uint64_t all);
 
 }  // namespace tendon

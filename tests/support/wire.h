@@ -13,7 +13,6 @@
 namespace tendon {
 
 using Bytes = std::vector<std::byte>;
-/// Returns the bytes `first`, `first` + 1 …
 inline Bytes bytes(std::size_t size, int first) {
   Bytes result(size);
   for (std::size_t i = 0; i < size; ++i) result[i] = static_cast<std::byte>(first + static_cast<int>(i));
@@ -26,7 +25,6 @@ struct Datagram {
   Bytes bytes;
 };
 
-/// All datagrams in flight, oldest first. Tests can read, change and insert datagrams, and deliver them to an inbox.
 using Wire = std::deque<Datagram>;
 
 class End : public Link {

@@ -70,7 +70,6 @@ TEST(Bridged, AForceIsOnTheWireInTheTurnInWhichItWasAskedFor) {
   world.run(200, [&] { bridged.ask(kOld, world.now, world.now + milliseconds(50), pushes_by(0)); });
   double wanted = 0;
   world.run(100, [&] {
-    // The next step of the device uses the force requested at the end of the previous millisecond.
     EXPECT_NEAR(world.step.wanted.y(), wanted, 1e-9);
     wanted += 1e-3;
     bridged.ask(kOld, world.now, world.now + milliseconds(50), pushes_by(wanted));

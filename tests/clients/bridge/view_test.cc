@@ -19,7 +19,6 @@
 namespace tendon::bridge::view_test {
 namespace {
 
-/// Returns the 24 rotations that map axes to axes.
 std::vector<Quat> axis_aligned_rotations() {
   std::vector<Quat> all;
   std::array<Eigen::Index, 3> order = {0, 1, 2};
@@ -109,7 +108,6 @@ TEST(View, ThePageForNewcomersTellsTheFramesAsTheyAre) {
 }
 
 TEST(View, TurnsTheStylusAboutTheProgramsOwnAxis) {
-  // A quarter turn to the left about the vertical axis, which is z in ROS and y in VRPN.
   const Quat left = rotation_by(Vec3(0, std::numbers::pi / 2, 0));
   EXPECT_TRUE((View(*find_frame("ros"), {}).orientation(left) * Vec3::UnitX()).isApprox(Vec3::UnitY(), 1e-12))
       << "ahead has become left";

@@ -29,7 +29,7 @@ class World {
   World(const World&) = delete;
   World& operator=(const World&) = delete;
 
-  /// Each BridgedDevice opens two sessions, so it is two more clients of the server.
+  /// Each BridgedDevice has two sessions, as two clients of the server.
   BridgedDevice& add_bridged(BridgedDevice::Config config = {}) {
     config.new_seed = [this] {
       Seed seed;
@@ -46,7 +46,7 @@ class World {
     return *guest.bridged;
   }
 
-  /// Runs for this time. Calls `each` once per millisecond, after the turns of the bridged devices.
+  /// Calls `each` once per millisecond, after the turns of the bridged devices.
   void run(int milliseconds, const std::function<void()>& each = nullptr) {
     for (int i = 0; i < milliseconds; ++i) {
       now += std::chrono::milliseconds(1);
@@ -88,7 +88,7 @@ class World {
   StepRecord step;
   /// J, minimum of the energy ledger; negative if the device generates energy
   double least_energy = 0;
-  HandleDescription handle;  ///< used by the server from its next start on
+  HandleDescription handle;  ///< used when the server is restarted
 
  private:
   struct Guest {

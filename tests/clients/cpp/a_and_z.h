@@ -17,15 +17,15 @@
 #include "protocol/link.h"
 #include "protocol/session.h"
 
-// A client (A), a server (Z) and a network between them on virtual time. A is the ForceClient under test. Z is
-// assembled from the parts of the protocol. The network loses and delays datagrams according to a seed.
+// A ForceClient (A), a server of the protocol's parts (Z) and a network between them on virtual time. The network loses
+// and delays datagrams according to a seed.
 
 namespace tendon::a_and_z {
 
 inline const Address a_address = parse_address("127.0.0.2:50000");
 inline const Address z_address = parse_address("127.0.0.1:47100");
 
-/// Loss, delay and jitter of the network; the jitter reorders datagrams. The delay must be above zero.
+/// The jitter reorders datagrams. The delay must be above zero.
 struct Weather {
   double loss = 0.05;
   Duration delay = std::chrono::milliseconds(5);
@@ -42,7 +42,7 @@ class Network {
 
   void set(Weather weather) { weather_ = weather; }
   void send(LocalTime now, const Address& from, const Address& to, std::span<const std::byte> bytes);
-  /// Returns the size of the next datagram for `to` that is due at `now`, or 0.
+  /// The size of the next datagram for `to` that is due at `now`, or 0.
   std::size_t receive(LocalTime now, const Address& to, Address& from, std::span<std::byte> buffer);
   /// Drops the datagrams that have arrived while no socket was open.
   void drop_arrived(LocalTime now);
@@ -80,7 +80,7 @@ class Port : public Link {
   Address self_;
 };
 
-/// Z serves one client at a time, the newest. The simulated hand moves along a known path.
+/// Serves one client at a time, the newest. The simulated hand moves along a known path.
 class Server {
  public:
   Server(Link& link, std::uint8_t secret) : link_(link), handshake_(handshake_config(secret)) {}
@@ -97,10 +97,10 @@ class Server {
   std::optional<Turning> turning;
   std::uint64_t press_every = 0;  ///< button 1 is pressed in one of this many states; 0: never
 
-  std::vector<Code> lease_answers;  ///< answers to take_lease in order, then kOk
+  std::vector<Code> lease_answers;  ///< the answers to take_lease, followed by kOk
   int snatches = 0;                 ///< leases that another client takes as soon as they are granted
 
-  std::vector<LocalTime> attempts;  ///< one entry for each Hello with a valid cookie
+  std::vector<LocalTime> attempts;  ///< contains an entry for each Hello with a valid cookie
   std::vector<Hello> hellos;
   std::vector<std::pair<LocalTime, ForceCommand>> forces;
   std::vector<Request> requests;  ///< requests except those for descriptions
@@ -143,7 +143,6 @@ class World {
     a.emplace(a_port, z_address, config, std::move(callback), now);
   }
   void run(Duration length);
-  /// Runs until A is in `phase`. Returns false after `limit`.
   bool run_until(ForceClient::Phase phase, Duration limit);
   void restart_server() {
     kill_server();

@@ -75,7 +75,7 @@ TEST(ForceClient, ShowsThePhysicsTheNewestStateOnly) {
   world.run(5 * kSecond);
   ASSERT_GT(seen.size(), 90U);
   EXPECT_TRUE(std::is_sorted(seen.begin(), seen.end(), std::less_equal<>())) << "a state came back, or came twice";
-  // The newest of the last 35 states is little older than the constant delay. A queue would add 35 ms or more.
+  // The newest state is little older than the constant delay. If there were a queue, it would be at least 35 ms older.
   EXPECT_LE(behind, 30U);
   const ForceClient::Stats stats = world.a->stats();
   EXPECT_EQ(stats.states, seen.size() + stats.states_skipped + 1) << "the +1 still waits for its turn";
@@ -90,7 +90,6 @@ TEST(ForceClient, OfStatesThatArriveTogetherOnlyTheNewestIsComputed) {
   });
   ASSERT_TRUE(world.run_until(Phase::kOpen, kSecond));
   world.run(kSecond);
-  // A is blocked for 50 ms, as by a long computation.
   const ForceClient::Stats before = world.a->stats();
   const int calls_before = calls;
   const LocalTime end = world.now + milliseconds(50);
@@ -131,7 +130,6 @@ TEST(ForceClient, NeverCatchesUpWhatItHasMissed) {
   for (std::size_t i = 1; i < calls.size(); ++i) EXPECT_GE(calls[i] - calls[i - 1], milliseconds(9));
 }
 
-// An engine that computes asynchronously: the callback returns no force, and the answer is sent later.
 TEST(ForceClient, ALaterAnswerIsSentUnlessANewerStateWasAnswered) {
   World world(24, kFineWeather);
   std::vector<Seen> seen;
@@ -202,7 +200,7 @@ TEST(ForceClient, AForceIsValidForThreePeriodsAndAtLeastTwentyMilliseconds) {
   EXPECT_EQ(valid_ms({.rate_hz = 100, .valid_for = milliseconds(7)}), 7);
 }
 
-/// Connects an engine that answers each state with `change` applied. Returns the last force after a second.
+/// The engine's answers have `change` applied. Returns the last force after a second.
 ForceCommand last_force(World& world, ForceClient::Config config, const std::function<void(Touch&)>& change) {
   config.rate_hz = 100;
   world.connect(config, [&](const DeviceState& hand) {
@@ -412,7 +410,7 @@ TEST(ForceClient, RefusesAnImpossibleConfigurationByFieldValueAndExpectation) {
   EXPECT_EQ(complaint({.max_datagrams = 0}), "max_datagrams = 0: expected 1 or more");
 }
 
-/// A link that stamps a datagram a little after the turn has begun, as real sockets do.
+/// The time stamp of a datagram is after the beginning of the turn, as for real sockets.
 class LateLink : public Link {
  public:
   explicit LateLink(Link& link) : link_(link) {}
@@ -463,7 +461,6 @@ TEST(ForceClient, AForceLeavesInTheTurnThatHasComputedIt) {
   EXPECT_GT(answers, 900);
 }
 
-/// A link whose clock the callback can advance.
 class ClockedLink : public Link {
  public:
   ClockedLink(Link& link, const LocalTime& clock) : link_(link), clock_(clock) {}

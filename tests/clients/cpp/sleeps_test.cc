@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-// Counts how often a client on real sockets sleeps.
 #include <gtest/gtest.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
@@ -35,7 +34,7 @@ class Server {
   Server& operator=(const Server&) = delete;
 
   Address address() const { return link_.local_address(); }
-  /// Stops the thread. Returns the number of forces received.
+  /// Stops the thread. Returns the number received.
   std::uint64_t forces() {
     end();
     return z_.forces.size();
@@ -53,7 +52,7 @@ class Server {
   std::thread thread_;
 };
 
-/// Voluntary context switches of this thread. Preemption is not counted.
+/// Voluntary context switches of this thread, without preemption.
 std::uint64_t sleeps() {
   rusage usage{};
   ::getrusage(RUSAGE_THREAD, &usage);
@@ -78,7 +77,7 @@ TEST(Sleeps, AClientSleepsOnceForEachStateThatItAnswers) {
   const std::uint64_t slept = sleeps() - before;
   const std::uint64_t forces = server.forces();
   ASSERT_GT(forces, 20U);
-  constexpr std::uint64_t kOthers = 60;  // the handshake, its answers, keep-alives
+  constexpr std::uint64_t kOthers = 60;
   EXPECT_LE(slept, forces + kOthers) << "a sleep between a state and its force would double them";
 }
 

@@ -17,7 +17,7 @@
 namespace tendon::udp_transport_test {
 namespace {
 
-/// A plain socket on loopback. A datagram to loopback has arrived when send() returns.
+/// A datagram to loopback has arrived when send() returns.
 class Z {
  public:
   Z() : fd_(::socket(AF_INET, SOCK_DGRAM, 0)) {
@@ -36,7 +36,6 @@ class Z {
     fd_ = -1;
   }
   Address address() const { return parse_address("127.0.0.1:" + std::to_string(port_)); }
-  /// Returns the size of the next datagram and remembers its sender.
   ssize_t receive() {
     std::array<char, kMaxDatagram> buffer{};
     socklen_t size = sizeof client_;
@@ -65,20 +64,17 @@ class Z {
 
 constexpr std::array<std::byte, 8> kWords{};
 
-/// Sends a datagram, so that the server can reply.
 void greet(UdpTransport& a, Z& z) {
   a.send(z.address(), kWords);
   EXPECT_EQ(z.receive(), 8);
 }
 
-/// Returns the size of the next datagram.
 std::size_t received(UdpTransport& a) {
   std::array<std::byte, kMaxDatagram> buffer{};
   Address from;
   return a.receive(from, buffer);
 }
 
-/// Includes the descriptor that reads the folder.
 std::ptrdiff_t open_files() {
   return std::distance(std::filesystem::directory_iterator("/proc/self/fd"), std::filesystem::directory_iterator());
 }
@@ -161,7 +157,7 @@ TEST(UdpTransport, WaitsForAnyOfSeveral) {
   greet(to_far, far);
   far.reply(3);
   const std::array<UdpTransport*, 2> both{&to_near, &to_far};
-  UdpTransport::wait_for_any(both, std::chrono::hours(1));  // returns at once, or the test hangs
+  UdpTransport::wait_for_any(both, std::chrono::hours(1));  // must return immediately
   EXPECT_EQ(received(to_near), 0U);
   EXPECT_EQ(received(to_far), 3U);
   UdpTransport::wait_for_any(both, Duration::zero());

@@ -35,7 +35,6 @@ struct Tool {
     compare->add_option("--side", side, "Of the hands")->check(usage::one_of({"left", "right", "both"}));
   }
 
-  /// Returns the exit code, and stores the output in `out` and `err`.
   int parse(std::vector<const char*> words) {
     words.insert(words.begin(), "tool");
     testing::internal::CaptureStdout();
@@ -113,7 +112,6 @@ struct Said {
   bool json = false;
 };
 
-/// Returns the error message, "none" or "help".
 std::string refusal(std::vector<const char*> words) {
   Said said;
   CLI::App app("A tool (1,5)", "tool");

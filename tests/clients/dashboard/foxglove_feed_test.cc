@@ -112,7 +112,7 @@ TEST_F(FoxgloveFeedTest, GivesEveryStateOnceFromTheSubscriptionOn) {
     states(1, 3);
     feed_.take(now_);
     feed_.take(now_);
-    if (turn == 2) board_.take_states(1);  // the page's own feed takes the states of this device
+    if (turn == 2) board_.take_states(1);
   }
   const auto steps = told(client).data;
   ASSERT_EQ(steps.size(), 15U);
@@ -124,7 +124,6 @@ TEST_F(FoxgloveFeedTest, TimesAreThoseOfTheSamplesInUnixTime) {
   ASSERT_TRUE(subscribe(client, 3, "/haptic/step"));
   states(0, 1);
   feed_.take(now_ += std::chrono::milliseconds(3));
-  // Small changes of the clock estimate do not change the time stamps.
   board_.observe_clock(kAhead + std::chrono::microseconds(900));
   states(0, 1);
   feed_.take(now_ += std::chrono::milliseconds(3));

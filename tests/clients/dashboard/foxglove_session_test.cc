@@ -73,7 +73,6 @@ TEST(FoxgloveSession, DropsTheOldestTenthsWholeAndSaysHowMany) {
   session.subscribe(0, 1);
   session.subscribe(1, 2);
   const std::string payload(200, 'x');
-  // 10 s of steps and scene updates.
   std::uint64_t put = 0;
   for (int i = 0; i < 10'000; ++i) {
     session.put(1, kStart + i * kMillisecond, payload);

@@ -15,7 +15,7 @@ namespace {
 
 using nlohmann::json;
 
-/// Decodes base64 (RFC 4648), independently of the encoder.
+/// Base64 (RFC 4648), independently of the encoder.
 std::string decoded(std::string_view text) {
   const std::string digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
   EXPECT_EQ(text.size() % 4, 0U);

@@ -6,8 +6,7 @@
 
 namespace tendon::dash {
 
-/// The two sides of an engaged coupling with scales of 1. The leader has given 30 mJ, of which the follower has
-/// received 25 mJ.
+/// The scales are 1. The follower has received 25 mJ of the 30 mJ that were given by the leader.
 inline Board::Ports both_ends() {
   Board::Ports ports;
   PortFrame& leader = ports.own;

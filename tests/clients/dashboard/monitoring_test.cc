@@ -45,8 +45,7 @@ std::map<std::string, std::set<std::string>> exported() {
   return names;
 }
 
-/// Returns the metrics in a PromQL expression. They must be exported, and so must the labels that it selects or
-/// groups by.
+/// Metrics of PromQL, and labels that it selects or groups by.
 std::set<std::string> expect_exported(const std::string& expression) {
   static const std::map<std::string, std::set<std::string>> known = exported();
   static const std::regex metric(R"((tendon_[a-z_]+)(\{([^}]*)\})?)");
@@ -142,7 +141,7 @@ std::set<std::string> panels_of(const nlohmann::json& part) {
   return all;
 }
 
-/// Returns whether a path such as "/haptic/step.position_m.x" names a number, bool or enum of a step.
+/// A path such as "/haptic/step.position_m.x" names a number, bool or enum of a step.
 bool is_plotted_field(const std::string& path) {
   constexpr std::string_view kTopic = "/haptic/step.";
   if (!path.starts_with(kTopic)) return false;

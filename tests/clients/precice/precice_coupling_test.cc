@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests preCICE between two processes on this machine.
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <sys/wait.h>

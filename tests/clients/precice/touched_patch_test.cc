@@ -21,7 +21,6 @@ DeviceState at(double x, double y = 0, double z = 0) {
   return hand;
 }
 
-/// Returns the reaction forces of nodes on springs with this total stiffness.
 std::vector<double> held(const TouchedPatch& patch, const DeviceState& hand, double stiffness) {
   std::vector<double> forces = patch.displacements(hand);
   for (double& force : forces) force *= stiffness / static_cast<double>(patch.nodes());

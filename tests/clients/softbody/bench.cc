@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Measures the cost of an answer and its error on the pressed block B1 at ν = 0.45.
-//
-// The tool moves vertically and sideways and is sampled at 100 Hz. Dynamic bodies take the time steps in between. The
-// counter error_percent is the error of the static stiffness against 420.2 N/m.
+// Cost of an answer and its error on the pressed block B1 at ν = 0.45. The tool moves vertically and sideways and is
+// sampled at 100 Hz; dynamic bodies take the time steps in between. error_percent: static stiffness against 420.2 N/m.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
@@ -66,8 +64,8 @@ double processor_time() {
   return 1e3 * static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_nsec);
 }
 
-/// Simulates the second thread of a body as if it had its own processor and the answers were 1 ms apart: a field is
-/// finished after as many answers as the previous one took milliseconds.
+/// Simulates a second thread with its own processor and answers 1 ms apart: a field is finished after as many answers
+/// as the previous one took milliseconds.
 struct Beside {
   explicit Beside(Body& body) {
     body.prepare_by([this](std::packaged_task<void()> work) { given.push_back(std::move(work)); });
@@ -84,8 +82,8 @@ struct Beside {
   double waited = 0;
 };
 
-/// Presses 5 mm deep and strokes 20 mm sideways and back, in steps of state.range(1) µm, with a tolerance of 0.5 %.
-/// Reports all answers together, and the slowest of those that compute a piece of a near field. With `with_thread` a
+/// Measures a path 5 mm deep, 20 mm sideways and back, in steps of state.range(1) µm, with a tolerance of 0.5 %.
+/// Reports all answers together, and the slowest of those that compute a piece of a near field. `with_thread`: a
 /// simulated second thread computes the fields.
 void path(benchmark::State& state, ModelKind model, Law law, bool with_thread) {
   BodyConfig config = testing::pressed_body(model, Element::kHex8Sri, static_cast<int>(state.range(0)));
@@ -137,9 +135,9 @@ void path(benchmark::State& state, ModelKind model, Law law, bool with_thread) {
   state.counters["model_mb"] = static_cast<double>(body.size().bytes) / 1e6;
 }
 
-/// Measures learned shapes or tables for B1 within 12 mm of (10, 0) mm: 5 mm deep, 20 mm sideways and back, in steps
-/// of 0.2 mm, with a tolerance of 2 %. A simulated second thread computes the near fields. The true error is measured
-/// at every millimeter, against Newton's method on the whole mesh with a tolerance of 1e-9.
+/// Measures learned shapes or tables for B1 within 12 mm of (10, 0) mm: 5 mm deep, 20 mm sideways and back, in steps of
+/// 0.2 mm, with a tolerance of 2 % and a simulated second thread. The true error is measured at every millimeter,
+/// against Newton's method on the whole mesh with a tolerance of 1e-9.
 void learned(benchmark::State& state, Law law, bool tabulate) {
   BodyConfig config = testing::pressed_body(ModelKind::kNear, Element::kHex8Sri, static_cast<int>(state.range(0)));
   config.near.law = law;
@@ -204,7 +202,7 @@ void rigid(benchmark::State& state, const Tool& tool) {
   state.counters["model_mb"] = static_cast<double>(body.size().bytes) / 1e6;
 }
 
-/// Measures models that exist for comparison. Dynamic models take steps of state.range(1) µs with one iteration each.
+/// Dynamic models take steps of state.range(1) µs with one iteration each.
 void compared_with(benchmark::State& state, compared::Kind kind) {
   compared::Config config = compared::testing::soon_at_rest(kind);
   if (compared::info(kind).has_time) {
@@ -216,8 +214,8 @@ void compared_with(benchmark::State& state, compared::Kind kind) {
   answer_with(state, body);
 }
 
-/// Measures the cost of a cut through half of the width, state.range(1) mm deep, with the existing factorization or a
-/// new one. Building the new mesh, solid and surface is not included.
+/// Through half of the width, state.range(1) mm deep, with the existing factorization or a new one, without building
+/// the new mesh, solid and surface.
 template <class CutModel>
 void cut(benchmark::State& state, Law law, bool anew) {
   const int n = static_cast<int>(state.range(0));

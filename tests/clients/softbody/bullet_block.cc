@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// tendon-bench-bullet: the pressed block B1 as a deformable body of Bullet, with the tetrahedra of clients/softbody
-// and the same patch. It measures the static stiffness and the cost of a step; see tests/tools/lab/ACCURACY.md. It is
-// only built if Bullet is installed (Debian: libbullet-dev).
+// tendon-bench-bullet: the pressed block B1 as a deformable body of Bullet, with the tetrahedra of clients/softbody and
+// the same patch; see tests/tools/lab/ACCURACY.md. Only built if Bullet is installed (Debian: libbullet-dev).
 #include <BulletCollision/BroadphaseCollision/btDbvtBroadphase.h>
 #include <BulletSoftBody/btDeformableBodySolver.h>
 #include <BulletSoftBody/btDeformableLinearElasticityForce.h>
@@ -102,7 +101,7 @@ void press(Law law, int n, double newtons) {
   body.m_cfg.kDP = 0;
   body.m_cfg.collisions = 0;
   body.m_sleepingThreshold = 0;
-  body.setActivationState(DISABLE_DEACTIVATION);  // otherwise Bullet deactivates it before it moves
+  body.setActivationState(DISABLE_DEACTIVATION);  // Bullet must not deactivate it
   world.addSoftBody(&body);
   const auto elastic = force_of(law, material);
   Press load(patch, newtons);

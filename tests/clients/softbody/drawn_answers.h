@@ -19,7 +19,6 @@
 
 namespace tendon::softbody::testing {
 
-/// A block with the tested model, and Newton's method on the whole mesh as the reference.
 struct AskedAndExact {
   explicit AskedAndExact(Solid block)
       : solid(std::move(block)),

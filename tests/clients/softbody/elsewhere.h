@@ -9,7 +9,7 @@
 
 namespace tendon::softbody::testing {
 
-/// Replaces the second thread. Its work is collected until work() runs it.
+/// Collects the second thread's work until work() runs it.
 struct Elsewhere {
   Background background() {
     return [this](std::packaged_task<void()> work) { given.push_back(std::move(work)); };

@@ -156,8 +156,7 @@ TEST(SoftbodyExplain, WhatAnEffectAddsIsTheDifferenceToTheBodyWithoutIt) {
   const std::int64_t bare = bytes(scene.body);
   scene.body.effects.density = 1000;
   scene.body.effects.gravity = Vec3(0, 0, -9.81);
-  // The scene takes 10 s and 12 s, and the one without gravity 4 s, for 40 answers each. Then the time limit ends the
-  // measurement.
+  // The scene takes 10 s and 12 s, and the one without gravity 4 s, for 40 answers each. Then time is up.
   const Explanation explanation = explain(scene, saying({0, 0, 10, 10, 22, 22, 26, 26}));
   EXPECT_NEAR(explanation.all.answer_s, 0.25, 1e-12);
   EXPECT_NEAR(explanation.resolution_s, 0.05, 1e-12);

@@ -80,7 +80,7 @@ TEST(PlacedBody, ABodyThatSticksSendsNoSurfaceThatOnlyPushes) {
   EXPECT_FALSE(body.answer(hand).contact);
 }
 
-/// The force that the server extrapolates from the answer at `x` to a point `deeper` (m) along x.
+/// Extrapolated by the server from the answer at `x` to a point `deeper` (m) along x.
 Vec3 meant(PlacedBody& body, const Vec3& x, double deeper) {
   DeviceState hand;
   hand.position = x;
@@ -124,7 +124,7 @@ Scene with_tool(std::string_view tool) {
   return parse_scene(text, "s.toml", ".");
 }
 
-/// A hand with orientation `turn` whose tool, at `offset` (m) from the handle, is at `tool`.
+/// The tool is `offset` (m) from the handle.
 DeviceState hand_with(const Vec3& tool, const Vec3& offset, const Quat& turn) {
   DeviceState hand;
   hand.position = tool - rotated(turn, offset);
@@ -202,7 +202,6 @@ TEST(PlacedBody, APatchAtAnOffsetGivesATorqueOnEveryModel) {
   EXPECT_LT((*touch.torque - offset.cross(touch.force)).norm(), 1e-14);
 }
 
-/// A scene with the given model and the effects that it requires.
 std::string scene_of(const ModelInfo& model) {
   std::string text = with("\"condensed\"", "\"" + std::string(model.name) + "\"");
   std::string names;
@@ -277,7 +276,7 @@ TEST(PlacedBody, WhatIsPlannedOverTimeCountsFromTheFirstAnswersSample) {
   EXPECT_EQ(force(72'000), cut);
   EXPECT_NEAR(force(73'000) / cut, 2, 1e-9);
   EXPECT_NEAR(force(75'000) / cut, 3, 1e-9);
-  EXPECT_NEAR(force(60'000) / cut, 1, 1e-9);  // the clock is set back: the modulus follows, the cut stays
+  EXPECT_NEAR(force(60'000) / cut, 1, 1e-9);  // the clock is set back, which resets the modulus but not the cut
 }
 
 TEST(PlacedBody, ABodyWithTimeAdvancesByTheTimeBetweenSamples) {
@@ -309,7 +308,6 @@ std::string text_of(const std::string& file) {
   return text.str();
 }
 
-/// The result of `tendon-softbody selftest` at this rate.
 SelfTest expect_passed(const Scene& scene, double rate_hz = 1000) {
   PlacedBody body(scene);
   SelfTestScript script;

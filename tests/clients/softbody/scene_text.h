@@ -6,7 +6,6 @@
 
 namespace tendon::softbody::testing {
 
-/// A valid scene. Tests replace parts of it.
 inline const std::string kGood = R"(effects = ["contact"]
 [body]
 shape = "block"
@@ -29,7 +28,6 @@ inline std::string with(std::string_view old, std::string_view replacement) {
   return text;
 }
 
-/// A cut without its time.
 inline constexpr std::string_view kCut =
     "[[cutting]]\ncorner_mm = [0, -60, 25]\nalong_mm = [0, 120, 0]\ndeep_mm = [0, 0, 30]\n";
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// malloc and its relatives for a single-threaded program, with a free list for each power of two.
+// malloc and its relatives, single-threaded, with a free list for each power of two.
 #include "tests/clients/softbody/steady_heap.h"
 
 #include <array>

@@ -5,8 +5,8 @@
 
 namespace tendon::softbody::testing {
 
-/// Allocated bytes. In a program that links steady_heap.cc, every heap call takes the same number of instructions,
-/// whatever was allocated before. With glibc it varies by a few hundred.
+/// If steady_heap.cc is linked, the number of instructions of a heap call does not depend on previous calls. In glibc,
+/// it varies by a few hundred.
 std::size_t bytes_on_heap() noexcept;
 
 }  // namespace tendon::softbody::testing

@@ -19,7 +19,6 @@
 namespace tendon::frames_test {
 namespace {
 
-/// Returns the 48 orthonormal bases along ±x, ±y and ±z, 24 of which are right-handed.
 std::vector<Mat3> axis_aligned_bases() {
   std::vector<Mat3> bases;
   std::array<Eigen::Index, 3> order = {0, 1, 2};
@@ -139,7 +138,6 @@ TEST(Frames, HaveANameOfTheirOwnByWhichTheyAreFound) {
   EXPECT_EQ(find_frame("maya"), nullptr);
 }
 
-/// Work and torque must not depend on the basis. The 48 bases include every frame of the table.
 TEST(Frames, WorkAndTurnsAreTheSameSeenFromAnyOfThe48Bases) {
   Dice random(7);
   for (const Mat3& basis : axis_aligned_bases()) {
@@ -150,7 +148,6 @@ TEST(Frames, WorkAndTurnsAreTheSameSeenFromAnyOfThe48Bases) {
     // Rotating a point of the handle and changing the frame must commute.
     EXPECT_LT((frame.orientation(turn) * frame.position(place) - frame.position(turn * place)).norm(), 1e-12);
     EXPECT_NEAR(frame.orientation(turn).determinant(), 1, 1e-12);
-    // Torques transform like lever × force, so their work is invariant.
     EXPECT_LT((frame.torque(place.cross(force)) - (frame.position(place) / 100).cross(frame.force(force))).norm(),
               1e-12);
     EXPECT_NEAR(frame.force(force).dot(frame.position(place)) / 100, force.dot(place), 1e-12);
@@ -161,8 +158,7 @@ TEST(Frames, WorkAndTurnsAreTheSameSeenFromAnyOfThe48Bases) {
   }
 }
 
-/// Regression test for ZeroSimROSUnity issue #7: changing quaternion signs by hand kept yaw correct and swapped roll
-/// and pitch.
+/// Regression for ZeroSimROSUnity issue #7: changing signs by hand kept yaw correct and swapped roll and pitch.
 TEST(Frames, AYawToTheLeftTurnsNegativeAboutUnitysUp) {
   const Frame& unity = *find_frame("unity");
   const Mat3 left = Eigen::AngleAxisd(0.5, Vec3::UnitY()).toRotationMatrix();  // seen from above, counter-clockwise

@@ -16,7 +16,6 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 const double kNan = std::numeric_limits<double>::quiet_NaN();
 
-/// The tolerance is about 1.5 units in the last place.
 double ulps(double right) { return std::max(3e-16 * std::abs(right), 1.2e-16); }
 
 TEST(PortableMath, RoundsEvenWhereAddingAHalfWouldNot) {
@@ -57,7 +56,7 @@ TEST(PortableMath, Expm1AndTanhKeepTheirPrecisionNearZero) {
   EXPECT_TRUE(std::isnan(tanh(kNan)));
 }
 
-/// Computes eˣ (or eˣ − 1) with one rounding per operation, in the order of the definition.
+/// eˣ (or eˣ − 1) with one rounding per operation, in the order of the definition.
 double defined(double x, bool less_one) {
   const std::int64_t k = round(x / std::numbers::ln2);
   const auto whole = static_cast<double>(k);
@@ -93,7 +92,7 @@ TEST(PortableMath, SineAndCosineAgreeWithLibmUpToAYearOfSeconds) {
       EXPECT_NEAR(cos(y), std::cos(y), ulps(std::cos(y))) << y;
     }
   }
-  for (int k = -100'000; k < 100'000; k += 7) {  // where one of them is nearly zero
+  for (int k = -100'000; k < 100'000; k += 7) {
     const double y = k * std::numbers::pi / 2;
     EXPECT_NEAR(sin(y), std::sin(y), 1.2e-16) << k;
     EXPECT_NEAR(cos(y), std::cos(y), 1.2e-16) << k;
@@ -116,7 +115,7 @@ TEST(PortableMath, HypotNeitherOverflowsNorLosesTheSmallSide) {
   EXPECT_TRUE(std::isnan(hypot(kNan, 1.0)));
 }
 
-/// Hash of many results. A different value means that this machine does not reproduce the reference bits.
+/// Another hash means that this machine does not reproduce the reference bits.
 TEST(PortableMath, TheBitsAreThoseOfEveryOtherMachine) {
   std::uint64_t bits = 0;
   const auto feed = [&](double value) { bits = bits * 6364136223846793005U + std::bit_cast<std::uint64_t>(value); };

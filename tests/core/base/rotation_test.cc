@@ -120,8 +120,7 @@ TEST_F(Rotations, ASpringIsStiffnessTimesAngleForSmallTurns) {
   }
 }
 
-/// Returns the work of the hand against the spring along a closed path, J. Negative work means that the spring
-/// generated energy.
+/// Returns the work of the hand along a closed path, J. If it is negative, the spring generated energy.
 double work_round(const Mat3& k, const Quat& rest, const std::vector<Quat>& way) {
   constexpr int kParts = 40;  // per leg; three Gauss points in each part leave an error of about 1e-12 J
   constexpr std::array<std::pair<double, double>, 3> kGauss{

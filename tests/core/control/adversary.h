@@ -26,7 +26,7 @@ Vec<N> random_direction(Dice& dice) {
   return v.normalized();
 }
 
-/// Eq. (7): the motion along `force` that extracts the most energy while the force is held.
+/// Eq. (7): extracts the most energy while the force is held.
 template <int N>
 Vec<N> worst_motion(const Vec<N>& force, const Friction& friction, Duration held) {
   const double size = force.norm();
@@ -34,7 +34,7 @@ Vec<N> worst_motion(const Vec<N>& force, const Friction& friction, Duration held
   return force / size * (seconds(held) * (size - friction.coulomb) / (2 * friction.viscous));
 }
 
-/// Demand as a function of position. Laws that are passive only in static worlds are tested with one of these.
+/// Laws that are passive only in static worlds are tested with one of these.
 template <int N>
 using World = std::function<Demand<N>(const Vec<N>& position)>;
 
@@ -74,7 +74,6 @@ World<N> static_world(Dice& dice, double stiffest, const Walls& of) {
   };
 }
 
-/// Returns `world` evaluated at the position `periods` periods ago.
 template <int N>
 World<N> delayed(World<N> world, int periods) {
   return [world = std::move(world),
@@ -86,7 +85,7 @@ World<N> delayed(World<N> world, int periods) {
   };
 }
 
-/// Returns arbitrary demands: huge, tiny, zero, NaN, along and against the motion, with changing stiffness.
+/// Huge, tiny, zero, NaN, along and against the motion, with changing stiffness.
 template <int N>
 World<N> hostile_world(Dice& dice) {
   return [&dice, last = Vec<N>(Vec<N>::Zero())](const Vec<N>& x) mutable {
@@ -191,8 +190,8 @@ inline Friction random_friction(Dice& dice) {
   return {dice.chance(0.3) ? 0.0 : dice.decades(-3, -0.3), dice.decades(-2, 0.3)};
 }
 
-/// Runs `make(claimed friction, longest hold)` in hostile worlds. Returns the number of seeds for which the port
-/// generated energy. If `overclaim` is larger than 1, the law assumes a viscous friction that is larger by this factor.
+/// `make(claimed friction, longest hold)`. Counts the seeds for which the port generated energy. The law assumes a
+/// viscous friction that is larger by `overclaim`.
 template <int N, class Make>
 int broken_by_hostile_worlds(Make make, int seeds, double overclaim = 1) {
   int broken = 0;
@@ -211,8 +210,7 @@ int broken_by_hostile_worlds(Make make, int seeds, double overclaim = 1) {
   return broken;
 }
 
-/// Same count for laws that are passive in static, convex worlds. `make` also gets the slope of the world, `stiffest`
-/// in N/m.
+/// For laws that are passive in static, convex worlds. `make` also gets the world's slope, `stiffest` in N/m.
 template <int N, class Make>
 int broken_by_static_worlds(Make make, int seeds, const Walls& walls = {}, int periods_late = 0) {
   int broken = 0;
@@ -235,8 +233,7 @@ int broken_by_static_worlds(Make make, int seeds, const Walls& walls = {}, int p
   return broken;
 }
 
-/// Checks the requirements for every law. A demand that is not finite is replaced by zero and is not booked. The energy
-/// is equal to the ledger of the port.
+/// A demand that is not finite is replaced by zero and is not booked. The energy is equal to the ledger of the port.
 template <int N, class Law>
 requires StabilityController<Law, N>
 void expect_the_common_promises(Law law, const Friction& friction) {

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// Passivity of AOL+, judged by the true ledger: exact positions, exact friction and the applied force. The law itself
-// sees positions in encoder counts.
+// The ledger has exact positions and friction and the applied force; the law sees positions in encoder counts.
 #include "core/control/aol_plus.h"
 
 #include <gtest/gtest.h>
@@ -39,7 +37,6 @@ struct Case {
   double force_scale = 1;      // sabotage: applied force / permitted force
 };
 
-/// Returns a law with random friction and the parts that are given by `listed`.
 template <int Blocks, int Size>
 Case<Blocks, Size> random_case(Dice& dice, const std::string& listed) {
   using Law = AolPlus<Blocks, Size>;
@@ -85,7 +82,7 @@ Case<Blocks, Size> random_case(Dice& dice, const std::string& listed) {
 }
 
 struct Outcome {
-  double least = 0;         // J, the minimum of the true ledger
+  double least = 0;         // minimum of the true ledger, J
   double scale = 0;         // J, the maximum of the true ledger; this is the scale of the rounding errors
   double worst_excess = 0;  // N above `permitted`
   double felt = 0;          // N, the largest force
@@ -178,8 +175,8 @@ Outcome run(Dice& dice, const Case<Blocks, Size>& c, int steps) {
   return outcome;
 }
 
-/// Runs a law with a list of parts for all seeds. Adaptive friction (`f`) must not be combined with other parts, because
-/// the interval in which the friction falls is booked with the previous bound.
+/// Adaptive friction (`f`) must be alone, because the interval in which the friction falls is booked with the previous
+/// bound.
 template <int Blocks, int Size>
 void expect_passive(const std::string& listed, int seeds = 150) {
   SCOPED_TRACE(std::to_string(Blocks) + " blocks of " + std::to_string(Size));
@@ -275,7 +272,6 @@ TEST(AolPlus, AfterAnIntervalThatIsNoNumberThePlainBoundHolds) {
   const Interval<1> bad{.applied = Vec<1>(0), .dx = Vec<1>(std::nan("")), .held = kPeriod};
   law.observe(bad);
   EXPECT_EQ(law.limit(push).permitted, plain.limit(push).permitted);
-  // A single interval yields a velocity but no acceleration.
   const Interval<1> good{.applied = Vec<1>(0), .dx = Vec<1>(1e-4), .held = kPeriod};
   law.observe(good);
   plain.observe(good);
@@ -305,7 +301,7 @@ TEST(AolPlus, WavingInFreeSpaceSwitchesThePlainLimiterOffButNotTheCappedOne) {
   EXPECT_NEAR(capped.limit({.force = Vec<1>(1e3)}).permitted, 0.02 + 2 * std::sqrt(0.26 * 0.005 / 1e-3), 1e-9);
 }
 
-/// Pushes slowly into a spring of `stiffness` to `depth` and back. Returns the share of limited steps.
+/// Slowly, to `depth` and back. Returns the share of limited steps.
 template <class Law>
 double limited_share(Law& law, double stiffness, double depth) {
   double applied = 0;
@@ -369,7 +365,6 @@ TEST(AolPlus, ASpringThatIsHeldForAMinuteIsStillPaidFor) {
 }
 
 TEST(AolPlus, DryFrictionDoesNotPumpUpTheCap) {
-  // Dragging over a rough surface adds work that is never returned.
   auto config = one_axis();
   config.parts.energy_cap.emplace();
   AolPlus<1> law(config);

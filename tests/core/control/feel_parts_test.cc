@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// Effect of each AOL+ part that reduces vibration. aol_plus_test.cc tests their passivity.
+// AOL+ parts that reduce vibration. aol_plus_test.cc tests their passivity.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -79,8 +78,7 @@ TEST(Thrift, AForceGrowsOnlyByWhatTheAccountCanPayTheCountsOf) {
   EXPECT_LT(-limited.force[0], 0.9 * limited.permitted) << "the bound itself is not what held it back";
 }
 
-/// Returns the work of the damper during one second of hand vibration at 20 Hz with `amplitude` (m/s), in a contact of
-/// 2 N, J.
+/// J, during one second of hand vibration at 20 Hz with `amplitude` (m/s), in a contact of 2 N.
 double damped(const AolPlus<1>::Config& config, double amplitude, double slow_speed = 0, double slow_hz = 0) {
   AolPlus<1> law(config);
   law.credit(0.05);

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// Tests that every control law must pass, as tables with one row per law.
 #include <gtest/gtest.h>
 
 #include <limits>

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// The limiter measures the real hold times and passes them to its law. core_passivity_test covers passivity.
+// core_passivity_test covers passivity.
 #include "core/control/limiter.h"
 
 #include <gtest/gtest.h>
@@ -53,7 +52,6 @@ TEST(Limiter, AfterALateHoldTheBoundCountsOnOneMoreLikeIt) {
     const Vec3 push(100, 0, 0);
     limiter.observe({.applied = Vec3::Zero(), .dx = Vec3(1e-3, 0, 0), .held = milliseconds(1)});
     const double before = limiter.limit({.force = push}).permitted;
-    // If the hand is at rest, the energy must not change.
     limiter.observe({.applied = Vec3::Zero(), .dx = Vec3::Zero(), .held = microseconds(1600)});
     EXPECT_EQ(limiter.longest_hold(), milliseconds(2)) << info(law).name;
     const double coulomb = law == Law::kForceBounding ? 0 : 0.02;
@@ -91,7 +89,6 @@ TEST(Limiter, ForcesUnderWayAreReservedForTheLongerHold) {
   const double energy = limiter.energy();
   const double under_way = limiter.limit({.force = Vec3(0.2, 0, 0)}).force.norm();
   limiter.observe({.applied = Vec3::Zero(), .dx = Vec3::Zero(), .held = microseconds(1600)});
-  // T is now 2 ms. This is also used for the force that is already in flight.
   const double reserve = 2e-3 * std::pow(under_way - 0.02, 2) / (4 * 0.26);
   EXPECT_NEAR(limiter.limit({.force = Vec3(100, 0, 0)}).permitted,
               0.02 + 2 * std::sqrt(0.26 * (energy - reserve) / 2e-3), 1e-9);

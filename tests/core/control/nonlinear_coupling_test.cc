@@ -88,7 +88,7 @@ TEST(NonlinearCoupling, AForceThatComesLateYieldsInsteadOfGivingEnergy) {
   EXPECT_TRUE(yielded);
 }
 
-// Moves forward and back. Each return yields an excess of (K/2 − b/T) Δx².
+// Each return yields an excess of (K/2 − b/T) Δx².
 double energy_of_shaking(double overclaim) {
   NonlinearCoupling<1> law({{0, 0.26 * overclaim}, milliseconds(1)});
   EnergyLedger truth({0, 0.26});

@@ -71,7 +71,6 @@ TEST(PassivityController, DampsAsMuchAsIsMissing) {
   const double predicted = -held.dot(dx) - wanted.dot(dx);
   ASSERT_LT(predicted, 0);
   const LimitedForce<3> limited = law.limit({wanted});
-  // Another such interval leaves the observed energy at zero.
   EXPECT_NEAR(law.observed() - limited.force.dot(dx), 0, 1e-15);
   EXPECT_NEAR((limited.force - wanted).cross(dx).norm(), 0, 1e-15);
   EXPECT_TRUE(limited.reasons.has(Reason::kEnergy));

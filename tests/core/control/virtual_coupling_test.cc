@@ -60,8 +60,7 @@ TEST(VirtualCoupling, WithinColgatesRuleNoAdversaryDrawsEnergy) {
   }
 }
 
-// A spring pulls the hand into a wall. At the surface the demand reports a stiff world, while the tool, which lags or
-// leads the hand, is outside.
+// At the surface the demand reports a stiff world, while the tool, which lags or leads the hand, is outside.
 TEST(VirtualCoupling, AWorldStifferForTheHandThanForTheToolGivesEnergy) {
   const Friction friction{0, 0.26};
   VirtualCoupling<1> law({friction, milliseconds(1), 520});
@@ -77,7 +76,7 @@ TEST(VirtualCoupling, AWorldStifferForTheHandThanForTheToolGivesEnergy) {
   EXPECT_LT(law.energy(), -1e-4);
 }
 
-// Oscillates across the surface of a rigid wall, the motion for which the rule is tight.
+// The motion for which the rule is tight.
 double energy_of_shaking_a_rigid_wall(double share_of_damping, double excess) {
   const Friction friction{0, 0.26};
   const double damping = share_of_damping * friction.viscous;
@@ -109,7 +108,7 @@ TEST(CouplingDesign, ColgatesRule) {
   EXPECT_THROW(colgate_coupling(1, Duration::zero(), 0), std::invalid_argument);
 }
 
-// Adams & Hannaford's matrix in complex arithmetic. Returns the minimum of 2 Re h11 Re h22 − |h12 h21| − Re(h12 h21).
+// Adams & Hannaford's matrix: minimum of 2 Re h11 Re h22 − |h12 h21| − Re(h12 h21).
 double llewellyn(double mass, double viscous, double stiffness, double damping) {
   constexpr double kPeriod = 1e-3;
   double least = std::numeric_limits<double>::infinity();

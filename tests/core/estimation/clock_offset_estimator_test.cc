@@ -37,7 +37,7 @@ struct Hosts {
   }
 };
 
-/// Returns the delays of a bad Wi-Fi link. They are just above 1 ms, but one in 14 is a stall with a long tail.
+/// Bad Wi-Fi: just above 1 ms, but one in 14 is a stall with a long tail.
 Duration wifi(Dice& dice) {
   const double little = -0.15e-3 * std::log(1 - dice.uniform());
   const double stall = dice.chance(0.07) ? 4e-3 / (1 - dice.uniform()) : 0;
@@ -98,8 +98,7 @@ TEST(ClockOffsetEstimator, ItsBoundHoldsForEveryPromisedDriftAndAsymmetry) {
   }
 }
 
-// The peer does not receive anything new from us but continues to send. It echoes our last datagram with an increasing
-// delay.
+// The peer receives nothing new, so it echoes our last datagram with an increasing delay.
 TEST(ClockOffsetEstimator, ItsBoundHoldsForAPeerThatDelaysAndDrifts) {
   for (std::uint64_t seed = 1; seed <= 60; ++seed) {
     Dice dice(seed);

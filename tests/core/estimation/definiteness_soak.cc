@@ -2,9 +2,9 @@
 // Long version of RecursiveLeastSquares.*StaysDefinite*: `nice definiteness_soak 100000000 --json`.
 // tests/tools/bench/RESULTS.md has a result.
 //
-// Feeds nearly collinear regressors (s, s + 1e-4 r, 1), forgetting 0.999, p0 = 1e6, to the UD and the QR form in float32
-// and float64. After every step it checks that every D of P = U D Uᵀ is positive (1/R² for the QR form), that no sample
-// was refused, and that the trace is at most 3e6. The exit code is 1 if a check fails.
+// Feeds nearly collinear regressors (s, s + 1e-4 r, 1), forgetting 0.999, p0 = 1e6, to the UD and the QR form in
+// float32 and float64. After every step every D of P = U D Uᵀ must be positive (1/R² for the QR form), no sample
+// refused, and the trace at most 3e6. The exit code is 1 if a check fails.
 #include <unistd.h>
 
 #include <algorithm>
@@ -27,8 +27,7 @@ struct Options {
 
 constexpr std::uint64_t kSeed = 7;
 
-/// Runs one form with nearly collinear regressors. Returns true if the covariance stayed definite and all samples were
-/// accepted.
+/// True if the covariance stayed definite and all samples were accepted.
 template <class Estimator, class Scalar>
 bool soak(const char* form, const char* scalar, const Options& options) {
   Estimator estimator({.forgetting = 0.999, .prior_variance = 1e6});

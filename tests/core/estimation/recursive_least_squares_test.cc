@@ -16,7 +16,7 @@
 namespace tendon::recursive_least_squares_test {
 namespace {
 
-/// Textbook recursion, which the library avoids because it loses definiteness.
+/// The library avoids it because it loses definiteness.
 template <int M, class Scalar>
 struct Textbook {
   using Vector = Eigen::Matrix<Scalar, M, 1>;
@@ -74,7 +74,6 @@ TEST(RecursiveLeastSquares, EqualsBatchWeightedLeastSquares) {
   for (std::uint64_t seed = 0; seed < 50; ++seed) expect_equals_batch(seed);
 }
 
-/// The estimator in information form, P⁻¹ and θ.
 struct Information {
   LeastSquaresConfig config;
   Mat3 inverse = Mat3::Identity() / config.prior_variance;
@@ -153,8 +152,8 @@ void expect_definite() {
 TEST(RecursiveLeastSquares, UdStaysDefiniteInFloat32) { expect_definite<float>(); }
 TEST(RecursiveLeastSquares, UdStaysDefiniteInFloat64) { expect_definite<double>(); }
 
-/// Only one of two directions is excited in 1200 of 2000 samples. `error` is the largest error of θ after both
-/// directions are excited again.
+/// Only one of two directions is excited in 1200 of 2000 samples. `error`: the largest of θ when both are excited
+/// again.
 struct Return {
   double trace;
   double error;

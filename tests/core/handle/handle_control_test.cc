@@ -115,8 +115,7 @@ TEST(HandleControl, ForceAndTorqueShareOneAccount) {
   const double before = stylus.step({}).energy;
   stylus.ask({0, 0, 0.05});
   stylus.step({});
-  // The torque turns the handle by 0.1 rad and spends 5 mJ minus 0.1 mJ of friction, from the account shared with
-  // forces.
+  // 0.1 rad spends 5 mJ minus 0.1 mJ of friction, from the account shared with forces.
   const Step after = stylus.step(rotation_by({0, 0, 0.1}));
   EXPECT_NEAR(after.energy - before, -0.05 * 0.1 + 1e-4 * 0.1 + 1e-3 * 0.01 / 1e-3, 1e-12);
 }

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// Passivity of a handle that rotates and grips: for every motion and every demand, the common account of force and
-// torque and the account of the gripper must stay nonnegative. The test recomputes both accounts from the equations and
-// the true motion.
+// For every motion and demand, the common account of force and torque and that of the gripper must stay nonnegative.
+// Both are recomputed from the equations and the true motion.
 #include <gtest/gtest.h>
 #include <rapidcheck.h>
 
@@ -21,7 +19,7 @@ namespace {
 constexpr double kInf = std::numeric_limits<double>::infinity();
 constexpr Duration kLongest = std::chrono::milliseconds(2);
 
-/// Energy that a motion adds to an account, J: −F·Δx + f_c ‖Δx‖ + b ‖Δx‖²/T.
+/// J: −F·Δx + f_c ‖Δx‖ + b ‖Δx‖²/T.
 template <class Vector>
 double income(const Vector& force, const Vector& moved, const Friction& friction, Duration held) {
   const double way = moved.norm();
@@ -116,7 +114,7 @@ Outcome run(std::uint64_t seed, Law law) {
     if (dice.chance(hostility)) {
       dx = worst_motion(applied.force, config.limiter.friction, held);
       turn = worst_motion(applied.torque, config.rotation->friction, held);
-      if (turn.norm() > 3) turn *= 3 / turn.norm();  // more than half a turn is a different rotation
+      if (turn.norm() > 3) turn *= 3 / turn.norm();  // this would be a different rotation
       const Vec<1> grip = worst_motion(Vec<1>(applied.grip), config.grip->friction, held);
       dopening = grip[0] / config.grip->arm;
     }

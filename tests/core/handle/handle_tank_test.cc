@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// Tests the energy-sharing theorem of energy_tank.h for handles. There are two ports that rotate or grip. They pay each
-// other over a network that delays, loses, repeats and reorders messages. The accounts and the sum of both ledgers must
-// not fall below −1 nJ, even if the motion is a closed loop in SO(3). The ledgers are computed independently from the
-// true motion.
+// The energy-sharing theorem of energy_tank.h for two ports that rotate or grip, over a network that delays, loses,
+// repeats and reorders. The accounts and the sum of both ledgers, computed from the true motion, must not fall below −1
+// nJ, even on a closed loop in SO(3).
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -154,13 +152,12 @@ class HandlePair {
       if (hostile) {  // worst motion, eq. (7)
         if (size <= friction.coulomb) continue;
         part = held_force / size * (seconds(held) * (size - friction.coulomb) / (2 * friction.viscous));
-        if (i > 0 && part.norm() > 3) part *= 3 / part.norm();  // more than half a turn is a different rotation
+        if (i > 0 && part.norm() > 3) part *= 3 / part.norm();  // this would be a different rotation
       } else if (!resting) {
         part = any(dice_.decades(-7, -3) * (i == 0 ? 1 : 30));
       }
     }
     if (loops_ && !hostile) {
-      // Three rotations about axes that do not commute, then the one that closes the loop.
       if constexpr (kSize == 6) {
         out.template tail<3>() =
             now_ % 4 == 3 ? turn_between(end.q, end.loop_from) : Vec3(Vec3::Unit(now_ % 4) * dice_.within(-0.02, 0.02));
@@ -169,8 +166,7 @@ class HandlePair {
     return out;
   }
 
-  /// Moves the handle by a single rotation about one axis and books the work. The limiter uses the difference of two
-  /// samples.
+  /// A single rotation about one axis. The limiter uses the difference of two samples.
   void move(End& end, const Vec<kSize>& way, Duration held) {
     Vec<kSize> seen = way;
     if constexpr (kSize == 6) {

@@ -9,7 +9,7 @@
 
 namespace tendon::testing {
 
-/// Exact solution of m dv/dt = s t + bias − b v − f_c from rest, with optional encoder rounding.
+/// m dv/dt = s t + bias − b v − f_c from rest, with optional encoder rounding.
 struct ExactRamp {
   double rate = 0.1;  ///< s, N/s, either sign
   double viscous = 0.26;

@@ -39,8 +39,7 @@ TEST(KellyFit, DoesNotCareWhenTheClockStarted) {
 }
 
 TEST(KellyFit, OnADesktopSeesTheFrictionThatTheSpecSays) {
-  // 0.25 m of travel, true f_c = 0.05 N. The expected values come from a line through velocities, while kelly_fit uses
-  // positions, hence the 5 % tolerance.
+  // 0.25 m of travel, f_c = 0.05 N. Expected from a line through velocities; kelly_fit uses positions, hence the 5 %.
   struct Row {
     double viscous, rate, kelly_viscous, kelly_coulomb;
   };

@@ -46,7 +46,6 @@ TEST(Slide, StandingAtTheEndOfTheWorkspaceIsNoPartOfIt) {
   const Slide before = slide_of(run, kStep);
   const RampSample last = run.samples.back();
   for (int i = 1; i <= 1000; ++i) {
-    // Rebounds by 3 mm, then rests against the stop.
     const double bounce = i < 60 ? 1e-4 * std::min(i, 60 - i) : 0;
     run.samples.push_back({last.t + i * 1e-3, last.position - bounce, last.force + i * 1e-4});
   }

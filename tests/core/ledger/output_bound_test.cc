@@ -74,15 +74,13 @@ TEST(OutputBound, RefusesAHoldOfNoLength) {
   EXPECT_THROW(OutputBound::of(kFriction, Duration::zero()), std::invalid_argument);
 }
 
-// Eq. (7): the motion along F that extracts the most energy while F is held for T.
 Vec3 worst_motion(const Vec3& force, const Friction& friction, Duration held) {
   const double size = force.norm();
   if (size <= friction.coulomb) return Vec3::Zero();
   return force / size * (seconds(held) * (size - friction.coulomb) / (2 * friction.viscous));
 }
 
-// Returns the minimum energy that an adversary reaches in `steps` steps of random and worst motion, with forces of
-// `scale` times the bound.
+// Returns the minimum energy after `steps` steps of random and worst motion with forces of `scale` times the bound.
 double least_energy_against_adversary(double scale, std::uint64_t seed) {
   std::mt19937_64 random(seed);
   const auto uniform = [&random] { return static_cast<double>(random() >> 11) * 0x1p-53; };

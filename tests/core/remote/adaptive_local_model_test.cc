@@ -76,8 +76,7 @@ TEST(AdaptiveLocalModel, NothingJumpsWhenAnAnswerArrivesEvenInABlend) {
   }
 }
 
-/// The hand oscillates by 1 mm while a soft and a stiff spring alternate, the worst one at each reversal. Returns the
-/// energy that the hand receives, J.
+/// Returns the energy (J) of a hand that moves by 1 mm in the worse of a soft and a stiff spring at each reversal.
 double handed_out(const AdaptiveLocalModel::Config& config) {
   AdaptiveLocalModel model(config);
   double energy = 0;

@@ -118,7 +118,6 @@ TEST(Answer, ATableReplacesStiffnessAlongTheNormalWithinItsEnds) {
   EXPECT_EQ(along(0.1).stiffness(2, 2), 0);
   EXPECT_EQ(along(-0.1).force.z(), 0);
   EXPECT_EQ(along(1e12).force.z(), 8);
-  // The stiffness is used in the lateral direction. Its radius does not limit the table.
   RemoteForce narrow = answer;
   narrow.model->valid_radius = 1e-6;
   EXPECT_NEAR(reconstruct(narrow, deeper_by(0.001)).force.z(), 3.5, 1e-12);

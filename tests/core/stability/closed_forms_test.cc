@@ -39,7 +39,7 @@ TEST(ColgateSchenkel, DelayCostsAWholePeriodOfStiffnessEach) {
 
 TEST(ColgateSchenkel, WithDelayADamperMayHelpSpringAndMayHurt) {
   EXPECT_NEAR(passive_viscous_friction(spring(500, 0.2, 1)), 0.60625, 5e-6);  // independent program
-  // At most the sufficient K(T/2 + dT) + |B|, at least the limit for θ → 0.
+  // The bound is at most K(T/2 + dT) + |B|, which is sufficient, and at least the limit for θ → 0.
   for (const double b : {-1.0, -0.2, 0.2, 1.0}) {
     for (int d = 0; d <= 8; ++d) {
       const double k_age = 500 * (0.5 + d) * 1e-3;

@@ -10,7 +10,7 @@
 #include "core/stability/stability_boundary.h"
 #include "devices/simulated/simulated_device.h"
 
-/// The simulated device must be stable below and unstable above the boundaries of the closed forms.
+/// Stable below and unstable above the boundaries of the closed forms.
 
 namespace tendon::simulated_boundary_test {
 namespace {
@@ -22,8 +22,7 @@ struct Swing {
   double late = 0;   ///< m/s, largest speed in the last tenth
 };
 
-/// Releases a handle with `speed` (m/s) at the rest position of the spring. With an encoder this position lies on the
-/// edge between two counts, the worst case.
+/// From the spring's rest position, which is the edge between two encoder counts, the worst case. `speed`: m/s.
 Swing let_swing(const SampledSpring& spring, double speed, Duration span) {
   SimulatedDevice::Config config;
   config.mass = spring.mass;

@@ -94,8 +94,6 @@ Episode run(const World& world) {
   return result;
 }
 
-// ---- with the limiter ------------------------------------------------------------------------------------------
-
 TEST(AdmittanceLoop, TakesEnergyThatIsNotThereUnlessTheLimiterBoundsIt) {
   for (const Vec3& direction : {Vec3(1, 0, 0), Vec3(1, 2, -2)}) {
     for (const auto& config : {tool<3>(0.3, 2, 400, 4e3), tool<3>(0.3, 2, 1500, 1e4), tool<3>(0.05, 2, 400, 4e3)}) {
@@ -110,8 +108,7 @@ TEST(AdmittanceLoop, TakesEnergyThatIsNotThereUnlessTheLimiterBoundsIt) {
   }
 }
 
-// Effective mass and damping at the frequency of the hand, from a least-squares fit F = m a + b v. The fit omits the
-// first second of transients.
+// At the frequency of the hand, by least squares of F = m a + b v after the first second.
 struct Felt {
   double mass, damping;
 };
@@ -159,10 +156,7 @@ TEST(AdmittanceLoop, AToolLighterThanTheDeviceIsClippedUnlessDampingEarns) {
   EXPECT_GT(with.limited_share, 0.9);
 }
 
-// ---- anti-windup -----------------------------------------------------------------------------------------------
-
-// Holds the handle fast while the force sensor reads `push`, then `then`. Returns the number of steps for which the
-// force stays at the bound afterwards.
+// Holds the handle fast while the force sensor reads `push`, then `then`. Returns the steps at the bound afterwards.
 int steps_at_the_bound(double push, double then) {
   AdmittanceLoop<1> loop(tool<1>(1, 200, 10, 1000));
   constexpr double kBound = 2;
@@ -235,8 +229,6 @@ TEST(AdmittanceLoop, ClippingOneDirectionLeavesTheIntegralOfTheOthersAlone) {
   EXPECT_DOUBLE_EQ(wanted.y(), reference.y());
 }
 
-// ---- the tool --------------------------------------------------------------------------------------------------
-
 TEST(AdmittanceLoop, TheToolAnswersAStepOfForceAsItsEquationSays) {
   auto config = tool<6>(2, 8, 0, 0);
   config.mass << 2, 2, 2, 0.1, 0.1, 0.1;
@@ -307,11 +299,8 @@ TEST(AdmittanceLoop, SaysWhatIsWrongWithItsConfiguration) {
                   });
 }
 
-// ---- why there is no credit for kinetic energy --------------------------------------------------------------------
-
-// The adversary moves the 2 kg handle with an acceleration of at most `a_max`. It speeds up, is pushed by the motors at
-// constant speed, and stops. Returns the minimum of the work of the hand. This is exact for the motion. The bound is
-// f_c + 2 √(b (E + credit) / T).
+// The adversary moves the 2 kg handle with at most `a_max`: speeds up, is pushed by the motors at constant speed, and
+// stops. Returns the minimum work of the hand, exactly. The bound is f_c + 2 √(b (E + credit) / T).
 double least_hand_work(bool credit, double a_max) {
   constexpr double kMass = 2;
   const OutputBound bound = OutputBound::of({.coulomb = kCoulomb, .viscous = kViscous}, kPeriod);

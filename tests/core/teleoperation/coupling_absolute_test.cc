@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// Absolute maps: each leader position corresponds to a follower position, and engagement first aligns the two.
+// Each leader position has a follower position, and engagement first aligns the two.
 #include <gtest/gtest.h>
 
 #include <cmath>

@@ -23,7 +23,6 @@ struct HardCase {
   void (*make)(Draft& draft);
   bool breaks_springs = true;  ///< springs without limiters generate energy
   double bounces = 0;          ///< m/s, speed of a follower that keeps bouncing on its wall (position–force and
-                               ///< passivity)
 };
 
 constexpr HardCase kCases[] = {

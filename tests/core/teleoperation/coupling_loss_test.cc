@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// Tests couplings with a peer that stops sending, returns, or restarts, and with messages that are late or repeated.
-// This includes the stages of the decay. There must be no engagement without a request.
+// A peer stops sending, returns, or restarts; messages are late or repeated. Nothing engages without a request.
 #include <gtest/gtest.h>
 
 #include <optional>

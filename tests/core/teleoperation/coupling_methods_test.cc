@@ -24,8 +24,7 @@ double median(std::vector<double> of) {
   return of[of.size() / 2];
 }
 
-/// The hands have between 150 and 600 N/m, and each has a different bad network. Returns the force in the second press
-/// relative to a rigid link.
+/// Force in the second press relative to a rigid link. Hands of 150 to 600 N/m, each with a different bad network.
 std::vector<double> shares(Pressing with, std::uint64_t first_seed, double& buzz) {
   std::vector<double> all;
   for (std::uint64_t seed = first_seed; seed < first_seed + 21; ++seed) {

@@ -19,8 +19,7 @@ namespace {
 
 constexpr double kFriction = 0.02;  // N, Coulomb friction of each port
 
-/// Moves the leader periodically for `seconds` with a free follower. Returns the rms position difference without the
-/// delay of the link, m.
+/// Periodically, with a free follower: rms position difference without the delay of the link, m.
 double apart_while_waving(CouplingMethod method, double drift_rate, int one_way, double* least_sum = nullptr) {
   PortSetup leader = port_of(PortRole::kLeader);
   PortSetup follower = port_of(PortRole::kFollower);
@@ -259,7 +258,7 @@ TEST(CouplingRate, TheFollowerMovesAsFastAsTheHandleIsOut) {
   }
 }
 
-/// A rate follower with a scripted leader and a tool blocked at 0.
+/// A scripted leader and a tool blocked at 0.
 class PlayedRate {
  public:
   PlayedRate()
@@ -371,7 +370,7 @@ TEST(CouplingRate, AContactIsFeltButNeverMovesTheFollower) {
   PortSetup leader = rate_port(PortRole::kLeader);
   PortSetup follower = rate_port(PortRole::kFollower);
   follower.measures_contact = true;
-  // The hand holds its handle 10 mm from the center for 3 s while the follower is at a wall. Then it is released.
+  // 10 mm from the center for 3 s while the follower is at a wall, then released.
   leader.around[0] = {
       .stiffness = 1000, .damping = 3, .reference = [](double t) { return t < 2 ? 0.0 : 0.01; }, .until = 5};
   follower.around[0] = {.stiffness = 500, .damping = 1, .reference = [](double) { return 0.005; }, .wall = true};

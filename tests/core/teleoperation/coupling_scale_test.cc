@@ -44,8 +44,7 @@ TEST(CouplingScale, IsSetByALeaderThatIsNotEngagedAndByNobodyElse) {
   EXPECT_FALSE(Coupling(waves.coupling).set_scale(2, 1)) << "sums of waves have one scale";
 }
 
-/// The scale changes from 0.1 to 10 while the clutch is held in free space. This must not cause any motion. After that
-/// the follower moves ten times as far.
+/// The clutch is held in free space. After that, the follower moves ten times as far.
 TEST(CouplingScale, ATenthBecomesTenBetweenClutchesAndNothingMoves) {
   PortSetup leader = led([](double t) { return t < 2 ? 5e-3 * t : 0.01 + 1e-3 * std::min(t - 2, 2.0); });
   PortSetup follower = port_of(PortRole::kFollower);
@@ -80,8 +79,7 @@ TEST(CouplingScale, ATenthBecomesTenBetweenClutchesAndNothingMoves) {
   EXPECT_GE(ports.least_account(), kRounding);
 }
 
-/// If a robot presses while its leader is clutched, it has a new spring afterwards. Its force must change without a
-/// jump.
+/// A robot that presses while its leader is clutched has a new spring afterwards.
 TEST(CouplingScale, UnderForceTheForceFadesToTheNewOne) {
   PortSetup leader = led([](double t) { return t < 0.5 ? 0 : 0.02; });
   PortSetup follower = port_of(PortRole::kFollower);
@@ -105,13 +103,12 @@ TEST(CouplingScale, UnderForceTheForceFadesToTheNewOne) {
   EXPECT_GE(ports.least_account(), kRounding);
 }
 
-/// A robot that holds its position while it is disengaged must also change its force without a jump.
 TEST(CouplingScale, ARobotThatHoldsItsPlaceIsNotJolted) {
   PortSetup follower = port_of(PortRole::kFollower);
   follower.coupling.holds_place = true;
   Ports ports(led([](double) { return 0.0; }), follower);
   ports.run(100);
-  ports.follower.setup.path = [](double) { return Vec3(2e-3, 0, 0); };  // it is held at a different position
+  ports.follower.setup.path = [](double) { return Vec3(2e-3, 0, 0); };  // the position is different
   ports.run(200);
   Vec3 force = ports.follower.demand.force;
   const double held = force.norm();

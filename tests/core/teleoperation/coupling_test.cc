@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// Two couplings between two devices: phases, engagement by a request only, the clutch, and bad input.
-// coupling_loss_test.cc tests lost links, coupling_force_test.cc forces, and coupling_world_test.cc random worlds.
+// Phases, engagement, the clutch, and bad input. coupling_loss_test.cc tests lost links, coupling_force_test.cc forces,
+// and coupling_world_test.cc random worlds.
 #include "core/teleoperation/coupling.h"
 
 #include <gtest/gtest.h>
@@ -99,8 +98,7 @@ TEST(Coupling, AFaultOfEitherDisengagesBothAndItsEndEngagesNobody) {
   }
 }
 
-/// The new leader has a smaller epoch than the previous one. The force of the previous leader fades, and its engagement
-/// has ended.
+/// The new leader has a smaller epoch. The engagement of the previous leader has ended, and its force fades.
 TEST(Coupling, AnotherLeaderIsHeardAfterARenewalAndEngagesByItsOwnAct) {
   Ports ports = far_apart(5);
   ports.leader.begin(9);
@@ -165,7 +163,7 @@ TEST(Coupling, ALeaderWaitsForTheAnswerButNotForOneThatDeclines) {
   int waited = 0;
   for (; leader.port.phase() == PortPhase::kEngaged && waited < 100'000; ++waited) {
     PortState late = leader.state(PortPhase::kCoupled);
-    late.answers = 2;  // it was sent before the engagement was received
+    late.answers = 2;
     leader.receive(late);
     leader.step();
   }

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// Tests two couplings in random worlds. The devices, maps, networks and hands are random, and so are all engagements,
-// clutches, losses, restarts, faults and replays. It is an error if an account or a pair generates energy, or if
-// something happens without a request to engage. The bugs in tests/mutants/coupling must be found by these tests.
+// Random devices, maps, networks and hands, and random engagements, clutches, losses, restarts, faults and replays. No
+// account or pair may generate energy, and nothing happens without a request to engage. These tests must find the bugs
+// in tests/mutants/coupling.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -21,7 +20,7 @@
 namespace tendon::coupling_world_test {
 namespace {
 
-/// Returns the first broken promise of a world, or an empty string.
+/// Returns the first broken promise, or empty.
 class CouplingWorld {
  public:
   explicit CouplingWorld(std::uint64_t seed) : dice_(seed), ports_(draw()) {}
@@ -203,7 +202,6 @@ class CouplingWorld {
     }
     const bool same_act = told.engagement == watch.told.engagement &&
                           (leads || told.answers_epoch == watch.told.answers_epoch);  // the leader numbers the
-                                                                                      // engagements
     const bool recentred = leads && port.setup.coupling.method == CouplingMethod::kRate;
     if (ours && same_act && !(live && watch.live) && !recentred) {
       breaks(told.position != watch.told.position, "still");

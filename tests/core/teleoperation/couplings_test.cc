@@ -1,7 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// Tests a follower with several leaders: shares, a common account, and loss. Each device has a complete haptic
-// controller.
 #include "core/teleoperation/couplings.h"
 
 #include <gtest/gtest.h>
@@ -210,9 +207,8 @@ TEST(Couplings, AHandOverUnderStretchMakesNoStepAndTakesNoEnergy) {
   }
 }
 
-/// Leader 0 oscillates about a follower that is held stiffly, and leader 1 does not move. The share of leader 0 is
-/// large while its spring relaxes, and it is nearly zero while the spring is stretched. The spring therefore generates
-/// energy in each cycle.
+/// Leader 0 oscillates about a stiff follower, and leader 1 rests. Leader 0's share is large while its spring relaxes
+/// and nearly zero while it is stretched, so the spring generates energy in each cycle.
 Star pumped(bool limited) {
   constexpr double kPeriod = 4;  // s
   const auto swing = [](double t) { return t < 1 ? 0.0 : 0.02 * std::sin(2 * std::numbers::pi * (t - 1) / kPeriod); };

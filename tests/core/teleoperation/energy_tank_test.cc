@@ -21,7 +21,6 @@ using std::chrono::milliseconds;
 constexpr double kInf = std::numeric_limits<double>::infinity();
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
-/// A message of a peer with epoch 7 that has received our epoch 1.
 EnergyTankMessage from_peer(std::uint64_t sequence, double account, double need, double given = 0, double taken = 0) {
   return {.epoch = 7,
           .answers_epoch = 1,
@@ -179,7 +178,7 @@ TEST(EnergyTank, ANewEpochOfThePeerVoidsTheTotalsAndTheOldNeverCountsAgain) {
   EXPECT_EQ(tank.refused(), 0U);
 }
 
-/// A new peer may have a lower epoch. The same peer must not be credited twice.
+/// A new peer may have a lower epoch.
 TEST(EnergyTank, ARenewedTankHearsAnyPeerAndCountsNoTotalTwice) {
   EnergyTank tank({.max_power = 100, .max_account = 100});
   tank.receive(0, from_peer(9, 1, 1, 2));

@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// Tests the energy-sharing theorem of energy_tank.h with two to four ports and a network that delays, loses, repeats
-// and reorders messages. The forces are arbitrary and include the worst motion, pauses and restarts. The accounts and
-// the sum of all ledgers must not fall below −1 nJ. The ledgers are computed independently. Each sabotage must be found
-// within 100 worlds.
+// The energy-sharing theorem of energy_tank.h with two to four ports and a network that delays, loses, repeats and
+// reorders. Arbitrary forces, the worst motion, pauses and restarts. The accounts and the sum of all independently
+// computed ledgers must not fall below −1 nJ. Each sabotage must be found within 100 worlds.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -105,8 +103,7 @@ class World {
 
   std::size_t ports() const { return ports_.size(); }
 
-  /// The port disappears. The watchdog of its device removes the force. Messages can still be received if they were
-  /// sent before.
+  /// The watchdog of its device removes the force. Messages sent before can still be received.
   void lose(std::size_t i) { stop(ports_[i], std::numeric_limits<int>::max()); }
 
  private:
@@ -169,12 +166,10 @@ class World {
       if (!coupled(i, j)) continue;
       links_[j * ports_.size() + i].deliver(now_, [&](EnergyTankMessage message) {
         if (sabotage_ == Sabotage::kEpochIgnored) {
-          // A receiver without epoch checks: every message seems to have the peer's present epoch and our present
-          // totals.
+          // No epoch checks: every message seems to have the peer's present epoch and our present totals.
           message.answers_epoch = port.epoch;
           message.epoch = 1;
           message.taken = std::min(message.taken, port.tank->given(number(i, j)));  // otherwise this check alone would
-                                                                                    // find it
         }
         port.tank->receive(number(i, j), message);
       });

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// Coupled grippers: the follower's fingers move to the leader's without a jump, grip forces are reflected, and a dead
-// link neither drops nor crushes an object.
+// The follower's fingers move without a jump, grip forces are reflected, and a dead link neither drops nor crushes an
+// object.
 #include "core/teleoperation/handle/grip_coupling.h"
 
 #include <gtest/gtest.h>
@@ -22,8 +21,7 @@ Surroundings egg() {
   return {.stiffness = 2000, .damping = 1, .reference = [](double) { return -0.012; }, .wall = true};
 }
 
-/// The opening in m. It is reduced to 6 mm within a second. This stores the energy that is needed for the grip of the
-/// follower.
+/// m, down to 6 mm within a second, which stores the energy of the follower's grip.
 double closing(double t) { return t < 1 ? 0.02 : std::max(0.02 - 0.014 * (t - 1), 0.006); }
 
 /// A hand of 300 N/m with a target of `opening` m.
@@ -100,7 +98,7 @@ TEST(GripCoupling, ItHoldsWhileTheLeaderIsClutchedAndComesBackSlowly) {
   EXPECT_LT(fastest, 0.1 * 1e-3) << "with 50 mm/s, and what the egg gives back";
 }
 
-/// Force on an egg, N, when the link fails for three seconds and the leader engages again.
+/// N. The link fails for three seconds and the leader engages again.
 struct EggForce {
   double before = 0;
   double least_dead = 1e9;

@@ -27,12 +27,10 @@ SurfaceModel<3> surface(std::uint64_t sequence, double offset, double stiffness,
   return {sequence, normal, offset, stiffness};
 }
 
-// ---- the gate --------------------------------------------------------------------------------------------------
-
-// The hand moves near surfaces that change all the time. The function ½ K depth² is convex and its slope changes by at
-// most K. A held force can therefore only return the energy that is lost by the surface plus ½ K ‖Δx‖². If K ≤ 2b/T,
-// the latter is covered by the friction of the device. Without this leak of sampling, the energy that was returned or
-// is stored must not be larger than the input of the hand and the budget.
+// The hand moves near surfaces that change all the time. ½ K depth² is convex and its slope changes by at most K, so a
+// held force can only return the energy lost by the surface plus ½ K ‖Δx‖². If K ≤ 2b/T, the latter is covered by the
+// friction of the device. Without it, the energy returned or stored must not exceed the input of the hand and the
+// budget.
 TEST(ModelMediated, NoUpdateOfTheModelPutsEnergyIn) {
   for (std::uint64_t seed = 1; seed <= 100; ++seed) {
     Dice dice(seed);
@@ -121,8 +119,6 @@ TEST(ModelMediated, PassesOverWhatCannotBeASurface) {
   EXPECT_NEAR(renderer.command(Vec3(0, 0, 0), 0).demand.force.x(), 1, 1e-12);
 }
 
-// ---- the estimator -----------------------------------------------------------------------------------------------
-
 constexpr SurfaceEstimator<3>::Config kEstimator = {
     .contact_force = 0.05, .first_stiffness = 200, .max_stiffness = 5000, .least_travel = 2e-4, .memory = 200};
 
@@ -167,8 +163,7 @@ struct Slide {
   double worst_friction = 0;
 };
 
-// A tool presses with 2 N ± 60 % against a wall 0.3 m from the origin and slides with friction 0.3, with 0.02 N of
-// noise per axis. Errors count from 1.5 s on.
+// 2 N ± 60 % against a wall 0.3 m from the origin, friction 0.3, 0.02 N of noise per axis. Errors count from 1.5 s on.
 Slide slide(std::uint64_t seed, double stiffness, double friction) {
   Dice dice(seed);
   SurfaceEstimator<3> estimator(
@@ -220,8 +215,7 @@ TEST(ModelMediated, FindsItUnderFrictionAndNoiseFarFromTheOrigin) {
   }
 }
 
-// A press of 2 N is only 1 mm deep. Friction tilts a slide by the same amount. The stiffness can be wrong, but the
-// force must be correct.
+// A press of 2 N is only 1 mm deep, and friction tilts a slide by as much. Only the force must be correct.
 TEST(ModelMediated, FeelsRightOnAWallTooHardToMeasure) {
   for (std::uint64_t seed = 1; seed <= 100; ++seed) ASSERT_LT(slide(seed, 2000, 0.3).worst_force, 0.15) << seed;
 }

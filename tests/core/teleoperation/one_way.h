@@ -22,18 +22,18 @@ struct Network {
   /// The delay is increased by `longer_by` from period `longer_from` on.
   int longer_from = std::numeric_limits<int>::max();
   int longer_by = 0;
-  /// Messages sent between `burst_from` and `burst_until` wait for the end of their burst of `burst` periods.
+  /// Messages of `burst_from` to `burst_until` wait for the end of their burst of `burst` periods.
   int burst = 1;
   int burst_from = 0;
   int burst_until = std::numeric_limits<int>::max();
   /// Messages sent in [cut_from, cut_until) are lost.
   int cut_from = std::numeric_limits<int>::max();
   int cut_until = 0;
-  /// The periods in which the copies of a message arrive that is sent in period `now`. It replaces all other fields.
+  /// Periods in which copies of a message of period `now` arrive. Replaces all other fields.
   std::function<std::vector<int>(int now)> arrivals{};
 };
 
-/// One direction of a bad network. The time is the number of the period, which is the same at both ends.
+/// One direction of a bad network. The time is the number of the period. It is the same at both ends.
 template <class Message>
 class OneWay {
  public:
@@ -56,7 +56,6 @@ class OneWay {
     }
   }
 
-  /// Calls `receive` for every message that arrives in period `now`, in sending order.
   template <class Receive>
   void deliver(int now, Receive receive) {
     const auto last = under_way_.upper_bound(now);

@@ -16,19 +16,19 @@
 
 namespace tendon {
 
-/// The external force on a handle along x. This can be a spring with a damper, or a wall.
+/// External force along x: a spring with a damper, or a wall.
 struct Surroundings {
   double stiffness = 0;                       ///< N/m
   double damping = 0;                         ///< N·s/m
   std::function<double(double)> reference{};  ///< t, s → m: rest position of the spring; empty: 0
   bool wall = false;                          ///< applies only if x is beyond `reference`
-  /// s: the contact ends (hand released or wall removed).
+  /// s: hand released or wall removed.
   double until = std::numeric_limits<double>::infinity();
   std::function<double(double)> stiffer{};  ///< t, s → factor on `stiffness`; empty: 1
 };
 
-/// A device with one degree of freedom: m dv/dt = F + F_surroundings − b v − f_c sgn(v). The integrator is the implicit
-/// midpoint rule with set-valued friction in substeps of 50 µs. It does not generate or lose any energy.
+/// m dv/dt = F + F_surroundings − b v − f_c sgn(v) by the implicit midpoint rule with set-valued friction in substeps
+/// of 50 µs, which neither generates nor loses energy.
 class Body {
  public:
   Body(double mass, const Friction& friction, Surroundings around)
@@ -94,8 +94,7 @@ struct PairConfig {
   double max_power = 100;
 };
 
-/// Simulates two devices with springs, limiters and tanks. They are connected by a bad network and run in virtual
-/// time.
+/// Two devices with springs, limiters and tanks over a bad network, in virtual time.
 class Pair {
  public:
   struct End {
@@ -231,7 +230,7 @@ class Pair {
   int now_ = 0;
 };
 
-/// A mean round trip of `round_trip` ms; each direction has jitter of max(5 ms, 20 %), reordering and 10 % loss.
+/// Mean round trip of `round_trip` ms; each direction has jitter of max(5 ms, 20 %), reordering and 10 % loss.
 inline void make_bad(PairConfig& config, int round_trip, std::uint64_t seed) {
   const int one_way = round_trip * 5;
   config.there = {.delay = one_way, .jitter = std::max(50, one_way / 5), .loss = 0.1, .seed = seed};

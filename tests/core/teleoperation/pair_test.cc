@@ -1,7 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// Two devices coupled by position–position springs with limiters and tanks over bad networks: contact force, free
-// motion, noise, and passivity of the pair.
 #include "tests/core/teleoperation/pair.h"
 
 #include <gtest/gtest.h>
@@ -20,7 +17,6 @@ constexpr std::array kRoundTrips = {0, 10, 50, 200, 600};  // ms
 
 constexpr AolPlus<1, 3>::Parts kCapped{.energy_cap = AolPlus<1, 3>::EnergyCap{}};
 
-/// Half cosine from 0 to `far` within 0.5 s.
 double ramp(double t, double far) {
   if (t <= 0) return 0;
   return t >= 0.5 ? far : far * (1 - std::cos(2 * kPi * t)) / 2;

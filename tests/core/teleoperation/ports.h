@@ -91,7 +91,6 @@ class Port {
 
   static LocalTime at(int now) { return LocalTime(std::chrono::seconds(100) + std::chrono::milliseconds(now)); }
 
-  /// One period after the reception of messages, without the network.
   PortState step(int now) {
     const double length = setup.every * 1e-3;
     const Duration held = setup.every * std::chrono::milliseconds(1);
@@ -178,7 +177,7 @@ class Ports {
     run(ticks, [](int) {});
   }
 
-  /// Runs until a new engagement is live. Returns false after one second.
+  /// Returns false after one second without a new live engagement.
   bool engage() {
     run(50);
     if (!leader.coupling->engage()) return false;

@@ -1,7 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// Tests one end of a position–position coupling: the force, the estimate of the round trip, and invalid input. See
-// pair_test.cc for tests with two of them.
 #include "core/teleoperation/methods/position_position.h"
 
 #include <gtest/gtest.h>
@@ -47,7 +44,7 @@ TEST(PositionPosition, BeforeTheFirstMessageThereIsOnlyDamping) {
   EXPECT_EQ(end.command(Vec3(1, 2, 3), Vec3(0.1, 0, 0)).force, Vec3(-0.4, 0, 0));
 }
 
-/// The peer answers immediately to the message sent `delay` periods ago.
+/// The peer answers at once to the message of `delay` periods ago.
 void talk(PositionPosition<3>& end, int delay, int periods) {
   static constexpr int kOffset = 1'000'000;  // the peer uses a different clock
   for (int n = 0; n < periods; ++n) {
@@ -152,7 +149,7 @@ TEST(PositionPosition, AnEndThatStartsAnewIsHeardAndItsFormerMessagesAreNot) {
   EXPECT_DOUBLE_EQ(end.command(Vec3::Zero(), Vec3::Zero()).force.x(), 4) << "the round trip begins anew, too";
   end.receive({.epoch = 1, .sequence = 5'000'000, .position = Vec3(0.05, 0, 0)});
   EXPECT_DOUBLE_EQ(end.command(Vec3::Zero(), Vec3::Zero()).force.x(), 4);
-  // This answers a different epoch of ours, so it does not contain a measurement of the round trip.
+  // Answers a different epoch of ours, so it does not measure the round trip.
   end.receive({.epoch = 2, .sequence = 2, .answers_epoch = 9, .answers = 1, .position = Vec3(0.02, 0, 0)});
   EXPECT_DOUBLE_EQ(end.command(Vec3::Zero(), Vec3::Zero()).force.x(), 8);
   EXPECT_EQ(end.round_trip(), Duration::zero());

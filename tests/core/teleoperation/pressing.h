@@ -35,7 +35,7 @@ struct Pressing {
   bool adapts = true;
 };
 
-inline constexpr int kPressMs = 4000;  // ms of contact, and of the pause that follows
+inline constexpr int kPressMs = 4000;  // ms, for the contact and the following pause
 
 inline Ports press(const Pressing& with) {
   PortSetup leader = port_of(PortRole::kLeader);

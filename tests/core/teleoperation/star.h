@@ -16,7 +16,7 @@
 
 namespace tendon {
 
-/// A device in a star. It has a complete haptic controller and three bodies, one for each axis.
+/// A complete haptic controller and three bodies, one for each axis.
 class Node {
  public:
   Node(const PortSetup& with, const std::vector<CoupledLeader>& leaders, std::uint64_t epoch)
@@ -88,7 +88,7 @@ class Node {
   bool began_ = false;
 };
 
-/// A follower and its leaders. Each leader has a different bad network. The virtual time has ticks of 1 ms.
+/// Each leader has a different bad network. Virtual time with ticks of 1 ms.
 class Star {
  public:
   struct Leader {
@@ -136,7 +136,7 @@ class Star {
     run(ticks, [](int) {});
   }
 
-  /// Runs until a new engagement of that leader is live. Returns false after one second.
+  /// Returns false after one second without a new live engagement.
   bool engage(std::size_t which) {
     run(50);
     if (!leaders[which].coupling().engage()) return false;

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// Tests that the spring does not generate energy on closed paths in SO(3), that the torque is the same at both ends and
-// has no steps, and that a pair with one account for force and torque is passive.
+// No energy on closed paths in SO(3), equal torques without steps at both ends, and a passive pair with one account for
+// force and torque.
 #include "core/teleoperation/handle/turn_coupling.h"
 
 #include <gtest/gtest.h>
@@ -67,8 +66,7 @@ TEST(TurnCoupling, DoesNotJumpWhereTheQuaternionChangesItsSign) {
   }
 }
 
-/// Returns the energy (J) that the spring generates on the single-axis rotation from `from` to `to`: Simpson's rule in
-/// steps of 1 mrad.
+/// J, on the single-axis rotation from `from` to `to`: Simpson's rule in steps of 1 mrad.
 double given_out(Spring& spring, const Quat& from, const Quat& to) {
   const Vec3 turn = turn_between(from, to);
   const int steps = 1 + static_cast<int>(turn.norm() / 1e-3);
@@ -282,7 +280,6 @@ TEST(WholeHandles, NoPairAndNoAccountGivesOutEnergy) {
       end->coupling.method = kMethods[seed % 4];
       end->coupling.turn->stiffness = turn;
       end->coupling.grip->stiffness = grip;
-      // Stiffness above the quiet limit.
       end->coupling.spring.adapt_to_delay = seed % 3 != 0;
       end->limiter.law = seed % 5 == 0 ? Law::kAol : Law::kAolPlus;
       end->flips = seed % 2 == 0;

@@ -25,7 +25,7 @@ struct Channel {
   double drift = 0;  // m, difference between the positions of tool and leader when both are at rest in free space
 };
 
-// The leader follows a prescribed motion. The massless tool presses against a spring of 400 N/m.
+// Prescribed motion. The massless tool presses against a spring of 400 N/m.
 Channel run(bool on, const Network& network, double drift_rate) {
   constexpr int kPeriods = 22000;
   PassivityLeader<1> leader({.max_damping = 1e9, .period = kPeriod});
@@ -128,8 +128,7 @@ TEST(TwoChannelPassivity, IsPassiveForEveryMotionAndEveryForce) {
   }
 }
 
-// The spring of the controller (1000 N/m) acts on a tool that does not move. Returns the minimum of the energy of both
-// ends in J.
+// A spring of the controller (1000 N/m) acts on a resting tool. Returns the minimum energy of both ends (J).
 double least_with_a_spring(double booked_stiffness, double drift_rate) {
   constexpr double kStiffness = 1000;
   PassivityLeader<1> leader({.max_damping = 1e9, .period = kPeriod});

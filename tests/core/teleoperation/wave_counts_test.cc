@@ -49,8 +49,7 @@ double held(double count, std::optional<Preset> preset) {
   return sum / 1000;
 }
 
-// This failed when each end sent the displacement in whole counts: the energy of such waves emptied the account, and
-// the force was 0.00 N.
+// Regression: displacements sent in whole counts emptied the account, and the force was 0.00 N.
 TEST(WavesOnCounts, ALightDeviceFeelsTheWall) {
   for (const std::optional<Preset> preset : {kBare, std::optional(Preset::kFeel)}) {
     const double exact = held(0, preset);

@@ -13,8 +13,7 @@
 
 namespace tendon {
 
-/// Two devices with a wave line between them. The virtual time has periods of 1 ms. The positions are exact, and there
-/// is no limiter.
+/// Two devices with a wave line between them, periods of 1 ms, exact positions, and no limiter.
 class WavePair {
  public:
   struct Config {
@@ -95,7 +94,7 @@ class WavePair {
   int now_ = 0;
 };
 
-/// Target of a hand that presses twice, m: 30 mm deep for `hold` s, from 1 s and from hold + 6 s on.
+/// Hand's target, m: 30 mm deep for `hold` s, from 1 s and from hold + 6 s on.
 inline double two_presses(double t, double hold) {
   const auto ramp = [t](double from) { return std::clamp((t - from) / 0.3, 0.0, 1.0); };
   return 0.03 * (ramp(0.7) - ramp(1 + hold) + ramp(5.7 + hold));
@@ -108,8 +107,7 @@ struct Presses {
   double least_sum = 0;          ///< J
 };
 
-/// A hand of `hand` N/m presses against a wall of `wall` N/m at 10 mm. A line with a round trip of 600 ms needs a
-/// minute to settle.
+/// `hand` and `wall` in N/m, the wall at 10 mm. A round trip of 600 ms needs a minute to settle.
 inline Presses press(WavePair::Config config, double hand = 400, double wall = 500, double hold = 9) {
   config.hand = {.stiffness = hand, .damping = 2, .reference = [hold](double t) { return two_presses(t, hold); }};
   config.tool = {.stiffness = wall, .reference = [](double) { return 0.01; }, .wall = true};

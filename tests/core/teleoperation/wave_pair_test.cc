@@ -68,7 +68,7 @@ TEST(WavePair, HoldsItThroughJitterLossAndReordering) {
   }
 }
 
-// The hand holds still. Bursts delay the line and so soften it, and the force recovers within a second.
+// The hand holds still. Bursts delay the line and soften it; the force recovers within a second.
 TEST(WavePair, BurstsSoftenItAsTheirDelaySaysAndLeaveNothingBehind) {
   for (const int burst : {10, 30, 60, 100}) {
     for (const bool both : {true, false}) {
@@ -89,7 +89,6 @@ TEST(WavePair, BurstsSoftenItAsTheirDelaySaysAndLeaveNothingBehind) {
       pair.run(9.2, [&](double t) {
         if (t >= 3 && t < 4) before -= pair.leader.force / 1000;
         if (t >= 5 && t < 7) during -= pair.leader.force / 2000;
-        // The line needs one more second after bursts above 60 ms.
         if (std::abs(t - (burst > 60 ? 9 : 8)) < 0.1) after -= pair.leader.force / 200;
       });
       std::cout << burst << (both ? " ms both ways: " : " ms one way: ") << before << ", " << during << ", " << after

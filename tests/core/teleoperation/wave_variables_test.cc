@@ -25,7 +25,7 @@ struct Channel {
   double least_account = 0;  // J, either end
 };
 
-// Moves both ends at random. The applied force is between zero and the demanded force.
+// The applied force is between zero and the demanded force.
 template <int N>
 Channel run(double impedance, const Network& network, Duration smoothing, bool clipped) {
   WavePort<N> leader({.impedance = impedance, .period = kPeriod, .smoothing = smoothing});
@@ -132,8 +132,7 @@ TEST(WaveVariables, SendsNothingWhileItsAccountIsShort) {
   const auto paid_back = port.observe({Vec<1>(-2), Vec<1>(1e-3), kPeriod});
   EXPECT_NEAR(port.energy(), 0, 1e-15);
   EXPECT_NEAR(paid_back.energy, 1e-3, 1e-15);
-  // Two waves (B Δx − T F)/√(2B) of 0.5 mm √(N·s/m) and 2 mm √(N·s/m) were due. Waves that the device does not use pay
-  // for the rest.
+  // Two waves (B Δx − T F)/√(2B) of 0.5 mm √(N·s/m) and 2 mm √(N·s/m) were due. Unused waves pay for the rest.
   for (std::uint64_t i = 1; i <= 4000; ++i) {
     const auto n = static_cast<double>(i);
     port.receive({i, i * 1ms, Vec<1>(1e-3 * n), 0.5e-3 * n});
@@ -312,8 +311,6 @@ TEST(WaveVariables, SayWhatIsWrongWithTheirConfiguration) {
   EXPECT_THROW(WavePort<1>({.impedance = 1, .period = kPeriod, .smoothing = 0ms}), std::invalid_argument);
   EXPECT_THROW(WavePort<1>({.impedance = 1, .period = kPeriod, .max_playout = -1ms}), std::invalid_argument);
 }
-
-// ---- when to play ------------------------------------------------------------------------------------------------
 
 TEST(PlayoutClock, PlaysAsLateAsOneInAHundredComes) {
   PlayoutClock clock(60ms);

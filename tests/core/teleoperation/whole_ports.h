@@ -15,7 +15,6 @@
 
 namespace tendon {
 
-/// A handle with motors for translation along x, for rotation, and for a gripper.
 struct WholeSetup {
   Coupling::Config coupling{};
   Surroundings along_x{};
@@ -206,7 +205,7 @@ class WholePorts {
     run(ticks, [] {});
   }
 
-  /// Runs until there is a new engagement that is live at both ends. Returns false if this takes more than two seconds.
+  /// Returns false if there is no new engagement after two seconds.
   bool engage() {
     for (int i = 0; i < 1000 && !leader.coupling().engage(); ++i) run(1);
     for (int i = 0; i < 2000 && !(leader.coupling().live() && follower.coupling().live()); ++i) run(1);

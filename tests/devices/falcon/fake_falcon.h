@@ -16,8 +16,8 @@
 
 namespace tendon {
 
-/// A model of a Falcon and its cable, with the FTDI chip, the boot loader, the firmware, the encoders and the motors.
-/// It implements what is known about the protocol, and it does not share any code with the driver.
+/// Models the cable, the FTDI chip, the boot loader, the firmware, the encoders and the motors from what is known about
+/// the protocol, without any code of the driver.
 class FakeFalcon final : public UsbModel {
  public:
   struct Options {
@@ -26,8 +26,7 @@ class FakeFalcon final : public UsbModel {
     std::size_t firmware_bytes = 8192;   ///< the image starts after this many bytes
     bool answers_greeting_late = false;  ///< with the leading 00 seen on some machines
     bool knows_flush_character = true;
-    /// The cable only powers the chip. With a separate supply, the firmware and the home position are not lost if it is
-    /// unplugged.
+    /// Firmware and home position outlive the cable, which then only powers the chip.
     bool own_supply = false;
     Duration thinking = std::chrono::microseconds(50);
   };
@@ -37,9 +36,9 @@ class FakeFalcon final : public UsbModel {
     kSilent,         ///< executes commands but sends nothing
     kDropsSome,      ///< loses one reply in three
     kGarblesSome,    ///< corrupts a byte of one reply in three
-    kGarblesAll,     ///< every reply has an invalid nibble
+    kGarblesAll,     ///< sends an invalid nibble in each reply
     kCutsAll,        ///< every reply is truncated
-    kSplits,         ///< every reply is sent in two IN packets
+    kSplits,         ///< sends each reply in two IN packets
     kBabbles,        ///< adds unsolicited bytes between the replies
     kBabblesOnly,    ///< sends only unsolicited bytes
     kJumps,          ///< the encoders lose count
@@ -55,27 +54,22 @@ class FakeFalcon final : public UsbModel {
 
   explicit FakeFalcon(const Options& options);
 
-  // Host side of the cable.
   bool plugged() const { return plugged_; }
   int times_plugged() const { return times_plugged_; }
   std::span<const std::uint8_t> descriptors() const override;
   bool request(LocalTime now, std::uint8_t request, std::uint16_t value) override;
   bool write(LocalTime now, std::span<const std::uint8_t> bytes) override;
   LocalTime next_in() const override;
-  /// Returns the status bytes and up to 62 data bytes.
   std::vector<std::uint8_t> take_in(LocalTime now) override;
 
-  // User side.
   void plug() override { plugged_ = true, ++times_plugged_; }
   void unplug() override;
   void move_to(const Vec3& position) { position_ = position; }  ///< m, device frame
-  /// Moves the grip all the way out and in. This is what a user does to home the device. It has no effect unless it was
-  /// requested by the host.
+  /// Moves the grip all the way out and in, as a user does to home it. No effect unless requested by the host.
   void pull_through();
   void press(std::uint8_t buttons) { buttons_ = buttons; }
   void set_fault(Fault fault);
 
-  // Observations.
   bool running() const { return mode_ == Mode::kRunning; }
   bool homed() const { return homed_ == 7; }
   const std::array<std::int16_t, 3>& torque() const { return torque_; }

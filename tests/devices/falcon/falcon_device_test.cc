@@ -163,8 +163,7 @@ TEST(FalconDevice, ButtonsComeWithThePosition) {
   EXPECT_EQ(bench.sample->buttons, 5U);
 }
 
-// The event character makes the chip send each complete reply, so every period has one. Without it the latency timer of
-// 1 ms may delay every second reply.
+// The event character makes the chip send each complete reply; the latency timer of 1 ms may delay every second one.
 TEST(FalconDevice, EveryPeriodOfAMillisecondHasItsSample) {
   for (const bool flush : {true, false}) {
     Bench bench({.has_firmware = true, .is_homed = true, .knows_flush_character = flush});
@@ -247,7 +246,7 @@ TEST(FalconDevice, AfterTheCableWasOutItTakesEveryStepAgain) {
     bench.falcon.plug();
     EXPECT_TRUE(bench.reaches(State::kOpening, 100ms, kForce));
     if (own_supply) {
-      // The Falcon still pushes, because commands could not reach it while unplugged. The first command ends the force.
+      // The Falcon still pushes because it has not received a command. The force is set to zero by the first command.
       while (bench.falcon.commands() == before) bench.step(kForce);
       EXPECT_FALSE(bench.falcon.pushes());
     } else {
@@ -299,7 +298,7 @@ TEST(FalconDevice, AMomentaryEncoderJumpCostsOnlySamples) {
   EXPECT_TRUE(bench.falcon.pushes());
 }
 
-// The Falcon reports that it is homed although its origin has moved. Positions would be wrong.
+// Although its origin has moved. Positions would be wrong.
 TEST(FalconDevice, AMovedOriginIsNotBelievedUntilHomedAnew) {
   for (const bool with_firmware : {false, true}) {
     Bench bench({.has_firmware = true, .is_homed = true, .firmware_bytes = 4096, .own_supply = true},
@@ -336,8 +335,6 @@ TEST(FalconDevice, ASafeDeviceIsHomedAndArmedAgainAfterAReplug) {
   expect_homing_and_arming_after_a_replug(
       bench, bench.falcon, [&] { bench.falcon.pull_through(); }, [](LocalTime) {});
 }
-
-// --- Every fault at every state --------------------------------------------------------------------------------------
 
 enum class Place { kOpening, kReset, kGreeting, kSending, kUnhomed, kHomed, kPushing };
 constexpr std::array kPlaces = {Place::kOpening, Place::kReset, Place::kGreeting, Place::kSending,

@@ -113,7 +113,7 @@ TEST(FalconFirmware, TheGreetingIsRepeatedUntilSomebodyAnswers) {
   Load load(kEmpty);
   load.falcon.set_fault(FakeFalcon::Fault::kSilent);
   EXPECT_EQ(load.run(1000), FirmwareLoader::Progress::kBusy);
-  load.falcon.plug();  // the loader waits for a greeting, as it does after power-on
+  load.falcon.plug();  // the loader waits for a greeting after power-on
   load.falcon.set_fault(FakeFalcon::Fault::kLosesFirmware);
   load.falcon.set_fault(FakeFalcon::Fault::kNone);
   EXPECT_EQ(load.run(2000), FirmwareLoader::Progress::kDone);

@@ -71,8 +71,8 @@ TEST(FalconKinematics, TheJacobianIsTheDerivativeOfTheAngles) {
   EXPECT_LE(worst, 1e-8);  // rad/m, of about 20
 }
 
-// The z column of the public driver has sin² θ₂ instead of sin θ₂ sin θ₃. Within the ball of 50 mm, it is between 60
-// and 94 % of the true value. A force along z has a lateral error of one third or more.
+// It has sin² θ₂ instead of sin θ₂ sin θ₃: 60 to 94 % of the true value within the ball of 50 mm, so a force along z
+// has a lateral error of one third or more.
 TEST(FalconKinematics, TheZColumnOfThePublicDriverIsTooSmallByUpTo40Percent) {
   Dice dice(5);
   double least = 1;

@@ -95,8 +95,6 @@ TEST(FalconPacket, RepliesComeThroughHoweverTheyAreCutIntoPieces) {
   EXPECT_EQ(parser.left_out(), 0U);
 }
 
-// Lost, corrupted and added bytes may cost only the replies that they hit. All complete replies must be found in order,
-// and no other.
 TEST(FalconPacket, EveryWholeReplyIsFoundAmongAnyOtherBytes) {
   Dice dice(2);
   for (int round = 0; round < 200; ++round) {
@@ -107,8 +105,7 @@ TEST(FalconPacket, EveryWholeReplyIsFoundAmongAnyOtherBytes) {
       auto packet = packet_of(static_cast<std::int16_t>(dice.bits()));
       if (dice.chance(0.3)) {
         for (std::uint64_t n = dice.bits() % 40; n > 0; --n) {
-          // The noise often contains bytes of frames. It must not contain '<', because a packet could start there and
-          // end with the next one.
+          // Often bytes of frames, but not '<', because a packet could start there and end with the next one.
           const auto noise = static_cast<std::uint8_t>(dice.chance(0.3) ? '>' : dice.bits());
           if (noise != '<') stream.push_back(noise);
         }

@@ -7,8 +7,8 @@
 
 #include "core/base/motion.h"
 
-/// Published geometry of the Falcon: half-angle form of Stamper's thesis and the Jacobian of libnifalcon with its wrong
-/// z column. This derivation is independent of devices/falcon/kinematics.cc.
+/// Half-angle form of Stamper's thesis and the Jacobian of libnifalcon with its wrong z column, independently of
+/// devices/falcon/kinematics.cc.
 namespace tendon::published {
 
 struct Leg {

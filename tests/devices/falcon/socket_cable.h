@@ -12,9 +12,8 @@
 #include "devices/usb/pipe.h"
 #include "tests/devices/falcon/fake_falcon.h"
 
-/// Cable between a driver and a FakeFalcon in different processes: a pair of SOCK_SEQPACKET sockets. A message of the
-/// driver is either the endpoint number and the data of an OUT transfer, or 0 and a vendor request. A message of the
-/// Falcon is the data of an IN transfer.
+/// A pair of SOCK_SEQPACKET sockets between processes. The driver sends the endpoint number and the data of an OUT
+/// transfer, or 0 and a vendor request; the Falcon the data of an IN transfer.
 namespace tendon::socket_cable {
 
 inline constexpr std::uint8_t kRequest = 0;
@@ -52,7 +51,6 @@ class Plug {
  public:
   Plug(FakeFalcon& falcon, int end) : falcon_(falcon), end_(end) {}
 
-  /// Handles the messages that have been received. Returns false if the other end is closed.
   bool turn(LocalTime now) {
     std::array<std::uint8_t, 128> message;
     for (;;) {
@@ -78,7 +76,6 @@ class Plug {
 
   /// Endpoint number and data of the last OUT transfer.
   const std::vector<std::uint8_t>& last() const { return last_; }
-  /// The number of bytes in all IN transfers.
   std::uint64_t said() const { return said_; }
 
  private:

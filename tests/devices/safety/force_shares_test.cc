@@ -201,7 +201,7 @@ TEST(Workspace, HasNoStepsAnywhere) {
       const double share = workspace.share(asked, at);
       ASSERT_GE(share, 0);
       ASSERT_LE(share, 1);
-      // Depth relative to the margin of 10 mm, and the outward direction, which varies most near the edge.
+      // Relative to the margin of 10 mm, and the outward direction, which varies most near the edge.
       ASSERT_NEAR(workspace.share(asked, moved), share, 1e-4);
     }
   }

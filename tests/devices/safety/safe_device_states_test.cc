@@ -19,8 +19,6 @@ namespace {
 using namespace std::chrono_literals;
 using By = SafeDevice::Arming::By;
 
-// --- Every fault in every state ----------------------------------------------------------------------------
-
 constexpr Duration kRamp = 10ms;
 
 SafeDevice::Config everything() {
@@ -167,7 +165,7 @@ TEST(SafeDevice, EveryFaultInEveryStateEndsInZeroForce) {
       trouble.cause(rig);
       rig.steps(static_cast<int>(kRamp / 1ms), kPush);
       const SafeDevice::Status after = rig.safe.status();
-      for (int i = 0; i < 1200; ++i) {  // a request to arm expires before this
+      for (int i = 0; i < 1200; ++i) {  // requests to arm expire before this time
         ASSERT_EQ(rig.step(kPush), Vec3::Zero());
         ASSERT_EQ(rig.puppet.told, Vec3::Zero());
       }
@@ -188,8 +186,6 @@ TEST(SafeDevice, EveryFaultInEveryStateEndsInZeroForce) {
   }
   EXPECT_EQ(latched.size(), 9U);
 }
-
-// --- The operator disarms ----------------------------------------------------------------------------------
 
 TEST(SafeDevice, DisarmedInAnyStateItGivesNoForceUntilTheOperatorArms) {
   for (const Situation& situation : kSituations) {
@@ -242,8 +238,6 @@ TEST(SafeDevice, WhatIsToBeArmedAtTheStartIsNotWhenDisarmedBefore) {
   rig.step();
   EXPECT_EQ(rig.state(), SafetyState::kArmed);
 }
-
-// --- Any sequence ------------------------------------------------------------------------------------------
 
 struct Seen {
   int armed_steps = 0;
@@ -310,7 +304,6 @@ void live(std::uint64_t seed, Seen& seen) {
       ASSERT_EQ(applied, Vec3::Zero());
       continue;
     }
-    // The applied force must have the same direction and no larger component.
     for (int axis = 0; axis < 3; ++axis) {
       ASSERT_LE(std::abs(applied[axis]), std::abs(asked[axis]));
       ASSERT_GE(applied[axis] * asked[axis], 0);

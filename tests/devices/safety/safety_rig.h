@@ -66,7 +66,6 @@ struct Rig {
     for (int i = 0; i < count; ++i) last = step(asked);
     return last;
   }
-  /// Performs the complete arming sequence of the operator.
   void arm() {
     steps(60);
     safe.arm();

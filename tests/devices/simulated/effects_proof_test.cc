@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// Effects that a scene does not list must cost nothing. Callgrind counts the instructions of each read and apply for a
-// device in a hand without effects, and for a build without the effects (see CMakeLists.txt).
+// Effects that a scene does not list must cost nothing: callgrind instructions of each read and apply in a hand without
+// effects, and in a build without the effects (see CMakeLists.txt).
 #include <gtest/gtest.h>
 
 #include <iomanip>

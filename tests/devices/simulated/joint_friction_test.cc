@@ -37,7 +37,7 @@ Vec3 way_of(const Mechanism::Kind& kind, const Vec3& at, Eigen::Index joint) {
 }
 
 TEST(JointFriction, OfOneTurningJointIsItsTorqueOverItsLever) {
-  // Forces along the motion of one joint, just below and just above the static friction of that joint.
+  // Just below and just above the static friction of that joint.
   const Vec3 torques(0.02, 0.03, 0.04);
   for (const Mechanism::Kind& kind : all_kinds()) {
     double least = std::numeric_limits<double>::infinity();
@@ -64,7 +64,6 @@ TEST(JointFriction, OfOneTurningJointIsItsTorqueOverItsLever) {
 }
 
 TEST(JointFriction, AStuckJointLetsTheHandleGiveWayAside) {
-  // A force that exceeds only the friction of the first joint must not move the other two.
   for (const Mechanism::Kind& kind : all_kinds()) {
     auto config = rubbing(kind, Vec3(1e-4, 1, 1));
     Bench bench(config);
@@ -79,8 +78,8 @@ TEST(JointFriction, AStuckJointLetsTheHandleGiveWayAside) {
 }
 
 TEST(JointFriction, BrakesAHandleThatTurnsOneJointAsTheClosedFormSays) {
-  // Force along the motion of a joint over a distance so short that J is constant: m a = −Jᵀτ. The resting joints carry
-  // the lateral part, and along the motion a = τ / (m ‖way‖).
+  // A distance so short that J is constant: m a = −Jᵀτ. The resting joints carry the lateral part, and along the motion
+  // a = τ / (m ‖way‖).
   const Vec3 torques(0.02, 0.02, 0.02);
   for (const Mechanism::Kind& kind : all_kinds()) {
     for (Eigen::Index joint = 0; joint < 3; ++joint) {
@@ -103,9 +102,8 @@ TEST(JointFriction, BrakesAHandleThatTurnsOneJointAsTheClosedFormSays) {
 }
 
 TEST(JointFriction, TurnsRoundWithoutAPauseUnderAForceThatItCannotHold) {
-  // Force and friction stop the joint, then the force minus friction reverses it, along the motion of one joint.
-  // Friction may have the wrong sign for the rest of the 50 µs substep of the reversal. A pause of that length would
-  // cost 2.5 mm/s.
+  // Friction stops the joint, then the force reverses it. Friction may have the wrong sign for the rest of the 50 µs
+  // substep of the reversal; a pause of that length would cost 2.5 mm/s.
   const Vec3 torques(0.02, 0.02, 0.02);
   for (const Mechanism::Kind& kind : all_kinds()) {
     for (Eigen::Index joint = 0; joint < 3; ++joint) {
@@ -143,8 +141,8 @@ TEST(JointFriction, ViscousInTheJointsLetsASpeedFallAsTheExponential) {
 }
 
 TEST(JointFriction, ItsLawHoldsExactlyWithTheMeanVelocityOfEachSubstep) {
-  // The change of momentum is equal to the impulse of the hand and the motors minus friction, so τ = J⁻ᵀ (momentum −
-  // resistance v̄) / (h/2). It must be at its maximum and opposite to q̇, or q̇ must be zero.
+  // The change of momentum is the impulse of hand and motors minus friction: τ = J⁻ᵀ (momentum − resistance v̄) /
+  // (h/2). It must be at its maximum and opposite to q̇, or q̇ must be zero.
   for (const Mechanism::Kind& kind : all_kinds()) {
     Dice dice(5);
     int stood = 0;

@@ -1,11 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// Simulated device in a hand whose instructions effects_proof_test.cc counts.
-//
-//     device-proof none     without optional effects
-//     device-proof each     with one additional effect at a time
-//
-// Prints the name of each effect on one line. Callgrind counts within `live_in_turn` and writes a file at each return.
+// For effects_proof_test.cc: device-proof none, without optional effects; device-proof each, with one at a time. Prints
+// the name of each effect. Callgrind counts within `live_in_turn` and writes a file at each return.
 #include <iostream>
 #include <string_view>
 
@@ -28,7 +23,7 @@ SimulatedDevice::Config bare() {
 
 }  // namespace
 
-/// Callgrind finds this function by its name, so it must be neither inlined nor mangled.
+/// Neither inlined nor mangled, for callgrind.
 extern "C" [[gnu::noinline]] void live_in_turn(SimulatedDevice& device, int from, int to) {
   for (int i = from; i < to; ++i) {
     const auto sample = device.read(LocalTime(std::chrono::milliseconds(i)));

@@ -143,8 +143,7 @@ TEST(Recorded, IsHeldAtTheEndOrPlayedAgainFromTheStart) {
 }
 
 TEST(Recorded, FollowsASmoothMotionThatWasSampledWell) {
-  // Slopes have a second-order error away from extrema and a first-order error at them: 0.2 % for a 1 Hz sine at 100
-  // Hz.
+  // Second-order error of slopes away from extrema, first-order at them: 0.2 % for a 1 Hz sine at 100 Hz.
   Recorded recorded;
   for (int i = 0; i <= 200; ++i) {
     recorded.samples.push_back({0.01 * i, std::sin(2 * std::numbers::pi * 0.01 * i)});

@@ -17,8 +17,8 @@ Vec3 motor_side(const SimulatedDevice::Truth& truth) { return truth.position + t
 
 double stored(const SimulatedDevice::Truth& truth) { return truth.kinetic_energy + truth.spring_energy; }
 
-/// Sum (5) of Lee and Lee (2009) with f = −(force on the hand), implemented independently of the ledger:
-///     E = Σ −F·dx + f_c |dx| + b |dx|²/T
+/// Sum (5) of Lee and Lee (2009) with f = −(force on the hand), independent of the ledger: E = Σ −F·dx + f_c |dx| + b
+/// |dx|²/T
 struct Equation5 {
   double b;
   double f_c;
@@ -128,7 +128,7 @@ TEST(SimulatedDeviceEnergy, HandAndWallsNeverDoLessWorkThanEquation5Demands) {
 }
 
 TEST(SimulatedDeviceEnergy, NothingIsLostWhereNothingRubs) {
-  // Without friction the balance is exact, including a hand with mass and a stiff grip.
+  // Exact without friction, including a hand with mass and a stiff grip.
   SimulatedDevice::Config config;
   config.mass = 0.075;
   config.start_velocity = {0.1, -0.2, 0.3};

@@ -11,8 +11,8 @@
 #include "devices/simulated/simulated_device.h"
 #include "tests/devices/device_bench.h"
 
-/// Known stability boundaries of a real device with a sampled spring. With different boundaries, experiments on a
-/// limiter would only test the simulator.
+/// Known stability boundaries of a real device with a sampled spring. With others, experiments on a limiter would only
+/// test the simulator.
 
 namespace tendon::simulated_device_stability_test {
 namespace {
@@ -26,8 +26,8 @@ SimulatedDevice::Config device(double m, double b) {
   return config;
 }
 
-/// The stability limit of a spring that is sampled and held for T. There is a mass with viscous friction but no hand.
-/// This is Jury's criterion for the exact discretization:
+/// Returns the stability limit of a spring that is sampled and held for T, for a mass with viscous friction and without
+/// a hand. This is Jury's criterion for the exact discretization:
 ///     K_max = b (1 − δ) / (m (1 − δ)/b − T δ),  δ = e^(−bT/m);   about 2b/T (1 + bT/(6m))
 double exact_k_max(double m, double b, double t) {
   const double delta = std::exp(-b * t / m);
@@ -64,8 +64,8 @@ TEST(SampledSpring, LosesStabilityAtTheStiffnessOfTheClosedForm) {
   }
 }
 
-/// Returns the largest speed in the last half second of 3 s, on a spring whose rest position lies on the edge between
-/// two counts (worst case). f_c = 0.05 N and a count of 0.2 mm: 2 f_c/Δ = 500 N/m.
+/// In the last half second of 3 s, with the spring's rest position on the edge between two counts (worst case). f_c =
+/// 0.05 N and a count of 0.2 mm: 2 f_c/Δ = 500 N/m.
 double late_speed_on_a_count_edge(double stiffness) {
   const double step = 2e-4;
   auto config = device(0.075, 2);
@@ -97,8 +97,7 @@ TEST(QuantisedSpring, KeepsALimitCycleAboveThatThatGrowsWithTheStiffness) {
 }
 
 TEST(SampledSpring, BeyondTheViscousBoundOnlySlowMotionIsStable) {
-  // v_lim = (4/π) f_c/(K T/2 − b), with the describing function of the friction: Diolaiti et al., IEEE T-RO 22(2),
-  // 2006.
+  // v_lim = (4/π) f_c/(K T/2 − b), by the describing function of friction: Diolaiti et al., IEEE T-RO 22(2), 2006.
   const double b = 0.05;
   const double f_c = 0.05;
   const double stiffness = 1000;

@@ -34,8 +34,6 @@ OperatorHand::Config waving_hand(const Vec3& direction = Vec3::UnitX()) {
           .motion = ScriptedMotion(ScriptedMotion::Sine{.amplitude = 0.02, .frequency = 1.5, .direction = direction})};
 }
 
-// ---- time ------------------------------------------------------------------------------------------------------
-
 TEST(SimulatedDevice, TheFirstReadOnlySetsTheInstantZero) {
   auto config = bare();
   config.start_velocity = {1, 0, 0};
@@ -106,8 +104,6 @@ TEST(SimulatedDevice, AHandThatHasLetGoPushesNoMoreAndTakesItsMassWithIt) {
   EXPECT_NEAR(often.truth().kinetic_energy, often.truth().velocity.squaredNorm() * 0.075 / 2, 1e-12);
 }
 
-// ---- viscous friction ------------------------------------------------------------------------------------------
-
 TEST(ViscousFriction, LetsTheVelocityFallAsTheExponentialOfTheClosedForm) {
   const double m = 0.075;
   const double b = 0.26;
@@ -123,8 +119,6 @@ TEST(ViscousFriction, LetsTheVelocityFallAsTheExponentialOfTheClosedForm) {
     ASSERT_LT((bench.truth().position - v0 * (m / b * (1 - left))).norm(), 1e-8);
   }
 }
-
-// ---- Coulomb friction ------------------------------------------------------------------------------------------
 
 TEST(CoulombFriction, HoldsWhatPushesWithLessInAnyDirection) {
   auto config = bare();
@@ -185,7 +179,7 @@ TEST(CoulombFriction, HoldsAgainstAForceThatBrakedTheDeviceToAStop) {
 
 TEST(CoulombFriction, TurnsRoundWithoutAPauseUnderAForceThatItCannotHold) {
   // F + f_c stops the handle, then F − f_c reverses it. Friction may have the wrong sign for the rest of the 50 µs
-  // substep of the reversal. A pause of that length would cost 3 mm/s.
+  // substep of the reversal; a pause of that length would cost 3 mm/s.
   const double m = 0.075;
   const double error = 2 * 0.04 / m * seconds(SimulatedDevice::Config{}.max_substep);
   for (const double v0 : {0.1, 0.1003, 0.1011, 0.1017, 0.1026}) {
@@ -201,7 +195,7 @@ TEST(CoulombFriction, TurnsRoundWithoutAPauseUnderAForceThatItCannotHold) {
 }
 
 TEST(CoulombFriction, OpposesTheVelocityAlongACurvedPath) {
-  // A lateral force during sliding, compared with a Runge-Kutta solution of m dv/dt = F − f_c v/|v| in steps of 1 µs.
+  // A lateral force while sliding, against Runge-Kutta for m dv/dt = F − f_c v/|v| in steps of 1 µs.
   const double m = 0.075;
   const double f_c = 0.04;
   const Vec3 force(0, 0.1, 0.05);
@@ -248,8 +242,6 @@ TEST(SimulatedDevice, DoesNotKnowWhichWayTheFrameIsTurned) {
   }
 }
 
-// ---- encoder ---------------------------------------------------------------------------------------------------
-
 TEST(Encoder, SaysTheCentreOfTheCountSoTheTruthIsWithinHalfACount) {
   const double step = 30e-6;
   auto config = bare();
@@ -279,8 +271,6 @@ TEST(Encoder, HasCountsOfOneWidthAlsoAroundTheOrigin) {
     bench.wait(100us);
   }
 }
-
-// ---- saturation ------------------------------------------------------------------------------------------------
 
 TEST(Saturation, KeepsTheDirectionAndReturnsTheForceReallyHeld) {
   auto config = bare();
@@ -328,8 +318,6 @@ TEST(SimulatedDevice, DropsTheForceItHeldWhenTheNextIsNotANumber) {
   }
 }
 
-// ---- amplifier -------------------------------------------------------------------------------------------------
-
 TEST(Amplifier, FollowsAStepAsAFirstOrderLag) {
   const double m = 0.075;
   const double tau = 1 / (2 * std::numbers::pi * 300);
@@ -346,13 +334,10 @@ TEST(Amplifier, FollowsAStepAsAFirstOrderLag) {
   }
 }
 
-// ---- watchdog --------------------------------------------------------------------------------------------------
-
 TEST(Watchdog, TakesTheForceAwayAfterExactlyItsTime) {
   auto config = bare(0.075);
   config.watchdog = 5ms;
-  // The intervals end when the watchdog does, before it, or long after it. The impulse must be force × 5 ms in each
-  // case.
+  // The intervals end when the watchdog does, before it, or long after it. The impulse is always force × 5 ms.
   for (const Duration interval : {Duration(5ms), Duration(1700us), Duration(333'333), Duration(1s)}) {
     Bench bench(config);
     bench.device().apply({0.3, -0.6, 0.6});
@@ -387,8 +372,6 @@ TEST(Watchdog, LetsTheNextForceThroughAgain) {
   EXPECT_NEAR(bench.truth().velocity.x() - before, 3e-3 / 0.075, 1e-14);
   EXPECT_FALSE(bench.truth().watchdog_fired);
 }
-
-// ---- effects that are not listed -------------------------------------------------------------------------------
 
 TEST(SimulatedDevice, WithoutAnyEffectIsNewtonsSecondLawAndNothingElse) {
   const double m = 0.075;
@@ -495,8 +478,6 @@ TEST(AllEffects, RepeatThemselvesToTheLastBit) {
     }
   }
 }
-
-// ---- configuration ---------------------------------------------------------------------------------------------
 
 TEST(SimulatedDevice, SaysWhatItCanDo) {
   auto config = bare();

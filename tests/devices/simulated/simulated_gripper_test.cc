@@ -82,7 +82,7 @@ TEST(SimulatedGripper, AHandBringsItToItsOpeningOrPressesTheStop) {
   Fingers fingers(config);
   fingers.press(0, 20'000);
   EXPECT_NEAR(fingers.gripper.sample(), 0.4, 1e-9);
-  fingers.press(1, 20'000);  // the motor opens it against the hand
+  fingers.press(1, 20'000);  // the motor pushes against the hand
   EXPECT_NEAR(fingers.gripper.sample(), 0.4 + 1 / (400 * 0.06), 1e-9);
   EXPECT_NEAR(fingers.truth().hand_force, -1, 1e-9);
 
@@ -95,8 +95,7 @@ TEST(SimulatedGripper, AHandBringsItToItsOpeningOrPressesTheStop) {
 }
 
 TEST(SimulatedGripper, WorkOfTheHandIsNeverLessThanTheLedgerDemands) {
-  // 2000 random cases at the stops and between them. The balance is exact if there is no friction and no contact with a
-  // stop.
+  // The cases are at the stops and between them. The balance is exact if there is no friction and no contact.
   double least = 1e300;
   int met = 0;
   for (std::uint64_t seed = 0; seed < 2000; ++seed) {

@@ -122,8 +122,7 @@ TEST(SimulatedRotation, AHandBringsItWhereItWantsFromAnySide) {
 }
 
 TEST(SimulatedRotation, AHandThatTurnsAboutChangingAxesIsFollowed) {
-  // Only the damper moves the handle, with the angular velocity of the script. There would be a drift if the rate of
-  // the rotation vector were used.
+  // The damper alone moves the handle, with the script's angular velocity. The rate of the rotation vector would drift.
   auto config = free_handle();
   config.inertia = 1e-7;
   const ScriptedMotion motion(
@@ -179,7 +178,7 @@ struct World {
 };
 
 TEST(SimulatedRotation, WorkOfTheHandIsNeverLessThanTheLedgerDemands) {
-  // 2000 random cases. Each interval is one substep, so turn_between gives the true rotation for every axis.
+  // Each interval is one substep, so turn_between gives the true rotation for every axis.
   double least = 1e300;
   for (std::uint64_t seed = 0; seed < 2000; ++seed) {
     Dice dice(seed);

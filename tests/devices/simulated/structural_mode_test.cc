@@ -21,7 +21,6 @@ constexpr double kMass = 0.075;
 constexpr double kHandle = 0.03;
 constexpr double kMotor = kMass - kHandle;
 
-/// Returns a free device with a resonance at `hz` and damping ratio `zeta`.
 SimulatedDevice::Config ringing(double hz, double zeta) {
   const double omega = 2 * std::numbers::pi * hz;
   const double stiffness = omega * omega / (1 / kMotor + 1 / kHandle);
@@ -31,7 +30,7 @@ SimulatedDevice::Config ringing(double hz, double zeta) {
   return config;
 }
 
-/// Deflection of a linear oscillator after a force step from rest (closed form).
+/// A linear oscillator after a force step from rest.
 double step_response(double force, double omega, double zeta, double t) {
   const double damped = omega * std::sqrt(1 - zeta * zeta);
   const double ring = std::cos(damped * t) + zeta * omega / damped * std::sin(damped * t);
@@ -96,7 +95,7 @@ TEST(StructuralMode, WithTheMotorSideHeldTheHandleRingsOnTheSpringAlone) {
 }
 
 TEST(StructuralMode, TheEncoderSeesTheMotorSideAndTheHandIsOnTheOther) {
-  // A force of 1 N acts on the handle in a hand of 500 N/m. At rest the structural spring deflects by 1 N / K.
+  // 1 N in a hand of 500 N/m. At rest the structural spring deflects by 1 N / K.
   auto config = ringing(60, 0.1);
   config.viscous_friction = 5;
   config.hand = OperatorHand::Config{.stiffness = 500,
@@ -137,7 +136,6 @@ TEST(StructuralMode, AtAStiffnessBeyondAllTheDeviceIsOneMassAgain) {
 }
 
 TEST(StructuralMode, StoresWhatItHasTakenIn) {
-  // Without friction, the energy of the motors is stored in the masses and the spring.
   auto config = ringing(80, 0);
   Bench bench(config);
   Dice dice(4);
@@ -154,9 +152,7 @@ TEST(StructuralMode, StoresWhatItHasTakenIn) {
   EXPECT_GT(most, 1e-4);
 }
 
-// ---- Stability: against the eigenvalues of the exact discretisation ------------------------------------------------
-
-/// Matrix exponential: scaled by 2⁻¹⁰, 14 terms, squared ten times.
+/// Scaled by 2⁻¹⁰, 14 terms, squared ten times.
 Eigen::MatrixXd exponential(const Eigen::MatrixXd& exponent) {
   const Eigen::MatrixXd small = exponent / 1024;
   Eigen::MatrixXd result = Eigen::MatrixXd::Identity(exponent.rows(), exponent.cols());
@@ -189,7 +185,7 @@ double spectral_radius(const SimulatedDevice::Config& config, double stiffness, 
   return period.eigenvalues().cwiseAbs().maxCoeff();
 }
 
-/// Returns the smallest value for which `radius` is at least 1.
+/// The smallest value for which `radius` is at least 1.
 double boundary(const std::function<double(double)>& radius) {
   double unstable = 1;
   while (radius(unstable) < 1) unstable *= 1.02;
@@ -201,7 +197,6 @@ double boundary(const std::function<double(double)>& radius) {
   return stable;
 }
 
-/// Returns the ratio of late to early amplitude on such a spring and damper.
 double growth(const SimulatedDevice::Config& config, double stiffness, double damping) {
   Bench bench(config);
   Vec3 before = bench.wait(0ms);
@@ -219,8 +214,7 @@ double growth(const SimulatedDevice::Config& config, double stiffness, double da
 }
 
 TEST(StructuralMode, RenderableDampingEndsWhereAnEigenvalueIsOne) {
-  // The limit is 2 m/T = 150 N·s/m without the mode and about 2 (m − m_h)/T = 90 with it. It falls as the mode
-  // approaches the sampling rate.
+  // 2 m/T = 150 N·s/m without the mode and about 2 (m − m_h)/T = 90 with it; less as it approaches the sampling rate.
   double before = 2 * kMotor / 1e-3;
   for (const double hz : {60.0, 100.0, 200.0}) {
     auto config = ringing(hz, 0.02);

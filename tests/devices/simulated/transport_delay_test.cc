@@ -25,7 +25,7 @@ SimulatedDevice::Config free_mass(std::optional<Duration> sample, std::optional<
 }
 
 TEST(TransportDelay, ASampleIsThatOfTheInstantThatItSays) {
-  // At 1 m/s the position shows when the sample was taken. The intervals are not multiples of the delay.
+  // The position shows the time of the sample. The intervals are not multiples of the delay.
   for (const Duration delay : {Duration(1ms), Duration(1'700us), Duration(333'333ns), Duration(100ms)}) {
     auto config = free_mass(delay, std::nullopt);
     config.start_velocity = {1, 0, 0};
@@ -42,8 +42,7 @@ TEST(TransportDelay, ASampleIsThatOfTheInstantThatItSays) {
 }
 
 TEST(TransportDelay, AForceActsFromItsDelayUntilTheDelayOfTheNext) {
-  // The force is 2 N for one period of 1 ms. The impulse must be 2 mN·s for every delay. The position shows when the
-  // force was applied.
+  // 2 N for 1 ms: an impulse of 2 mN·s for every delay. The position shows when the force was applied.
   for (const Duration delay : {Duration(1ns), Duration(999'999ns), Duration(300us), Duration(1ms), Duration(1'700us),
                                Duration(2ms), Duration(12'345'678ns)}) {
     Bench bench(free_mass(std::nullopt, delay));
@@ -63,7 +62,6 @@ TEST(TransportDelay, UntilTheFirstForceHasArrivedThereIsNone) {
 }
 
 TEST(TransportDelay, ALoopFeelsOnlyTheSumOfBothDelays) {
-  // The same spring. The delay is in the samples, in the forces, or in both.
   const auto seen = [](Duration sample, Duration force) {
     auto config = free_mass(sample > 0ms ? std::optional(sample) : std::nullopt,
                             force > 0ms ? std::optional(force) : std::nullopt);
@@ -136,8 +134,8 @@ TEST(TransportDelay, ShiftsASampledSpringsStabilityAsTheClosedForm) {
 }
 
 TEST(TransportDelay, EnergyIsBalancedByForcesThatHaveArrived) {
-  // A spring with a delay of two periods on a handle without friction. It generates energy, and an account of the
-  // returned forces misses the time at which they act.
+  // A spring with a delay of two periods generates energy without friction, and an account of the returned forces
+  // misses the time at which they act.
   auto config = free_mass(1ms, 1ms);
   config.start_position = Vec3(0.01, 0, 0);
   Bench bench(config);
@@ -174,8 +172,7 @@ TEST(TransportDelay, TheWatchdogCountsTheForcesThatArrive) {
 }
 
 TEST(TransportDelay, HasRoomForAllForcesOfTheFastestLoop) {
-  // The period is 100 µs, the delays are the longest ones, and each force is different. The momentum must be the sum of
-  // all forces that have arrived.
+  // The longest delays, a period of 100 µs, and a different force in each.
   Bench bench(free_mass(100ms, 100ms));
   double sum = 0;
   for (int i = 0; i < 5000; ++i) {

@@ -175,7 +175,6 @@ TEST(SpaceMouseDevice, ItNeverLeavesItsWorkspaceAndComesBackAtOnce) {
   EXPECT_LT(bench.sample->position.x(), 0.03 - 0.5 * 14e-3);
 }
 
-// Without reports the position of the cap is unknown.
 TEST(SpaceMouseDevice, APushThatNoReportConfirmsIsOver) {
   Bench bench({.speed = 0.1, .dead_band = 0, .reach = 1});
   bench.hold({350, 0, 0}, 16ms);

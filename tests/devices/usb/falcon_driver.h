@@ -21,7 +21,7 @@ bool comes_true(const Holds& holds) {
   return holds();
 }
 
-/// The driver of a Falcon. It is called at 1 kHz in real time, like the haptic thread does.
+/// Called at 1 kHz in real time, as by the haptic thread.
 struct FalconDriver {
   explicit FalconDriver(std::unique_ptr<usb::Pipe> pipe) : device({.firmware = fake_firmware(4096)}, std::move(pipe)) {}
 
@@ -46,8 +46,7 @@ struct FalconDriver {
     return turns_until([&] { return device.state() == state; }, force);
   }
 
-  /// Homes the device with `home()`, arms `safe` and requests `force` until `pushes()`. Repeats each step as needed,
-  /// because a machine that stalls loses these states.
+  /// Repeats each step as needed until `pushes()`, because a machine that stalls loses these states.
   template <class Home, class Pushes>
   bool comes_to_push(SafeDevice& safe, const Vec3& force, const Home& home, const Pushes& pushes) {
     const LocalTime end = real_now() + std::chrono::seconds(30);

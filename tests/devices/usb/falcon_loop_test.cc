@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// The haptic half of the server with a Falcon through the real libusb, in this process, so that the heap calls of a
-// step can be counted. tests/e2e/falcon_server_test.cc runs the complete server.
+// The real libusb in this process, so that the heap calls of a step can be counted. tests/e2e/falcon_server_test.cc
+// runs the complete server.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -36,8 +35,7 @@ RemoteForce answer(const DeviceState& state, std::uint64_t number, LocalTime now
 
 bool near(const Vec3& felt, const Vec3& written) { return (felt - written).norm() <= 0.1 + 0.2 * written.norm(); }
 
-// No limiter: on a machine that stalls for several periods it would rightly remove most of the wall. The expectations
-// do not depend on time.
+// No limiter: it would rightly remove most of the wall on a machine that stalls for several periods.
 TEST(FalconLoop, AWallIsFeltThroughTheRealLibraryWithoutAHeapCallInTheLoop) {
   UsbfsShim shim({.has_firmware = true, .is_homed = true});
   FalconDevice device({}, usb::open_pipe({.node = [&shim] { return shim.node(); }}));
@@ -81,7 +79,7 @@ TEST(FalconLoop, AWallIsFeltThroughTheRealLibraryWithoutAHeapCallInTheLoop) {
     if (++steps % 10 == 0) {
       if (const DeviceState* state = mail->state.take()) mail->forces[0].put(answer(*state, steps, now));
     }
-    // After two new positions in a row inside the wall, the motors must have the command of one of these two steps.
+    // Two new positions in a row are inside the wall: the motors have the command of one of these steps.
     if (x > 0.005 && seen && seen_before) {
       const Vec3 felt = shim.with([](FakeFalcon& falcon) { return falcon.force(); });
       if (!near(felt, written) && !near(felt, written_before)) ++at_odds;
@@ -91,8 +89,7 @@ TEST(FalconLoop, AWallIsFeltThroughTheRealLibraryWithoutAHeapCallInTheLoop) {
   loop.stop();
   EXPECT_EQ(heap_calls, 0U);
   EXPECT_GT(pushed, 0U);  // a sign error would pull
-  // After a step that was late, the hand is at a different position, and the levers of the motors are different. If a
-  // reply has timed out, it is used as the answer to the next request.
+  // After a late step, hand and levers have moved. A reply that has timed out answers the next request.
   EXPECT_LE(at_odds, loop.stats().overruns + loop.stats().unseen);
 }
 

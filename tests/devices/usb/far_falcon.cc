@@ -26,7 +26,6 @@ using namespace std::chrono_literals;
 
 /// The priority is higher than that of the server, because this is the hardware.
 constexpr int kPriority = kHapticPriority + 15;
-/// Period of the hand motion.
 constexpr Duration kRound = 1ms;
 
 int checked(int result, const char* what) {
@@ -39,7 +38,6 @@ void close_if_open(int& file) {
   file = -1;
 }
 
-/// Sends the descriptors that libusb reads first, and the file descriptor of the node.
 bool send_node(int to, std::span<const std::uint8_t> descriptors, int file) {
   std::vector<std::uint8_t> bytes(descriptors.begin(), descriptors.end());
   iovec part{.iov_base = bytes.data(), .iov_len = bytes.size()};
@@ -154,7 +152,6 @@ void FarFalcon::serve(Session& session, LocalTime at) {
       tcflow(session.slave, TCOON);  // NOLINT(concurrency-mt-unsafe): nobody else writes to it
     }
     if (!heard) {
-      // From here on the master end reports that the node is closed.
       close_if_open(session.cable);
       close_if_open(session.slave);
     }

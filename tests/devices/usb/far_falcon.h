@@ -24,10 +24,8 @@ namespace tendon {
 ///     tendond ── libusb ── far_usbfs (preloaded) ══ cable: a socket ══ FarFalcon, a FakeFalcon and the hand on it
 ///        └ guardian ──────── the node: a pty, of which FarFalcon has the master end ─┘
 ///
-/// Each time the node is opened, it gets a new cable and a new pty. Data that a guardian writes to its node arrives at
-/// the master end after all data that the dead process sent by cable.
-///
-/// Runs in its own thread at the highest real-time priority that the system grants, like hardware.
+/// Each opening of the node has a new cable and a new pty. What a guardian writes arrives after all data that the dead
+/// process sent by cable. Runs in its own thread at the highest real-time priority granted.
 ///
 /// Thread-safe.
 class FarFalcon {
@@ -38,7 +36,6 @@ class FarFalcon {
   FarFalcon(const FarFalcon&) = delete;
   FarFalcon& operator=(const FarFalcon&) = delete;
 
-  /// "NAME=value" entries for the process that must find it.
   std::vector<std::string> environment() const;
 
   template <class Act>
@@ -46,7 +43,7 @@ class FarFalcon {
     const std::lock_guard lock(mutex_);
     return act(falcon_);
   }
-  /// User of the device, called at least once per millisecond in the thread of FarFalcon.
+  /// Called at least once per millisecond in the thread of FarFalcon.
   void set_user(std::function<void(FakeFalcon&, LocalTime)> user);
 
   void plug();
@@ -58,7 +55,7 @@ class FarFalcon {
     std::vector<std::uint8_t> last{};  ///< newest packet: endpoint and bytes
     std::optional<LocalTime> let_go;   ///< when the motor torque last became zero
     std::uint64_t pushes_begun = 0;    ///< transitions from zero to nonzero torque
-    Duration longest_gap{};            ///< the longest time between two periods
+    Duration longest_gap{};            ///< the maximum time between two periods
   };
   Seen seen() const;
 

@@ -1,10 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// Preload library (LD_PRELOAD) for a program that uses libusb, such as an unmodified tendond. It replaces the kernel's
-// part of USB with one plugged-in Falcon, which FarFalcon simulates in another process. Device enumeration is replaced
-// as well, because test machines may have neither udev nor sysfs.
-//
-// This library has no thread: FarFalcon wakes libusb by opening the gate of the node after sending.
+// LD_PRELOAD for a program that uses libusb, such as an unmodified tendond: replaces the kernel's part of USB with one
+// plugged-in Falcon, which FarFalcon simulates in another process, and device enumeration, because test machines may
+// have neither udev nor sysfs. Has no thread: FarFalcon wakes libusb by opening the gate of the node after sending.
 #include <dlfcn.h>
 #include <fcntl.h>
 #include <libusb.h>
@@ -30,7 +27,7 @@
 namespace tendon {
 namespace {
 
-/// Name that libusb gives to a wrapped node (bus 0), consistent with USBDEVFS_CONNECTINFO.
+/// libusb's name of a wrapped node (bus 0), consistent with USBDEVFS_CONNECTINFO.
 constexpr std::string_view kNode = "/dev/bus/usb/000/007";
 
 int connect_to_falcon() {
@@ -112,7 +109,7 @@ class FarNode final : public UsbfsNode {
   bool gone_ = false;
 };
 
-/// The open node, used only by the thread of the pipe.
+/// Used only by the thread of the pipe.
 std::unique_ptr<FarNode>& the_node() {
   static std::unique_ptr<FarNode> node;
   return node;
@@ -168,7 +165,6 @@ int libusb_init(libusb_context** context) {
   return tendon::next("libusb_init", &libusb_init)(context);
 }
 
-/// The device that libusb creates for a wrapped node.
 ssize_t libusb_get_device_list(libusb_context* context, libusb_device*** list) {
   auto** const devices = static_cast<libusb_device**>(std::calloc(2, sizeof(libusb_device*)));  // libusb frees it
   *list = devices;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Models of a Falcon and a SpaceMouse plugged into the real kernel and driven through its usbfs and the real libusb.
-// deploy/test-usb-kernel runs this in an emulated machine. Measured times appear on the device pages; the tests compare
-// them with the round trip measured in the same run.
+// Models of a Falcon and a SpaceMouse in the real kernel, through its usbfs and the real libusb
+// (deploy/test-usb-kernel, in an emulated machine). Measured times appear on the device pages; the limits are relative
+// to the round trip in the same run.
 #include <fcntl.h>
 #include <gtest/gtest.h>
 #include <linux/usbdevice_fs.h>
@@ -135,7 +135,7 @@ TEST(UsbKernel, FromThePlugToTheForce) {
                                  Vec3::Zero()));
 }
 
-/// Returns the times of a packet and its reply, with a single thread and blocking calls.
+/// Returns the times of a packet and its reply for a single thread with blocking calls.
 std::vector<double> bare_round_trips_ms(const std::string& node, int count) {
   const int file = open(node.c_str(), O_RDWR | O_CLOEXEC);
   unsigned interface = 0;
@@ -144,7 +144,6 @@ std::vector<double> bare_round_trips_ms(const std::string& node, int count) {
   std::array<std::uint8_t, usb::kPacketSize> packet{};
   usbdevfs_bulktransfer out{.ep = 0x02, .len = bytes.size(), .timeout = 1000, .data = bytes.data()};
   usbdevfs_bulktransfer in{.ep = 0x81, .len = packet.size(), .timeout = 1000, .data = packet.data()};
-  // Discards replies that the driver requested and did not read.
   for (int silent = 0; silent < 20; ++silent) {
     if (ioctl(file, USBDEVFS_BULK, &in) > static_cast<int>(usb::ftdi::kStatusBytes)) silent = 0;
   }
@@ -231,7 +230,6 @@ TEST(UsbKernel, UnpluggedInMidForceIsAFaultWithoutForceAndReplugWantsArming) {
   record_quantiles("unplugged_to_absent_ms", absent_ms);
 }
 
-/// Arguments that start this program as a driver to be killed.
 constexpr const char* kDrive = "--drive-guarded";
 constexpr const char* kDriveAlone = "--drive-alone";
 
@@ -250,7 +248,7 @@ constexpr const char* kDriveAlone = "--drive-alone";
   for (;;) driver.step(kForce);
 }
 
-/// This is a Falcon that is driven by another process. It records when the force has ended.
+/// This Falcon is driven by another process.
 class Driven {
  public:
   explicit Driven(const char* how) {
@@ -266,7 +264,7 @@ class Driven {
   Driven(const Driven&) = delete;
   Driven& operator=(const Driven&) = delete;
 
-  /// Sends SIGKILL while the Falcon is pushed and returns the time, or nothing if it was never pushed.
+  /// Sends SIGKILL. Returns the time, or nothing if the Falcon was never pushed.
   std::optional<LocalTime> kill_in_mid_force() {
     int pushing = 0;
     int commands = 0;

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Real libusb with threads in real time, on a model of the kernel and a Falcon. Waits are limited to seconds, and no
-// test depends on the speed of the machine.
+// In real time, on a model of the kernel and a Falcon. No test depends on the speed of the machine.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -113,7 +112,6 @@ TEST(LibusbPipe, UnpluggedInMidTransferItIsAbsentAndComesBackWithZeroForce) {
 
 const std::vector<std::uint8_t> kPacket(16, 'A');
 
-// No layer above the pipe requests this.
 TEST(LibusbPipe, ATransferThatFailsEndsTheConnectionWhateverTheReason) {
   using enum UsbfsShim::Trouble;
   for (const auto trouble : {kOverflow, kStall, kHang}) {
@@ -248,7 +246,7 @@ double quantile(std::vector<double> values, double share) {
   return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1))];
 }
 
-// There must be a sample in nearly every period. The limit depends on how late a sleeping thread is in the same run.
+// There is a sample in nearly every period. The limit depends on the wake-up latency of this machine.
 TEST(LibusbPipe, KeepsUpWithAKilohertz) {
   UsbfsShim shim(kReady);
   Loop loop(shim);

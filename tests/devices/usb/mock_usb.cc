@@ -135,10 +135,9 @@ struct MockPort::Inside {
   Inside(const Inside&) = delete;
   Inside& operator=(const Inside&) = delete;
 
-  // umockdev represents a node as a file, on which poll() never blocks, so libusb's thread would spin. The node
-  // therefore leads to the slave end of a pseudo-terminal. Like usbfs, its output stops while no transfer can be
-  // fetched (no POLLOUT), and its master end closes on unplug (POLLERR). Reading descriptors from the node is emulated
-  // below.
+  // poll() never blocks on umockdev's file, so libusb's thread would spin. The node therefore leads to the slave end of
+  // a pseudo-terminal: its output stops while no transfer can be fetched (no POLLOUT), and its master end closes on
+  // unplug (POLLERR), as in usbfs. Reading descriptors from the node is emulated below.
   void open_node() {
     std::array<char, 64> name{};
     if (openpty(&master, &slave, name.data(), nullptr, nullptr) != 0) throw std::runtime_error("no pseudo-terminal");
@@ -225,7 +224,6 @@ struct MockPort::Inside {
     return static_cast<off_t>(position);
   }
 
-  /// Returns result and errno.
   std::pair<int, int> obey(unsigned long request, UMockdevIoctlData* argument) {
     if (!plugged && request != USBDEVFS_REAPURBNDELAY && request != USBDEVFS_DISCARDURB) return {-1, ENODEV};
     switch (request) {
@@ -243,7 +241,6 @@ struct MockPort::Inside {
       case USBDEVFS_CONTROL: {
         const Data transfer = resolve(argument, 0, sizeof(usbdevfs_ctrltransfer));
         if (as<usbdevfs_ctrltransfer>(transfer.get()).bRequest != 8) return {-1, EPIPE};
-        // libusb sends only GET_CONFIGURATION
         as<std::uint8_t>(resolve(transfer.get(), offsetof(usbdevfs_ctrltransfer, data), 1).get()) = 1;
         return {1, 0};
       }
@@ -295,7 +292,6 @@ struct MockPort::Inside {
   }
 
   static std::array<std::atomic<Inside*>, 10> all;  ///< indexed by port number
-  /// Returns the owner of a node, or null.
   static Inside* of(int file);
 
   MockUsb& usb;
@@ -393,7 +389,7 @@ int MockPort::woken_for_nothing() const {
 
 }  // namespace tendon
 
-// The program exports these functions, so libusb's calls resolve to them before the preload and the C library.
+// libusb's calls resolve to the program's exported functions before the preload and the C library.
 extern "C" {
 
 ssize_t read(int file, void* to, std::size_t size) {

@@ -10,10 +10,8 @@
 namespace tendon {
 
 /// The USB of a simulated machine. The real libusb finds the devices in the sysfs of umockdev and receives its udev
-/// events. The ioctls of the nodes end in this process. The paths of this process and of its children are redirected by
-/// umockdev-preload, which must be linked to the program.
-///
-/// There can be only one per process. It must be constructed before any other thread. It cannot be used to measure
+/// events; the ioctls of the nodes end in this process. umockdev-preload, which must be linked to the program,
+/// redirects the paths of this process and of its children. One per process, before any other thread. Not for measuring
 /// times, because each ioctl sends messages through a socket.
 class MockUsb {
  public:
@@ -48,7 +46,7 @@ class MockPort {
 
   std::string node() const;       ///< of the plugged device: "/dev/bus/usb/001/002"
   int open_transfers() const;     ///< submitted and not yet reaped
-  int woken_for_nothing() const;  ///< wake-ups of libusb without a transfer
+  int woken_for_nothing() const;  ///< number of times that libusb was woken without a transfer
 
   template <class Act>
   auto with(const Act& act) const {

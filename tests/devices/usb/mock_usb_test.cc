@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Real libusb and libudev on a machine simulated by umockdev. Waits are limited to seconds.
+// Real libusb and libudev on a machine simulated by umockdev.
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -78,7 +78,7 @@ TEST_F(MockUsbTest, AForbiddenAnUnpluggedAndAMissingNodeAreToldApart) {
       const auto reports = report_devices(usb::plugged_in(), "");
       return reports.empty() ? "nothing" : reports[0].lacks.empty() ? "no lack" : reports[0].lacks[0].what;
     };
-    // A process that has not connected to the machine's udev may not write to the socket of umockdev.
+    // A process not connected to the machine's udev may not write to the socket of umockdev.
     return as_nobody(lacks);
   };
   ASSERT_EQ(chmod(usb.really("/").c_str(), 0777), 0);

@@ -11,19 +11,18 @@
 
 namespace tendon {
 
-/// For the adapters whose other side lives in real time.
 inline LocalTime real_now() {
   return LocalTime(std::chrono::duration_cast<Duration>(std::chrono::steady_clock::now().time_since_epoch()));
 }
 
-/// Full-speed device with one interface, as seen from its cable. The adapters of all tiers use this interface
-/// (tests/devices/README.md). A model reports the state of the bus at the given time without waiting or reading a
-/// clock, so it behaves identically behind a memory pipe, the real libusb and a real kernel.
+/// A full-speed device with one interface, for the adapters of all tiers (tests/devices/README.md). A model reports the
+/// bus at the given time without waiting or reading a clock, so it behaves identically behind a memory pipe, the real
+/// libusb and a real kernel.
 class UsbModel {
  public:
   virtual ~UsbModel() = default;
 
-  /// Contents of the usbfs node (USB 2.0, 9.6): device descriptor of 18 bytes, then the complete configuration.
+  /// USB 2.0, 9.6: device descriptor of 18 bytes, then the complete configuration.
   virtual std::span<const std::uint8_t> descriptors() const = 0;
   /// HID report descriptor (HID 1.11, 6.2.2).
   virtual std::span<const std::uint8_t> report_descriptor() const { return {}; }
@@ -33,10 +32,8 @@ class UsbModel {
 
   /// Vendor request without data. Returns false for a stall.
   virtual bool request(LocalTime now, std::uint8_t request, std::uint16_t value) = 0;
-  /// OUT transfer. Returns false for a stall.
   virtual bool write(LocalTime now, std::span<const std::uint8_t> bytes) = 0;
-  /// The time when a waiting IN transfer ends without another event. This is LocalTime::max() if it can only be ended
-  /// by an event.
+  /// When a waiting IN transfer ends without another event; LocalTime::max(): never.
   virtual LocalTime next_in() const = 0;
   virtual std::vector<std::uint8_t> take_in(LocalTime now) = 0;
 
@@ -46,7 +43,6 @@ class UsbModel {
   UsbModel& operator=(const UsbModel&) = default;
 };
 
-/// Length of the device descriptor at the start of `descriptors`.
 inline constexpr std::size_t kDeviceDescriptor = 18;
 
 }  // namespace tendon

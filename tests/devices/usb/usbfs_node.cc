@@ -23,8 +23,7 @@ int refuse(int error) {
   return -1;
 }
 
-/// A guardian has only the open node, inherited from the process that claimed it. Its writes go through the node, after
-/// endpoint and size, to the holder of the master end.
+/// A guardian has only the inherited node. Its writes are sent to the master end with the endpoint and the size.
 int bulk_through(int file, const usbdevfs_bulktransfer& transfer) {
   std::array<std::uint8_t, 66> frame{};
   if (transfer.len > frame.size() - 2) return refuse(EINVAL);
@@ -205,8 +204,7 @@ off_t UsbfsNode::seek(off_t to) {
 
 }  // namespace tendon
 
-// libusb's calls resolve to these functions before the C library, because the program exports them or they are
-// preloaded.
+// libusb's calls resolve to these before the C library, because the program exports them or they are preloaded.
 extern "C" {
 
 int ioctl(int file, unsigned long request, ...) noexcept {

@@ -13,13 +13,10 @@
 
 namespace tendon {
 
-/// A usbfs node (/dev/bus/usb/…) for the real libusb. It implements the part of the kernel that is used by libusb. The
-/// other end of the cable is implemented by a derived class. The functions ioctl, read and lseek are defined in
-/// usbfs_node.cc. Calls for other files are passed to the kernel.
-///
-/// The node is the slave end of a pseudo-terminal, because poll() must work. As in usbfs, there is no POLLOUT until a
-/// transfer can be fetched, and POLLERR is set when the device is unplugged. For this the output is stopped and the
-/// master end is closed.
+/// A usbfs node (/dev/bus/usb/…) for the real libusb: the part of the kernel that libusb uses, through ioctl, read and
+/// lseek in usbfs_node.cc, which pass calls for other files to the kernel. The derived class is the other end of the
+/// cable. The node is the slave end of a pseudo-terminal, because poll() must work as in usbfs: no POLLOUT (stopped
+/// output) until a transfer can be fetched, and POLLERR (closed master end) when the device is unplugged.
 ///
 /// One per process. Thread-safe.
 class UsbfsNode {
@@ -34,7 +31,7 @@ class UsbfsNode {
     std::uint64_t out = 0;              ///< accepted OUT transfers
     std::uint64_t interrupt = 0;        ///< submitted interrupt transfers
     std::uint64_t bulk = 0;             ///< submitted bulk transfers
-    std::uint64_t fetched_nothing = 0;  ///< wake-ups of libusb without a transfer
+    std::uint64_t fetched_nothing = 0;  ///< number of times that libusb was woken without a transfer
     int open_transfers = 0;             ///< submitted and not yet reaped
     int most_in = 0;                    ///< largest number of waiting IN transfers
     bool claimed = false;
@@ -49,7 +46,7 @@ class UsbfsNode {
  protected:
   enum class Taken : std::uint8_t { kYes, kRefused, kHangs };
 
-  // The cable. These are called with mutex_ held.
+  // Called with mutex_ held.
   virtual bool gone() const = 0;
   virtual std::span<const std::uint8_t> descriptors() const = 0;
   virtual bool request(std::uint8_t request, std::uint16_t value) = 0;
@@ -62,9 +59,7 @@ class UsbfsNode {
   void set_file(int slave);
   int file() const { return file_; }
   void finish(usbdevfs_urb* urb, int status, int size);
-  /// Completes the oldest waiting IN transfer with `packet`.
   void bring(std::span<const std::uint8_t> packet);
-  /// Completes all waiting transfers as on device removal.
   void finish_all();
   void gate(bool open) const;
 

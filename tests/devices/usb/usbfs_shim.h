@@ -10,26 +10,24 @@
 
 namespace tendon {
 
-/// This is a FakeFalcon with a usbfs node in this process. It runs in real time.
-///
-/// Thread-safe.
+/// A FakeFalcon with a usbfs node in this process, in real time. Thread-safe.
 class UsbfsShim final : public UsbfsNode {
  public:
   explicit UsbfsShim(const FakeFalcon::Options& options);
   ~UsbfsShim() override;
 
-  /// Returns the open node. It is negative if nothing is plugged in.
+  /// Negative if nothing is plugged in.
   int node() const;
 
   void unplug();
   void plug();
 
-  /// These are errors of transfers, and not faults of the device.
+  /// Errors of transfers, not faults of the device.
   enum class Trouble {
     kNone,
     kOverflow,  ///< IN: more data than requested
     kStall,     ///< IN: the endpoint is halted
-    kMute,      ///< IN: there is no data, and no chip status
+    kMute,      ///< an IN transfer has no data and no chip status
     kHang,      ///< OUT: never completes
   };
   void set_trouble(Trouble trouble);

@@ -22,14 +22,13 @@ namespace {
 
 using namespace std::chrono_literals;
 
-// Numbers are big-endian. A header has 48 bytes: five common fields, five fields of the command, and the setup packet
-// of a control transfer.
+// Big-endian. 48 bytes: five common fields, five fields of the command, and the setup packet of a control transfer.
 constexpr std::uint32_t kSubmit = 1;
 constexpr std::uint32_t kUnlink = 2;
 constexpr std::uint32_t kSubmitted = 3;
 constexpr std::uint32_t kUnlinked = 4;
 
-/// Bus 1, device 1 at the remote side. The kernel requires these and ignores them.
+/// Bus 1, device 1 at the remote side, which the kernel requires and ignores.
 constexpr std::uint32_t kFarId = 0x10001;
 constexpr int kFullSpeed = 2;
 constexpr int kPorts = 8;
@@ -54,7 +53,7 @@ bool receive(int end, void* to, std::size_t size) {
   return recv(end, to, size, MSG_WAITALL) == static_cast<ssize_t>(size);
 }
 
-/// The kernel rejects ports in use. A port becomes free some time after detaching.
+/// The kernel rejects ports in use, which become free some time after detaching.
 bool attach(int socket) {
   for (int tries = 0; tries < 500; ++tries) {
     for (int port = 0; port < kPorts; ++port) {
@@ -221,7 +220,6 @@ void UsbIpCable::answer_unlink(std::uint32_t number, std::uint32_t unlinked) {
 }
 
 void UsbIpCable::send(std::span<const std::uint8_t> bytes) {
-  // Fails after the kernel closes the socket. Reading the next order reports this.
   [[maybe_unused]] const ssize_t sent = ::send(end_, bytes.data(), bytes.size(), MSG_NOSIGNAL);
 }
 

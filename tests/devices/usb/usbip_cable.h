@@ -14,16 +14,14 @@
 
 namespace tendon {
 
-/// Connects a model to the real kernel in real time. It speaks USB/IP (Linux, Documentation/usb/usbip_protocol.rst)
-/// over one end of a socket pair, and the virtual host controller vhci_hcd gets the other end. Enumeration, usbfs,
-/// usbhid and disconnection are those of the kernel.
-///
-/// Requires root and the vhci_hcd module. deploy/test-usb-kernel runs it in a separate machine.
+/// Connects a model to the real kernel in real time, by USB/IP (Linux, Documentation/usb/usbip_protocol.rst) over a
+/// socket pair, whose other end is the virtual host controller vhci_hcd. Enumeration, usbfs, usbhid and disconnection
+/// are those of the kernel. Requires root and vhci_hcd; deploy/test-usb-kernel runs it in a separate machine.
 ///
 /// Thread-safe.
 class UsbIpCable {
  public:
-  /// This is called after each OUT transfer that is accepted, with its time. The model is locked.
+  /// This is called with the time of each accepted OUT transfer. The model is locked.
   using Watch = std::function<void(LocalTime)>;
 
   /// Plugs the device in. Throws std::runtime_error if the kernel rejects it.

@@ -87,7 +87,6 @@ TEST(WoodenHapticsDevice, TheCountersAreNotSetAgainUnlessItIsAskedForAgain) {
   }
 }
 
-// The counters may have changed while unplugged.
 TEST(WoodenHapticsDevice, ABoardThatWasCalibratedBeforeIsNotBelievedToBe) {
   for (const bool own_supply : {false, true}) {
     Bench bench({.own_supply = own_supply});

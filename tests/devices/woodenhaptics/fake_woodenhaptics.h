@@ -16,9 +16,8 @@
 
 namespace tendon {
 
-/// A WoodenHaptics at the end of its cable: the published firmware (haptikfabrikenapi, firmware/main.cpp) step by step,
-/// its amplifiers, the arm, and a full-speed bus with one report per direction in each frame of 1 ms. It shares no code
-/// with the driver, does not block and reads no clock.
+/// The published firmware (haptikfabrikenapi, firmware/main.cpp) step by step, its amplifiers, the arm, and a
+/// full-speed bus with one report per direction in each frame of 1 ms. Shares no code with the driver.
 ///
 ///     firmware:  loop: send the counters and wait until the host reads them; wait for a report; take the newest;
 ///                if it has 14 bytes: amplifiers on, watchdog set to 0.5 s, execute it
@@ -39,7 +38,7 @@ class FakeWoodenHaptics {
     kDropsSome,    ///< loses one report in three
     kGarblesSome,  ///< corrupts a byte of one report in three
     kGarblesAll,   ///< puts an invalid `info` in every report
-    kCutsAll,      ///< truncates every report by one byte
+    kCutsAll,      ///< removes one byte from each report
     kPadsAll,      ///< pads every report to 64 bytes
     kBabbles,      ///< adds unsolicited packets between the reports
     kBabblesOnly,  ///< sends only unsolicited packets
@@ -55,21 +54,17 @@ class FakeWoodenHaptics {
 
   explicit FakeWoodenHaptics(const Options& options);
 
-  // Host side of the cable.
   bool plugged() const { return plugged_; }
   int times_plugged() const { return times_plugged_; }
   /// Not a serial chip, so there are no vendor requests.
   bool request(LocalTime, std::uint8_t, std::uint16_t) { return false; }
   bool write(LocalTime now, std::span<const std::uint8_t> bytes);
-  /// Time at which a waiting IN transfer may complete.
   LocalTime next_in() const;
   std::vector<std::uint8_t> take_in(LocalTime now);
-  /// The node is closed, which cancels waiting transfers.
   void cancel();
 
   void advance(LocalTime now);
 
-  // User side.
   void plug();
   void unplug();
   void move_to(const Vec3& position) { angles_ = arm_.angles_at(position); }  ///< m, workspace frame
@@ -78,7 +73,6 @@ class FakeWoodenHaptics {
   void close_switch(bool closed) { switch_closed_ = closed; }
   void set_fault(Fault fault);
 
-  // Observations.
   const published_arm::Arm& arm() const { return arm_; }
   bool calibrated() const { return calibrated_ && !calibrate_ && fault_ != Fault::kJumps; }
   bool amplifiers_on() const { return amplifiers_on_; }
@@ -90,7 +84,6 @@ class FakeWoodenHaptics {
   Vec3 position() const { return arm_.position_at(angles_); }
   int obeyed() const { return obeyed_; }
   int calibrations() const { return calibrations_; }
-  /// Largest number of reports that waited in the buffer.
   int most_waiting() const { return most_waiting_; }
 
  private:
@@ -116,7 +109,7 @@ class FakeWoodenHaptics {
   std::optional<LocalTime> boots_;
   int most_waiting_ = 0;
 
-  bool begun_ = false;           ///< this was sent without a request
+  bool begun_ = false;           ///< sent without a request
   std::array<int, 3> origin_{};  ///< counter value at angle 0
   bool calibrate_ = false;       ///< set by the button
   bool calibrated_ = false;      ///< by command 1 since the last reset

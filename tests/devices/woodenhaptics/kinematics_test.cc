@@ -20,7 +20,7 @@ using published_arm::Arm;
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
-/// Returns a uniformly distributed pose in the published workspace with full force.
+/// Uniform in the published workspace, with full force.
 Pose place(Dice& dice, const Model& model) {
   for (;;) {
     const auto pose = pose_at(model, model.workspace_radius * std::cbrt(dice.uniform()) * dice.direction());
@@ -188,7 +188,7 @@ TEST(WoodenHapticsKinematics, ANewtonUpwardsTakesTheCurrentsOfTheDrawings) {
   ASSERT_TRUE(pose);
   // Lateral: arm 220 mm, gear 16, 0.321 N·m/A.
   EXPECT_EQ(currents_for(model, *pose, {0, 4, 0}, 2000)[0], static_cast<int>(4e3 * 0.220 / 16 / 0.321));
-  // Vertical: gear 12, 0.0603 N·m/A. The upper link leans 19.7° forward and is pushed down; the lower one is at 38.1°.
+  // Gear 12, 0.0603 N·m/A. The upper link leans 19.7° forward and is pushed down; the lower one is at 38.1°.
   const Currents up = currents_for(model, *pose, {0, 0, 4}, 2000);
   EXPECT_NEAR(up[1], -4e3 * 0.205 * std::sin(pose->angles[1]) / 12 / 0.0603, 1);
   EXPECT_NEAR(up[2], 4e3 * 0.245 * std::sin(pose->angles[2]) / 12 / 0.0603, 1);
@@ -261,7 +261,6 @@ TEST(WoodenHapticsKinematics, TheForceFadesToNoneAtASingularPose) {
     for (int i = 0; i < 5000; ++i) {
       const Pose pose = pose_with(model, 4 * dice.direction());
       const auto given = force_of(model, pose, currents_for(model, pose, 3 * dice.direction(), 2000));
-      // This is 1 mA per motor where the sensitivity is the lowest.
       ASSERT_TRUE(!given || given->norm() < 3.5) << pose.angles.transpose();
     }
   }

@@ -11,8 +11,8 @@
 
 #include "core/base/motion.h"
 
-/// Published arm parameters in their published order, with independent kinematics: rotations of links instead of sums
-/// of sines, and circle intersection instead of the law of cosines. Uses no code of devices/woodenhaptics.
+/// Parameters in their published order, with kinematics independent of devices/woodenhaptics: rotations of links
+/// instead of sums of sines, and circle intersection instead of the law of cosines.
 namespace tendon::published_arm {
 
 /// variant; 3 capstans, 3 lengths, 3 bodies; origin, radius; 3 torque constants; full scale; 6 counts per turn; force,
@@ -55,11 +55,9 @@ struct Arm {
   Vec3 calibration() const { return three(32); }
   Vec3 direction() const { return Vec3::Ones() - 2 * three(38); }
 
-  /// Body angle per count.
   Vec3 per_count() const {
     return (2 * std::numbers::pi * direction()).cwiseQuotient(three(18)).cwiseProduct(three(1)).cwiseQuotient(three(7));
   }
-  /// Body torque per ampere.
   Vec3 per_ampere() const { return direction().cwiseProduct(three(14)).cwiseProduct(three(7)).cwiseQuotient(three(1)); }
 
   Vec3 position_at(const Vec3& angles) const {
@@ -69,7 +67,7 @@ struct Arm {
     return Vec3(0, 0, length()[0]) + about(angles[0], Vec3::UnitZ()) * Vec3(up + down) - origin();
   }
 
-  /// The elbow is the upper intersection of circles around the shoulder and the tip.
+  /// The upper intersection of circles around the shoulder and the tip.
   Vec3 angles_at(const Vec3& position) const {
     const Vec3 at = position + origin();
     const Eigen::Vector2d tip(std::hypot(at.x(), at.y()), at.z() - length()[0]);

@@ -34,7 +34,7 @@ class Cable final : public usb::Pipe {
   const bool& full_;
 };
 
-/// A driver, a cable and an arm. Current is allowed once the counters are set.
+/// Current is allowed once the counters are set.
 struct WoodenHapticsBench : DriverBench<WoodenHapticsBench> {
   explicit WoodenHapticsBench(const FakeWoodenHaptics::Options& options = {}, double max_current = 2)
       : arm(options),

@@ -204,7 +204,7 @@ TEST(WoodenHapticsDevice, ZeroDoesNotWaitForAnAnswer) {
   EXPECT_FALSE(bench.arm.pushes());
 }
 
-/// The guardian writes this packet if the server is killed, stops or hangs (devices/safety/guardian.h).
+/// If the server is killed, stops or hangs (devices/safety/guardian.h).
 TEST(WoodenHapticsDevice, ThePacketOfTheGuardianEndsTheForceAtOnce) {
   Bench bench;
   bench.home(kForce);
@@ -252,7 +252,6 @@ TEST(WoodenHapticsDevice, ReportsOfAnotherLengthDoNotFeedTheWatchdog) {
   EXPECT_FALSE(arm.pushes());
 }
 
-// The ledger uses the force that `apply` returns.
 TEST(WoodenHapticsDevice, AfterAPauseBeyondTheWatchdogTheOldForceIsOver) {
   for (const Duration pause : {Duration(300ms), Duration(700ms)}) {
     Bench bench;

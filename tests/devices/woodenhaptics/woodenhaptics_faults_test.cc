@@ -45,7 +45,7 @@ void go_to(Bench& bench, Place place) {
 
 class WoodenHapticsFault : public testing::TestWithParam<Fault> {};
 
-/// Faults that cost reports but not the device. Corrupting one report in three is not harmless: the byte may signal the
+/// Cost reports but not the device. One corrupted report in three is not harmless, because a byte may signal the
 /// button, which invalidates the calibration. On a real bus the checksum of USB rejects such reports.
 bool is_harmless(Fault fault) { return fault == Fault::kDropsSome || fault == Fault::kBabbles; }
 

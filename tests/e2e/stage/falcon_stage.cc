@@ -71,7 +71,7 @@ FalconStage::FalconStage(const Config& config)
 Scene FalconStage::scene() const { return read_scene(scene_); }
 
 void FalconStage::use(FakeFalcon& falcon, LocalTime now) {
-  // Limits the motion between two readings, so that the position does not jump after a pause of the machine.
+  // The position does not jump after a pause of the machine.
   const double most = speed_ * std::min(used_ ? seconds(now - *used_) : 0.0, 2e-3);
   used_ = now;
   const double x = x_ + std::clamp(wanted_x_ - x_, -most, most);

@@ -18,16 +18,14 @@
 
 namespace tendon::e2e {
 
-/// The whole server with a Falcon as in normal use: tendond with deploy/scenes/falcon.toml, a firmware file and a
-/// folder of keys; virtual_wall with its key, over UDP; the real libusb. The Falcon is a model, and FarFalcon replaces
-/// the kernel's USB.
+/// As in normal use: tendond with deploy/scenes/falcon.toml, a firmware file and a folder of keys; virtual_wall with
+/// its key, over UDP; the real libusb. Only the Falcon is a model, and FarFalcon replaces the kernel's USB.
 class FalconStage {
  public:
   struct Config {
     FakeFalcon::Options falcon = kReady;
     bool record = false;
   };
-  /// A Falcon that has already been homed.
   static constexpr FakeFalcon::Options kReady = {.has_firmware = true, .is_homed = true, .firmware_bytes = 4096};
   static constexpr double kWall = 500;  ///< N/m, at x = 0, in the path of a hand that moves along x
 
@@ -40,17 +38,15 @@ class FalconStage {
   const std::filesystem::path& folder() const noexcept { return folder_.path(); }
   Scene scene() const;
 
-  // The user. Initially the hand rests outside the wall and presses no button.
-  /// Moves the grip to x, m from the center, at `speed`, m/s. Returns when it has arrived.
+  // Initially the hand rests outside the wall and presses no button. To x, m from the center, at `speed`, m/s. Returns
+  // when it has arrived.
   void go_to(double x, double speed = 0.1);
-  /// Moves the grip through its range when the device requests homing.
   void home() { homes_ = true; }
-  /// Releases the button and presses it again outside the wall when the lamps are green. Returns after the time of the
-  /// force ramp.
+  /// Outside the wall when the lamps are green. Returns after the time of the force ramp.
   void arm();
   void arm_and_press();
 
-  /// Waits until `what` holds for the model. Throws std::runtime_error after kPatience.
+  /// Throws std::runtime_error after kPatience.
   void wait_until(const std::function<bool(const FakeFalcon&)>& what, const std::string& name);
   void wait_for_commands(int count);
   static bool pushed_out(const FakeFalcon& falcon) { return falcon.force().x() < -0.5; }
@@ -58,7 +54,6 @@ class FalconStage {
   /// Waits until the device is closed by all processes. Returns the state of the device node at that time.
   FarFalcon::Seen wait_for_release();
 
-  /// Observations after a SIGKILL of the server, when no process has the device open.
   struct Killed {
     double pushed_for_ms = 0;          ///< after the signal was sent
     double dead_ms = 0;                ///< time from the signal to the exit of the process
@@ -71,10 +66,9 @@ class FalconStage {
   /// Sends `signal` to the server, or to `process`, and waits until the force is zero. Returns the time in ms.
   double released_after(int signal, std::optional<pid_t> process = {});
 
-  /// Returns true if a thread of the test or the server was delayed long enough to trip watchdogs.
+  /// A thread of the test or the server was delayed long enough to trip watchdogs.
   bool machine_stood_still();
 
-  /// Forces while the hand is deeper in the wall than kDeep.
   static constexpr double kDeep = 0.002;  ///< m
   struct Felt {
     std::uint64_t rounds = 0;   ///< samples, about one per millisecond

@@ -27,7 +27,7 @@ struct Pipe {
   int write = -1;
 };
 
-/// Uses O_CLOEXEC so that the descriptors are not inherited by other programs.
+/// O_CLOEXEC: no other program inherits the descriptors.
 Pipe make_pipe() {
   std::array<int, 2> ends{};
   if (::pipe2(ends.data(), O_CLOEXEC) != 0) fail(errno, "pipe2");
@@ -117,7 +117,6 @@ int Process::wait(std::chrono::nanoseconds patience) {
   const Deadline deadline = std::chrono::steady_clock::now() + patience;
   while (!ended()) listen(deadline, "its end");
   if (!exit_code_) {
-    // This does not block for long, because both streams are closed.
     int status = 0;
     while (::waitpid(pid_, &status, 0) < 0) {
       if (errno != EINTR) fail(errno, "waitpid");

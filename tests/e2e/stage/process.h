@@ -14,34 +14,28 @@
 
 namespace tendon::e2e {
 
-/// Timeout of every wait in a test. Nothing takes longer than a few seconds, but virtual machines pause and builds run
-/// in parallel.
+/// Timeout of every wait in a test. It is this long because machines pause and builds run in parallel.
 inline constexpr std::chrono::seconds kPatience{30};
 
-/// A running program with its output and exit code. Killed by the destructor.
-///
-/// The output is read only during wait_for_line() and wait(), so the program must not write more than a pipe holds (64
-/// kB) between these calls. Both throw std::runtime_error with the whole output on a timeout or if the wait cannot
-/// succeed any more.
-///
-/// Thread-safe: no.
+/// Killed by the destructor. The output is read only during wait_for_line() and wait(), so between them the program
+/// must not write more than a pipe holds (64 kB). Both throw std::runtime_error with the whole output on a timeout or
+/// if the wait cannot succeed any more. Thread-safe: no.
 class Process {
  public:
-  /// Starts `program` in `folder` without standard input. `more_environment` ("NAME=value") is added to the
-  /// environment. Throws std::system_error on failure.
+  /// In `folder`, without standard input. `more_environment`: "NAME=value". Throws std::system_error on failure.
   Process(const std::filesystem::path& program, const std::vector<std::string>& arguments,
           const std::filesystem::path& folder, std::vector<std::string> more_environment = {});
   ~Process();
   Process(const Process&) = delete;
   Process& operator=(const Process&) = delete;
 
-  /// Returns the next line of stdout or stderr that contains `text`. Later calls search that stream after this line.
+  /// The next line of stdout or stderr that contains `text`. Later calls search that stream after this line.
   std::string wait_for_line(std::string_view text, std::chrono::nanoseconds patience = kPatience);
 
   void signal(int number);
   pid_t pid() const noexcept { return pid_; }
 
-  /// Waits for the end. Returns the exit code, or −N if signal N ended the program.
+  /// The exit code, or −N if signal N ended the program.
   int wait(std::chrono::nanoseconds patience = kPatience);
 
   const std::string& out() const noexcept { return out_.text; }

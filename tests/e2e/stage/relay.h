@@ -16,10 +16,8 @@ namespace tendon::e2e {
 
 using Datagram = std::vector<std::byte>;
 
-/// A man in the middle between one client and the server. Forwards in both directions, stores the client's datagrams,
-/// and can send forged ones in the client's name.
-///
-/// Thread-safe: yes. It has its own thread.
+/// A man in the middle between one client and the server. Stores the client's datagrams, and can forge others in its
+/// name. Thread-safe: yes. It has its own thread.
 class Relay {
  public:
   explicit Relay(const Address& server);
@@ -27,12 +25,9 @@ class Relay {
   Relay(const Relay&) = delete;
   Relay& operator=(const Relay&) = delete;
 
-  /// For the client.
   Address address() const;
-  /// The client's address as seen by the server.
   Address clients_address() const;
 
-  /// The client's datagrams that have been forwarded without truncation.
   std::vector<Datagram> said() const;
 
   void forge(std::span<const std::byte> datagram);

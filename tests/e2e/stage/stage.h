@@ -13,13 +13,13 @@
 
 namespace tendon::e2e {
 
-/// Path of a built program: tendond, tendon-inject, virtual_wall …
+/// tendond, tendon-inject, virtual_wall …
 std::filesystem::path program(const std::string& name);
 
 std::filesystem::path demo_scene();
 
-/// A scene with a hand that moves into the wall and stays there. Forces are held and fade for longer than a machine
-/// pauses, so that every stage of the age policy occurs.
+/// In this scene, the hand moves into the wall and holds its position. Forces are held and fade for longer than a
+/// machine pauses, so that every stage of the age policy occurs.
 inline constexpr std::string_view kPressingHand = R"([device]
 kind = "simulated"
 profile = "falcon"
@@ -43,24 +43,23 @@ safe_stop_ms = 1000
 /// Returns the path for a command line.
 std::string write(const std::filesystem::path& file, std::string_view text);
 
-/// Returns the number, or the first number of the array, under `key` of a JSON line. Throws std::runtime_error if there
-/// is none.
+/// Returns the number, or the first number of the array, for `key`. Throws std::runtime_error if it does not exist.
 double number_in(std::string_view json, const std::string& key);
 std::uint64_t count_in(std::string_view json, const std::string& key);
-/// Returns the text under `key`, which must not contain escapes.
+/// The text must not contain escapes.
 std::string text_in(std::string_view json, const std::string& key);
 
-/// A program started on port 0 that has reported its address. It exits after two minutes in case the test is killed.
+/// Reports its address on port 0. Exits after two minutes in case the test is killed.
 class Service {
  public:
-  /// Starts `name` in `folder` and reads the address from `key` of the JSON event `event`.
+  /// The address is `key` of the JSON event `event`.
   Service(const std::string& name, std::vector<std::string> arguments, const std::filesystem::path& folder,
           const std::string& event, const std::string& key, std::vector<std::string> more_environment = {});
 
   const std::string& address() const noexcept { return address_; }
   Process& process() noexcept { return process_; }
 
-  /// Sends `signal` and returns the last line of stdout. Throws std::runtime_error for any other exit code.
+  /// Returns the last line of stdout. Throws std::runtime_error for any other exit code.
   std::string stop(int signal = SIGTERM, int exit_code = 0);
 
  private:
@@ -97,9 +96,9 @@ struct Recording {
 };
 Recording read_recording(const std::filesystem::path& file);
 
-/// Checks a recording made with the limiter on. Steps are consecutive. No force exceeds the limiter's bound. The ledger
-/// does not fall below −1 nJ unless there is an overrun. After an overrun, it must not decrease further until the next
-/// overrun, and the forces must not exceed the Coulomb friction assumed by the limiter.
+/// Checks a recording with the limiter on: steps are consecutive, no force exceeds the bound, and the ledger stays
+/// above −1 nJ. After an overrun, it must not decrease until the next one, and forces must not exceed the limiter's
+/// Coulomb friction.
 void expect_passive(const Recording& recording, const Scene& scene);
 
 }  // namespace tendon::e2e

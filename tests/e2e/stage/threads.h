@@ -9,14 +9,12 @@
 
 namespace tendon::e2e {
 
-/// As shown by `top -H`.
 std::set<std::string> threads_of(pid_t process);
 
 /// The state from /proc. 'T' means stopped.
 char state_of(pid_t process);
 
-/// Returns the number of voluntary context switches of the thread. Throws std::runtime_error if there is no such
-/// thread.
+/// Voluntary context switches. Throws std::runtime_error if there is no such thread.
 std::uint64_t sleeps_of(pid_t process, const std::string& thread);
 
 /// Replaces the number of a name as server/THREADS.md does, for example "haptic-3" by "haptic-N".

@@ -67,8 +67,6 @@ TEST(Deadband, RefusesWhatIsImpossible) {
   EXPECT_THROW(Deadband({.longest_silence = Duration(0)}), std::invalid_argument);
 }
 
-// ---- states ----
-
 constexpr SetStateDeadband kAsked{.share = 0.10, .floor = 1e-3, .max_silence = milliseconds(20)};
 
 const Vec3 kRest = Vec3::Zero();

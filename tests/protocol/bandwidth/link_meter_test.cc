@@ -13,7 +13,6 @@ using std::chrono::seconds;
 constexpr LocalTime kStart{seconds(100)};
 const ClockOffsetEstimator::Estimate kClock{.offset = seconds(7)};
 
-/// An exchange with the one-way delays `there` and `back`. The peer answers after 3 ms.
 ClockExchange exchange(LocalTime sent, Duration there, Duration back) {
   const PeerTime received = kClock.to_peer(sent + there);
   return {.sent = sent,

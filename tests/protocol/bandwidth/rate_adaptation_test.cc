@@ -49,7 +49,6 @@ class NarrowLink {
   const RateAdaptation& adaptation() const { return adaptation_; }
   double queue_s() const { return queue_s_; }
   double longest_queue_s() const { return longest_queue_s_; }
-  /// Returns and clears the times recorded by one_in().
   std::map<std::uint32_t, Duration> take_times() { return std::exchange(time_at_, {}); }
 
  private:

@@ -11,8 +11,7 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-// The timeout can be many seconds if the link was slow. If the next copy is lost, the ends must not wait for this long
-// after the link is fast again.
+// After a slow link the timeout can be many seconds. If the next copy is lost, that would be the wait on a fast link.
 TEST(OutgoingRequests, AreSentAgainWithinASecondHoweverSlowTheLink) {
   for (const Duration timeout : {Duration(milliseconds(20)), Duration(seconds(1)), Duration(seconds(12))}) {
     OutgoingRequests requests;

@@ -48,7 +48,6 @@ class SealedHandshake : public ::testing::Test {
   ServerHandshake::Reply knock(const Bytes& datagram) { return z_.receive(now_, from_, datagram, answer_); }
   Bytes reply_to(const Bytes& datagram) { return first(answer_, knock(datagram).size); }
 
-  /// Returns a Hello with a cookie valid for `from_`.
   Bytes hello_with_cookie(ClientHandshake& client) {
     client.receive(now_, reply_to(said_by(client)));
     return said_by(client);
@@ -212,7 +211,6 @@ TEST_F(SealedHandshake, SpoofedHellosChangeNothingButACounter) {
   EXPECT_EQ(mallinfo2().uordblks, memory);
   EXPECT_EQ(z_.stats().retries, before + hellos);
   EXPECT_EQ(z_.stats().limited + z_.stats().unknown_key + z_.stats().forged + z_.stats().malformed, 0U);
-  // A client that really has one of these addresses is admitted.
   from_ = from;
   EXPECT_TRUE(knock(hello_with_cookie()).client.has_value());
 }
@@ -240,8 +238,6 @@ TEST_F(SealedHandshake, NoReplyIsEverLongerThanWhatItAnswers) {
     ASSERT_LT(z_.refuse(*reply.client, longest, answer_).size, bad.size());
   }
 }
-
-// ---- Which suite ----
 
 const Suites kOld = {Suite::kNoise};  ///< a peer without suite 2, or without hardware AES
 const Suites kNew = all_suites();

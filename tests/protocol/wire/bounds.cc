@@ -26,8 +26,6 @@ namespace pb = tendon::v1;
 using google::protobuf::FieldDescriptor;
 using google::protobuf::Message;
 
-// ---- The grammar ----
-
 struct Range {
   std::string least;      ///< as written
   std::string most;       ///< empty: none
@@ -118,8 +116,6 @@ std::int64_t whole(const std::string& text) {
   return std::stoll(text);
 }
 
-// ---- The cases ----
-
 /// Fields whose validity also depends on another field. A value that passes its own bound may still be refused.
 bool is_bound_to_others(const std::string& path) {
   static const std::regex kOthers(R"(.*\.(normal|workspace_min_m|workspace_max_m|operator_from_device|orientation|)"
@@ -162,7 +158,7 @@ class Maker {
     }
   }
 
-  /// Rotations and normals must have the length 1 ± 0.001. Adds values on both sides of these limits.
+  /// Lengths of rotations and normals on both sides of 1 ± 0.001.
   void lengthen(Message& message, const FieldDescriptor& field, const std::string& path) {
     const bool turns = field.cpp_type() == FieldDescriptor::CPPTYPE_MESSAGE && field.message_type()->name() == "Quat";
     if (!turns && field.name() != "normal") return;
@@ -298,8 +294,8 @@ class Maker {
     for (const int size : bound.too_few_or_many) resized(size, false);
   }
 
-  /// New entries are zeros, letters or copies of the last one, with different devices in claims and grants. A new frame
-  /// is empty, as from a newer peer.
+  /// Zeros, letters or copies of the last entry, with different devices in claims and grants. A new frame is empty, as
+  /// from a newer peer.
   static void resize(Message& message, const FieldDescriptor& field, int size) {
     const auto& reflection = *message.GetReflection();
     while (reflection.FieldSize(message, &field) > size) reflection.RemoveLast(&message, &field);

@@ -164,7 +164,7 @@ TEST(Codec, AFrameThatDoesNotFitLeavesTheDatagramAsItWas) {
   EXPECT_EQ(content->frames.size(), fitted);
 }
 
-/// The largest possible frame does not fit into a datagram and must not overflow a buffer.
+/// The largest frame does not fit and must not overflow a buffer.
 TEST(Codec, AnAnswerWithBothLongestDescriptionsIsRefusedWhole) {
   const std::string longest(24, 'x');
   ControlAck ack{.id = ~0U, .code = Code::kOk, .detail = std::string(128, 'x'), .device = examples::description()};

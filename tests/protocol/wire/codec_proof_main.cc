@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// Datagrams whose instructions codec_proof_test.cc counts: one with a state, one with a force, and one with the states
-// of 16 devices in columns, each written and read. For comparison, libprotobuf serializes and parses the same bytes.
+// For codec_proof_test.cc: a state, a force, and 16 states in columns, each written and read, by us and by libprotobuf.
 // Prints one line each. Callgrind counts within `in_turn` and writes a file at each return.
 #include <array>
 #include <cstdlib>
@@ -63,7 +61,7 @@ void read(Workplace& place, bool by_hand) {
 
 }  // namespace
 
-/// Callgrind finds this function by its name, so it must be neither inlined nor mangled.
+/// Neither inlined nor mangled, for callgrind.
 extern "C" [[gnu::noinline]] void in_turn(Workplace& place, bool writes, What what, bool by_hand, int times) {
   static const DeviceState state = examples::state();
   static const ForceCommand force = examples::force();

@@ -15,7 +15,7 @@ namespace {
 
 using examples::data;
 
-/// Values of all frames. golden.md has the bytes of the examples, and bounds.json the bounds of each field.
+/// golden.md has the bytes of the examples, and bounds.json the bounds of each field.
 TEST(Codec, AFrameComesOutAsItWentIn) {
   Dice dice(1);
   std::vector<Frame> frames = drawn::others();

@@ -16,7 +16,7 @@
 #include "tests/protocol/wire/read_back.h"
 #include "tests/support/dice.h"
 
-// Random datagrams: mostly ordinary ones, some with difficult values.
+// Mostly ordinary, some with difficult values.
 
 namespace tendon::drawn {
 
@@ -100,7 +100,7 @@ inline ForceCommand a_force(Dice& dice) {
   return command;
 }
 
-// The largest state and force: eight bytes for every component, ten for every counter.
+// Eight bytes for every component, ten for every counter.
 
 inline const Vec3 kThirds = Vec3::Constant(-1.0 / 3);
 inline const Mat3 kNineEntries{{1.1, 2.1, 3.1}, {4.1, 5.1, 6.1}, {7.1, 8.1, 9.1}};
@@ -238,7 +238,7 @@ inline const std::vector<Frame>& others() {
   return all;
 }
 
-/// Returns the body of a datagram of a few frames. A share `spoilt` of its states and forces is invalid.
+/// A few frames. A share `spoilt` of the states and forces is invalid.
 inline Bytes a_datagram(Dice& dice, double spoilt) {
   std::array<std::byte, kMaxDatagram> buffer{};
   DataWriter writer;

@@ -78,7 +78,6 @@ class Writer {
     text_ += '\n';
   }
 
-  /// Writes lines of 16 bytes, with `words` in the first.
   void lines(Bytes bytes, int depth, std::string_view words) {
     line(hex(bytes.first(std::min(kAcross, bytes.size()))), depth, words);
     for (std::size_t at = kAcross; at < bytes.size(); at += kAcross) {
@@ -133,7 +132,7 @@ class Writer {
     }
   }
 
-  /// Writes floating-point numbers on separate lines, others together.
+  /// Floating-point numbers on separate lines, others together.
   void packed(const FieldDescriptor& about, std::size_t size, int depth, const std::string& words,
               const std::string& head) {
     const Bytes all = rest_.first(std::min(size, rest_.size()));

@@ -9,15 +9,15 @@
 
 namespace tendon::golden {
 
-/// A cleartext datagram as protocol/vectors/golden.md shows it: one line per field with its bytes in hex and their
-/// meaning. Names, types and enumerators are those of tendon.proto.
+/// As protocol/vectors/golden.md shows it: one line per field with its bytes in hex and their meaning, with the names
+/// of tendon.proto.
 std::string block(std::span<const std::byte> datagram);
 
 /// Returns the blocks of a page that start with "```golden NAME". The key is the name.
 std::map<std::string, std::string> blocks(std::string_view page);
 
-/// Returns `page` with its golden blocks generated from the examples of these names (examples.h). Throws
-/// std::invalid_argument if the sets of names differ.
+/// Generates the golden blocks from the examples of these names (examples.h). Throws std::invalid_argument if the sets
+/// of names differ.
 std::string rewritten(std::string_view page);
 
 }  // namespace tendon::golden

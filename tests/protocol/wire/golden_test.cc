@@ -11,14 +11,14 @@
 
 #include "tests/protocol/examples.h"
 
-// Checks that protocol/vectors/golden.md, with which other languages test their code, is correct and matches our code.
+// Other languages test their code with protocol/vectors/golden.md.
 
 namespace tendon::golden_test {
 namespace {
 
 using examples::Bytes;
 
-/// Parses a line of a golden block: hex bytes up to the semicolon. "00 x1117" repeats a byte.
+/// Hex up to the semicolon. "00 x1117" repeats a byte.
 Bytes bytes_of(const std::string& line) {
   Bytes out;
   std::istringstream words(line.substr(0, line.find(';')));

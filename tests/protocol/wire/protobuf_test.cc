@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// Compares our codec with libprotobuf. The Writer must produce the same bytes, and the DataReader must read the same
-// values in any order of the fields. The fuzz target `payload` does this with random bytes.
+// The Writer produces libprotobuf's bytes, and the DataReader reads the same values in any order of the fields. The
+// fuzz target `payload` does this with random bytes.
 #include <google/protobuf/message.h>
 #include <google/protobuf/stubs/common.h>
 #include <gtest/gtest.h>
@@ -45,7 +44,7 @@ Bytes bytes_of(const std::string& text) {
   return {begin, begin + text.size()};
 }
 
-/// Uses libprotobuf to parse the body and to serialize it again. Returns nothing if the body is malformed.
+/// Parsed and serialized by libprotobuf. Nothing if the body is malformed.
 std::optional<Bytes> by_protobuf(const Bytes& body) {
 #if GOOGLE_PROTOBUF_VERSION < 4022000
   const google::protobuf::LogSilencer silence;  // protobuf logs every text that is not UTF-8
@@ -58,7 +57,7 @@ std::optional<Bytes> by_protobuf(const Bytes& body) {
 
 Bytes told_of(const DeviceState& state) { return examples::data(0, {}, state); }
 
-/// Reads the same bytes in three ways: directly, through AnyOrder, and after libprotobuf has rewritten them.
+/// Directly, through AnyOrder, and after libprotobuf has rewritten the bytes.
 class Readers {
  public:
   ::testing::AssertionResult agree(const Bytes& body) {
@@ -194,7 +193,7 @@ TEST(Protobuf, ReadsOfDistortedBytesWhatProtobufDoes) {
   }
 }
 
-/// Encodings that WIRE.md allows and our writers never use, such as overlong numbers.
+/// Allowed by WIRE.md, such as overlong numbers.
 TEST(Protobuf, WhatNoWriterOfOursDoesIsPutInOrder) {
   const auto frame = [](const RawProtobuf& state) { return datagram_with(RawProtobuf().message(1, state)); };
   const RawProtobuf usual = RawProtobuf().varint(1, 5).varint(11, 2);
@@ -226,7 +225,7 @@ TEST(Protobuf, WhatNoWriterOfOursDoesIsPutInOrder) {
     force.message(14, RawProtobuf().message(1, RawProtobuf().fixed64(1, 0x3FF0000000000000)).packed(2, {1.0}));
   }))))
       << "a model of rotation without a torque";
-  // Encodes the tick 05 as 85 00. The lengths of state, frame and datagram grow by one.
+  // The tick 05 becomes 85 00. The lengths of state, frame and datagram grow by one.
   Bytes longer = frame(usual);
   const auto tick = std::find(longer.begin() + 9, longer.end(), std::byte{5});
   ASSERT_NE(tick, longer.end());

@@ -30,7 +30,6 @@ inline examples::Bytes datagram_with(const RawProtobuf& frame) {
   return RawProtobuf().fixed64(1, 1).message(3, frame).bytes();
 }
 
-/// Returns a force command changed by `change`, as raw content of message Frame.
 inline RawProtobuf raw_force(const std::function<void(RawProtobuf&)>& change) {
   RawProtobuf force;
   force.varint(1, 1).varint(5, 1000);
@@ -38,7 +37,6 @@ inline RawProtobuf raw_force(const std::function<void(RawProtobuf&)>& change) {
   return RawProtobuf().message(2, force);
 }
 
-/// Writes a datagram with the frame `in` and reads it back.
 template <class Message>
 Message there(const Message& in) {
   DataReader reader;

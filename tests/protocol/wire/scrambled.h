@@ -13,8 +13,8 @@
 
 namespace tendon {
 
-/// Encodes a message in a way that protobuf allows but no encoder uses. It shuffles the fields, repeats some, splits
-/// messages and lists into pieces, and adds unknown fields.
+/// Allowed by protobuf, though no encoder does it: shuffles fields, repeats some, splits messages and lists into
+/// pieces, and adds unknown fields.
 class Scrambled {
  public:
   explicit Scrambled(Dice& dice) : dice_(dice) {}
@@ -68,7 +68,6 @@ class Scrambled {
         return {};
     }
   }
-  /// Encodes a single number or text. The tag is optional.
   std::string one(const google::protobuf::Message& message, const Field& field, int index, bool tag) {
     const auto alone = std::unique_ptr<google::protobuf::Message>(message.New());
     alone->CopyFrom(message);
@@ -98,7 +97,7 @@ class Scrambled {
     const auto add = [&](const google::protobuf::Message& sub) {
       const std::string whole = (*this)(sub);
       if (field.is_repeated() || dice_.chance(0.7)) return out.push_back(in(number, whole));
-      // Sends the message twice. The first copy has no lists, because the receiver would join them.
+      // Twice. The first copy has no lists, because the receiver would join them.
       const auto first = std::unique_ptr<google::protobuf::Message>(sub.New());
       first->CopyFrom(sub);
       drop_lists(*first);

@@ -10,7 +10,7 @@
 
 namespace tendon {
 
-/// Returns everything that a reader gets from a body as text, bit for bit, including absent fields.
+/// Bit for bit, including absent fields.
 inline std::string told(const DataContent* content) {
   if (content == nullptr) return "malformed";
   std::string text = std::to_string(content->sent.time_since_epoch().count()) + " invalid " +

@@ -27,8 +27,6 @@ namespace {
 using examples::Bytes;
 using examples::hex;
 
-// ---- JSON ----
-
 std::string quoted(std::string_view text) {
   std::string out = "\"";
   for (const char c : text) {
@@ -59,7 +57,7 @@ std::string indented(std::string_view text) {
   return out;
 }
 
-/// JSON object with a fixed order of fields. Values are already JSON.
+/// Fixed order of fields. Values are already JSON.
 class Object {
  public:
   Object& json(std::string_view name, std::string_view value) {
@@ -104,8 +102,6 @@ Bytes first(const std::array<std::byte, Size>& buffer, std::size_t size) {
 }
 
 using Buffer = std::array<std::byte, kMaxDatagram>;
-
-// ---- The conversation that is shown ----
 
 struct Shown {
   std::string name;
@@ -349,7 +345,7 @@ std::string sealed_file(Suite suite) {
                        .str());
   }
 
-  // Datagrams that a client drops directly after the handshake.
+  // Dropped by a client directly after the handshake.
   Bytes state = examples::data(1, examples::echo(), examples::state());
   state.erase(state.begin(), state.begin() + kHeaderSize);
   const Header good{.connection_id = examples::kConnection, .packet_number = 1};
@@ -382,8 +378,7 @@ std::string sealed_file(Suite suite) {
     const Key& split = welcome.split.responder_to_initiator;
     drop("in suite 1, with the key that Split() gave", "malformed", sealed(Suite::kNoise, split, good, state));
     drop("the key that Split() gave", "forged", sealed(suite, split, good, state));
-    // A reversed packet number in the nonce, as from a little-endian implementation, under a header with the correct
-    // number.
+    // A reversed number in the nonce, as from a little-endian implementation, under a header with the correct one.
     const auto clear = encode_header({.suite = suite, .connection_id = examples::kConnection, .packet_number = 1});
     Bytes turned(clear.begin(), clear.end());
     turned.resize(kHeaderSize + state.size() + crypto::kTagSize);

@@ -6,7 +6,6 @@
 
 namespace tendon::vectors {
 
-/// Returns the generated files of protocol/vectors/ by name.
 std::map<std::string, std::string> files();
 
 }  // namespace tendon::vectors

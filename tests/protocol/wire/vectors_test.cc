@@ -23,7 +23,7 @@
 #include "tests/protocol/examples.h"
 #include "tests/protocol/wire/raw_protobuf.h"
 
-// Checks that protocol/vectors/, with which other languages test their code, is correct and matches our code.
+// Other languages test their code with protocol/vectors/.
 
 namespace tendon::vectors_test {
 namespace {
@@ -60,8 +60,6 @@ Key key(const std::string& hex) {
 }
 Key key(const Json& json, const std::string& name) { return key(text(json, name)); }
 
-// ---- what others have computed ----
-
 TEST(Vectors, X25519GivesTheAnswersOfRfc7748) {
   const Json file = read("primitives.json");
   for (const Json& v : file.at("x25519")) {
@@ -84,8 +82,7 @@ TEST(Vectors, HmacGivesTheAnswersOfRfc4231) {
   }
 }
 
-/// Returns the packet number of a nonce, or nothing if the nonce is not one of Noise: four zeros, then the number. Such
-/// vectors are for libraries that accept any nonce.
+/// Returns the packet number of a Noise nonce (four zeros, then the number). Others are for libraries that accept any.
 std::optional<std::uint64_t> number_in(const Bytes& nonce, Suite suite) {
   if (std::any_of(nonce.begin(), nonce.begin() + 4, [](std::byte b) { return b != std::byte{}; })) return {};
   std::uint64_t number = 0;
@@ -152,8 +149,6 @@ TEST(Vectors, OurNoiseIsThatOfCacophony) {
     }
   }
 }
-
-// ---- our own bytes ----
 
 TEST(Vectors, AreWhatTheCodeWrites) {
   if (!crypto::has_aes()) GTEST_SKIP() << "this processor has no AES: sealed_aes.json cannot be written";
@@ -242,7 +237,6 @@ TEST(Vectors, AFrameAtItsBoundsIsWrittenAgainAsItWasRead) {
   }
 }
 
-/// The session must answer these requests and accept these answers.
 TEST(Vectors, ARequestOrAnswerOutOfBoundsIsReadAsOneThatIsRefused) {
   const std::set<std::string> requests = {
       "SetStateRate", "Rearm",  "Describe", "TakeLease", "GiveLease", "LeaseLost", "SetStateDeadband",

@@ -8,7 +8,7 @@
 
 #include "core/base/reason.h"
 
-// WIRE.md is the specification for other languages, so its table of reasons must match the code.
+// The specification for other languages must have the code's table of reasons.
 
 namespace tendon::wire_md_test {
 namespace {

@@ -14,11 +14,10 @@
 namespace tendon::rooms {
 namespace {
 
-/// A path with one of these endings is a citation when its first folder is a room. A page (.md) always is one.
+/// A citation when the first folder is a room. A page (.md) always is one.
 const Names kCitedSources = {"*.h",  "*.cc",   "*.py",  "*.ts",    "*.mjs",  "*.proto",
                              "*.sh", "*.toml", "*.csv", "*.cmake", "*.html", "*.css"};
 
-/// Cited pages of other projects.
 const Names kPagesElsewhere = {"docs/spec.md"};
 
 constexpr std::string_view kProofs = "core/PROOFS.md";
@@ -65,7 +64,7 @@ bool is_of_path(char c) {
   return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_' || c == '.' || c == '/' || c == '-';
 }
 
-/// Returns whether `name` cites a file of this tree. The name "x" is a placeholder.
+/// The name "x" is a placeholder.
 bool names_a_file(std::string_view name) {
   if (name.starts_with('/') || name.substr(name.rfind('/') + 1).starts_with('.') || one_of(name, kPagesElsewhere) ||
       contains(name, "/x.") || contains(name, "/x_") || contains(name, "/x/")) {
@@ -97,7 +96,7 @@ void check_cited_files(const File& file, std::string_view prose, const Citable& 
       while (name.ends_with('.')) {  // the end of a sentence
         name.remove_suffix(1);
       }
-      // The name is a part of a URL, a variable or a pattern.
+      // Part of a URL, a variable or a pattern.
       const bool part = (from > 0 && contains(":~@$<>{}*\\", line.substr(from - 1, 1))) ||
                         (to < line.size() && contains("<>{}*$", line.substr(to, 1)));
       from = to;
@@ -112,8 +111,7 @@ void check_cited_files(const File& file, std::string_view prose, const Citable& 
   }
 }
 
-/// Finds `core/PROOFS.md, "Output bound"` and `core/PROOFS.md, "Output bound" and "Late holds"`, also over the end of a
-/// line.
+/// `core/PROOFS.md, "Output bound"` and `core/PROOFS.md, "Output bound" and "Late holds"`, also over a line end.
 void check_cited_sections(const File& file, std::string_view prose, const Citable& citable,
                           std::vector<Finding>& findings) {
   constexpr std::string_view kSpace = " \t\n";

@@ -20,8 +20,6 @@
 namespace tendon::rooms {
 namespace {
 
-// ---- The rules, as tables -------------------------------------------------------------------------------------------
-
 struct Room {
   std::string_view name;
   Names may_include;
@@ -34,8 +32,8 @@ const std::vector<Room>& rooms() {
       {"protocol", {"protocol", "core"}},
       {"devices", {"devices", "core"}},
       {"server", {"server", "protocol", "core", "devices"}},
-      // A client may include its own folder, clients/cpp, and the headers of protocol, which also provide the types
-      // of core. It may not include other clients.
+      // A client may include its own folder, clients/cpp, and the headers of protocol, which provide the types of core,
+      // but no other clients.
       {"clients", {"protocol"}},
   };
   return kRooms;
@@ -45,14 +43,13 @@ const Names kAtTheRoot = {".ci",          ".dockerignore",  ".clang-format",    
                           "CHANGELOG.md", "CMakeLists.txt", "CMakePresets.json", "CONTRIBUTING.md", "LICENSE",
                           "README.md"};
 
-/// These headers can be included from every room. They control the floating point unit, pass the newest value between
-/// threads, find misspelled words, format the errors of a command line, print without waiting for a reader, and declare
-/// the keys of a scene.
+/// From every room: control the floating point unit, pass the newest value between threads, find misspelled words,
+/// format the errors of a command line, print without waiting for a reader, and declare the keys of a scene.
 const Names kForAllRooms = {"core/base/arithmetic.h",   "core/base/nearest_word.h",   "core/exchange/latest.h",
                             "clients/cpp/usage.h",      "server/machine/output.h",    "server/scene/reader.h",
                             "server/scene/reference.h", "server/scene/scene_error.h", "server/scene/values.h"};
 
-/// Paths that end with a slash are folders. Paths that begin with a star are suffixes.
+/// If a path ends with a slash, it is a folder. If it begins with a star, it is a suffix.
 struct Door {
   std::string_view library;
   Names headers;
@@ -77,7 +74,7 @@ const std::vector<Door>& front_doors() {
       {"Eigen's tree of boxes", {"unsupported/Eigen/BVH"}, {"clients/softbody/effects/self_collision.cc"}},
       {"libsodium", {"sodium.h", "sodium/"}, {"protocol/secrets/crypto.cc", "devices/falcon/firmware.cc"}},
       {"libusb", {"libusb.h", "libusb-1.0/"}, {"devices/usb/with_libusb.cc", "tests/devices/usb/far_usbfs.cc"}},
-      // JSON output of programs and their libraries. The haptic thread writes no JSON.
+      // The haptic thread writes no JSON.
       {"nlohmann's JSON",
        {"nlohmann/"},
        {"server/commands/", "server/main.cc", "clients/cpp/discovery/list.cc", "clients/cpp/engine/self_test.cc",
@@ -124,14 +121,12 @@ const std::set<std::string_view> kSystemHeaders = {"dlfcn.h",  "elf.h",    "fcnt
                                                    "sched.h",  "signal.h", "spawn.h", "unistd.h"};
 const Names kSystemFolders = {"arpa/", "linux/", "net/", "netinet/", "sys/"};
 
-/// The background thread may outlive the model that gave it work, or end earlier, so both share ownership of the
-/// data.
+/// The background thread may outlive the model that gave it work, or end earlier, so both share the data.
 const Names kSharedWithAThread = {"clients/softbody/near/near_model.cc", "clients/softbody/near/near_model.h",
                                   "server/machine/output.cc"};
 
-/// Threads of the server and of the client library read the clock once per turn, and their sockets on each receive.
-/// All other code takes the time as a parameter. tests/core/base/time_test.cc checks that the time types of core have
-/// no now().
+/// Server and client library read the clock once per turn, and their sockets on each receive. All other code takes the
+/// time as a parameter. tests/core/base/time_test.cc checks that the time types of core have no now().
 const Names kClockReaders = {
     "server/machine/clock.h", "server/machine/clock.cc", "server/machine/log.cc", "server/server.cc",
     "server/machine/udp_link.cc", "clients/cpp/machine.h", "clients/cpp/machine.cc",
@@ -141,8 +136,6 @@ const Names kClockReaders = {
     "tests/devices/usb/", "tests/core/base/time_test.cc", "tests/tools/lab/experiments/meter.cc",
     "tests/tools/injector/proxy/real_time.cc", "tests/tools/conformance/udp_wire.cc",
     "tests/tools/conformance/worker_wire.cc", "*_main.cc"};
-
-// ---- Reading --------------------------------------------------------------------------------------------------------
 
 /// "clients/cpp/" for "clients/cpp/run.cc".
 std::string_view client_folder(std::string_view path) {
@@ -170,8 +163,6 @@ std::string list(const Names& names) {
   }
   return all;
 }
-
-// ---- The rules about one file ---------------------------------------------------------------------------------------
 
 std::optional<std::string> broken_by_project_include(const std::string& path, const Include& include) {
   const auto here = first_folder(path);
@@ -275,7 +266,7 @@ const std::vector<Forbidden>& forbidden_words() {
                      std::regex(R"(\bapp\.parse\s*\()"),
                      "usage::parse() parses command lines: CLI11 takes an empty text for 0",
                      [](std::string_view path) { return path != "clients/cpp/usage.cc"; }});
-    // Finds statements that print a text field of tendon.proto.
+    // Statements that print a text field of tendon.proto.
     words.push_back({{"cout", "cerr"},
                      std::regex(R"(\bstd::(cout|cerr)\b(?!.*\bvisible\().*)"
                                 R"(((\b(hello|welcome|peer)\w*|[^.\w]client\w*)(\.|->)name\b)"
@@ -316,8 +307,6 @@ void check_first_lines(const File& file, std::vector<Finding>& findings) {
     findings.push_back({file.path, 1, "a header has #pragma once"});
   }
 }
-
-// ---- The rules about the tree ---------------------------------------------------------------------------------------
 
 void check_places(const std::vector<File>& tree, std::vector<Finding>& findings) {
   std::set<std::string_view> paths;

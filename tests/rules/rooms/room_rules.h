@@ -14,7 +14,6 @@ struct File {
   std::string text;
 };
 
-/// A broken rule: where, and the rule as a sentence.
 struct Finding {
   std::string path;
   int line = 1;
@@ -23,30 +22,26 @@ struct Finding {
   friend bool operator==(const Finding&, const Finding&) = default;
 };
 
-/// Checks the rules about includes and files, from the text of all files:
+/// Checks the rules about includes and files:
 ///
 ///     clients ──▶ protocol ──▶ core ◀── devices        tests may include everything;
 ///                     ▲          ▲          ▲          only tests may include server and tests
 ///                     └───────  server  ────┘
 ///
-/// The rules cover includes between rooms, the files that may use each library, what core and protocol must not use,
-/// who may read a clock, functions that are forbidden everywhere, the license line, a README.md in each room, files
-/// at the root, and citations of files and of sections of core/PROOFS.md.
-///
-/// The rule about citations reads pages (except CHANGELOG.md) and comments. The others ignore comments and the
-/// contents of string literals. The findings are in the order of `tree` and by line; those about the whole tree are
-/// last.
+/// Includes between rooms, the files that may use each library, what core and protocol must not use, who may read a
+/// clock, functions that are forbidden everywhere, the license line, a README.md in each room, files at the root, and
+/// citations (in pages except CHANGELOG.md, and in comments) of files and of sections of core/PROOFS.md. The findings
+/// are in the order of `tree` and by line; those about the whole tree are last.
 std::vector<Finding> check(const std::vector<File>& tree);
 
-/// Reads all files under `root` in the order of their paths, without those that git ignores (build folders, caches,
-/// packages). Throws std::filesystem::filesystem_error if `root` cannot be read.
+/// All files in the order of their paths, without those that git ignores (build folders, caches, packages). Throws
+/// std::filesystem::filesystem_error if `root` cannot be read.
 std::vector<File> read_tree(const std::filesystem::path& root);
 
 /// Returns `path:line: rule`, which editors and terminals turn into a link.
 std::string to_string(const Finding& finding);
 
-/// Replaces all comments and the contents of string and character literals by spaces. Lines and columns stay the
-/// same. The file name in #include "…" is kept.
+/// They become spaces, so lines and columns stay the same. The file name in #include "…" is kept.
 std::string without_comments_and_strings(std::string_view text);
 
 }  // namespace tendon::rooms

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The last test checks this tree. The others show that the checker finds what it must find: each passes a small tree
-// in which one rule is broken.
+// The last test checks this tree. Each of the others passes a small tree in which one rule is broken.
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -57,7 +57,6 @@ void for_each_comment_and_literal(std::string_view text, const OnComment& commen
     const auto at = text.find(mark, from);
     return at == std::string_view::npos ? text.size() : at + mark.size();
   };
-  // Returns the end of a literal that begins at `from` with `quote`.
   const auto end_of_literal = [&](std::size_t from, char quote) {
     auto i = from + 1;
     while (i < text.size() && text[i] != quote && text[i] != '\n') {
@@ -105,7 +104,6 @@ void for_each_comment_and_literal(std::string_view text, const OnComment& commen
   }
 }
 
-/// Returns `text` with a space in place of each character except for line ends.
 inline std::string spaces_for(std::string_view text) {
   std::string spaces(text);
   std::ranges::replace_if(

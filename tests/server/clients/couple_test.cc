@@ -13,7 +13,7 @@
 #include "tests/server/clients/place.h"
 #include "tests/support/wire.h"
 
-// Two servers with coupled devices and haptic loops in virtual time, and clients that send requests.
+// Two servers with coupled devices and haptic loops in virtual time, and clients.
 
 namespace tendon::couple_test {
 namespace {
@@ -98,7 +98,7 @@ TEST_F(Coupled, ACutNetworkIsLostAndOnlyAnActCouplesAgain) {
   expect_sound();
 }
 
-/// A sealed session is identified by its number, so the coupling is not affected.
+/// The number identifies a sealed session.
 TEST_F(Coupled, AnEndWhoseAddressChangesStaysEngaged) {
   const Key key = Ratchet(std::uint64_t{5}).next();
   follower_ = place(shipped("follower.toml"), ++epoch_, key);
@@ -152,7 +152,6 @@ TEST_F(Coupled, APortWhoseHandleIsNotCoupledTellsNoTurnAndNoGrip) {
   EXPECT_FALSE(leader_->newest().sent.turn || leader_->newest().sent.grip);
 }
 
-/// The clock of the machine was set back. The epoch is therefore smaller than the one that the leader knows.
 TEST_F(Coupled, AServerThatComesBackWithALowerEpochIsHeard) {
   epoch_ = 10;
   start_engaged();

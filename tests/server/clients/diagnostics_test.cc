@@ -16,7 +16,7 @@ std::uint64_t sum(const LatenessHistogram& lateness) {
   return std::accumulate(lateness.begin(), lateness.end(), std::uint64_t{0});
 }
 
-/// An engine, and an observer that requests all features. They only send datagrams if they are passed to `run`.
+/// The observer requests all features. Both only send if they are passed to `run`.
 class Diagnosed : public SealedServer {
  protected:
   Client a = controller(wall_, "192.0.2.1:4000");
@@ -157,7 +157,7 @@ TEST_F(SealedServer, AnEngineReceivesNotOneByteMoreWhereOthersDiagnose) {
   EXPECT_TRUE(to_engine(true) == before);
 }
 
-/// A client that requests the feature as a controller, which ours does not.
+/// Ours does not request it as a controller.
 TEST_F(SealedServer, AControllerIsNotGrantedTheFeatureAndIsToldNothingOfIt) {
   restart_without_keys();
   wanted_ = Vec3(3, 0, -4);
@@ -182,7 +182,6 @@ TEST_F(TwoDevices, AnObserverIsToldOfItsDeviceAndOfEachEngineThere) {
   Client right = controller(other_, "192.0.2.2:4000", {.device = "right", .channel = "tissue", .take_lease = true});
   Client waits = controller(wall_, "192.0.2.5:4000",
                             {.device = "right", .channel = "tissue"});  // holds no lease, so it appears in no
-                                                                        // report
   Client watches_left = observer(screen_, "192.0.2.3:4000", {.device = "left", .diagnostics = true});
   Client watches_right = observer(screen_, "192.0.2.4:4000", {.device = "right", .diagnostics = true});
   measured_ = true;
@@ -248,7 +247,6 @@ TEST_F(SealedServer, SaysThatAnEnginesWayIsFullAndThatItsForcesAreNotTaken) {
   EXPECT_TRUE(b->peer_reports().front().forces_refused);
 }
 
-/// An engine that reports its solver path. `touch` is its answer.
 class EngineWithWays : public SealedServer {
  protected:
   Client engine(const std::vector<std::string>& ways) {

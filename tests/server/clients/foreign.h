@@ -10,7 +10,7 @@
 
 namespace tendon {
 
-/// An unencrypted client that can say what ForceClient does not.
+/// Unencrypted; says what ForceClient cannot.
 class Foreign {
  public:
   Foreign(Wire& wire, const std::string& address, const Address& server, const Hello& hello, LocalTime now)
@@ -18,7 +18,6 @@ class Foreign {
     connection_.greet(now, hello);
   }
 
-  /// Passes each event of the session to `take`.
   template <class Take>
   void turn(LocalTime now, const Take& take) {
     connection_.begin_turn();

@@ -13,7 +13,7 @@ namespace {
 
 using std::chrono::milliseconds;
 
-/// This is a device with four buttons and axes. The observer receives one of 20 states.
+/// Four buttons and axes. The observer receives one of 20 states.
 class Handle : public SealedServer {
  protected:
   Handle() {
@@ -169,8 +169,7 @@ TEST_F(Handle, ColumnsAreSentOnlyToThoseThatNamedTheFeature) {
   }
 }
 
-/// Clients with the feature `joints` receive the joints and their names. For other clients, the size of the states is
-/// the same as before.
+/// For other clients, the states have the same size as before.
 TEST_F(Handle, JointsAreToldToThoseThatNamedTheFeature) {
   for (const bool asks : {false, true}) {
     handle_ = HandleDescription{.buttons = {"right"}, .joints = {"upper", "lower"}};

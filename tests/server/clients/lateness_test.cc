@@ -11,7 +11,7 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-/// An engine at 100 Hz with a round trip of 40 ms and a force validity of 30 ms.
+/// 100 Hz, a round trip of 40 ms and a force validity of 30 ms.
 class Engine {
  public:
   explicit Engine(bool same_machine = false) { lateness.begin(now_, same_machine); }
@@ -100,7 +100,7 @@ TEST(Lateness, OnlyTheSilenceOfALocalEngineIsItsFault) {
   }
 }
 
-/// Two consecutive datagrams with time stamps `apart`, then a force with a long round trip.
+/// Time stamps `apart`, then a force with a long round trip.
 Lateness::Report after_silence(Duration apart, std::uint64_t lost) {
   Engine engine;
   engine.answer_times(200);

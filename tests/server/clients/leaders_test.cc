@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// Three servers in virtual time: a device with two leaders, and a client of the follower that changes the shares.
 #include <memory>
 #include <string>
 #include <vector>
@@ -26,7 +24,6 @@ class TwoLeaders : public Places {
     come(*follower_, "desk");
   }
 
-  /// Replaces the client.
   void come(const Place& server, const std::string& channel) {
     const Hello hello{.role = Role::kController,
                       .name = "desk",
@@ -163,7 +160,7 @@ TEST_F(TwoLeaders, WhoeverTakesTheChannelOfASilentLeaderMayCouple) {
   run(seconds(3));
   cut_off_ = leader_->end.self;
   come(*follower_, "trainer");
-  run(milliseconds(700));  // the lease has expired, the session has not
+  run(milliseconds(700));  // the lease has expired, but the session has not
   ASSERT_EQ(asked(TakeLease{.device = 0, .channel = kTrainer}).code, Code::kOk);
   Couple couple = couple_of(*leader_->scene.loop.control.coupling);
   couple.channel = kTrainer;

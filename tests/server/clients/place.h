@@ -81,7 +81,6 @@ struct Place {
   std::map<std::uint32_t, PortRecord> ports_;  ///< by channel
 };
 
-/// A client of a place. It stores the coupling states and the last answer that it receives.
 class Viewer : public Foreign {
  public:
   struct Seen {
@@ -106,7 +105,7 @@ class Viewer : public Foreign {
   std::optional<Session::RequestAnswered> answer;
 };
 
-/// Two or three servers with coupled devices and haptic loops in virtual time, and clients.
+/// Two or three, with coupled devices and haptic loops in virtual time, and clients.
 class Places : public ::testing::Test {
  protected:
   std::unique_ptr<Place> place(const Scene& scene, std::uint64_t epoch, const std::optional<Key>& key = {}) {

@@ -67,7 +67,7 @@ TEST_F(SealedServer, TakesForcesThatAnswerAPredictedStepWhichItWasTooLateToSee) 
   }
   EXPECT_EQ(stats().unanswerable, unanswerable);
   EXPECT_GT(stats().forces - forces, 450U);
-  EXPECT_GT(unseen, 90U);  // of the states that were the newest ones in their turn
+  EXPECT_GT(unseen, 90U);
 }
 
 }  // namespace

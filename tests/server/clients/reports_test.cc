@@ -30,15 +30,15 @@ TEST_F(SealedServer, TellsControllersAloneOnceASecondHowTheirForcesFare) {
   EXPECT_GT(report.received, 2900U);
   ASSERT_TRUE(report.round_trip && report.to_server && report.to_client);
   EXPECT_LE(report.round_trip->p99, milliseconds(2));
-  // Both ends share one clock here, so the estimated offset must be zero within its bound.
+  // Both ends share one clock.
   EXPECT_LE(std::chrono::abs(report.clock_offset), report.clock_error);
   EXPECT_LE(std::chrono::abs(report.to_server->median + report.to_client->median - report.round_trip->median),
             milliseconds(1));
   EXPECT_FALSE(b->report().has_value());
 }
 
-/// The delay is 20 ms in each direction. One end is preempted for 36 ms in the middle of a turn. If a datagram arrives
-/// during this time, it is handled with the time at the beginning of the turn.
+/// 20 ms in each direction. One end is preempted for 36 ms in the middle of a turn; a datagram that arrives meanwhile
+/// is handled with the time at the beginning of the turn.
 class InterruptedTurn : public SealedServer, public testing::WithParamInterface<bool> {};
 
 TEST_P(InterruptedTurn, MakesNoWayLookShort) {

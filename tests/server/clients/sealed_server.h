@@ -14,8 +14,8 @@
 #include "tests/server/clients/foreign.h"
 #include "tests/server/servers.h"
 
-// The network loops of a server with real clients and forgers, in virtual time on a perfect network. The haptic loops
-// do not run: the test sets the states of the devices and reads the forces from the mailboxes.
+// Network loops with real clients and forgers, in virtual time on a perfect network. No haptic loops: the test sets the
+// states and reads the forces from the mailboxes.
 
 namespace tendon {
 
@@ -43,7 +43,6 @@ class SealedServer : public Servers {
     restart();
   }
 
-  /// Starts a server with `config_`, `scenes_` and `shards_`.
   void restart() {
     serve(scenes_, shards_, {.network = config_, .watched = Mailboxes::Capacities{.steps = 1, .flight = 2}});
   }
@@ -87,7 +86,7 @@ class SealedServer : public Servers {
     return join(key, address, config, std::move(watch));
   }
 
-  /// Advances time by 1 ms and one device step at a time. `on_the_way` may change or drop datagrams.
+  /// 1 ms and one device step at a time. `on_the_way` may change or drop datagrams.
   template <class OnTheWay>
   void run(Duration length, const std::vector<Client*>& clients, const OnTheWay& on_the_way) {
     for (const LocalTime end = now_ + length; now_ < end; now_ += std::chrono::milliseconds(1)) {
@@ -107,7 +106,7 @@ class SealedServer : public Servers {
   void run(Duration length, const std::vector<Client*>& clients) {
     run(length, clients, [](Datagram&) { return true; });
   }
-  /// Writes the next state of each device. The x position of device i is i.
+  /// The x position of device i is i.
   void put_states() {
     tick_ += tick_step_;
     ++health_.steps;
@@ -128,15 +127,13 @@ class SealedServer : public Servers {
   void turn() {
     for (std::size_t i = 0; i < shards_; ++i) assembly_->turn_network(i, now_);
   }
-  /// Like UdpLink::several: data is delivered to the shard that owns the connection, other datagrams to the first
-  /// shard.
+  /// Like UdpLink::several: data to the shard that owns the connection, other datagrams to the first.
   void deliver(const Address& from, const Bytes& bytes) {
     const auto header = decode_header(bytes);
     const bool of_session = header && header->type == DatagramType::kData;
     ends_[of_session ? header->connection_id % shards_ : 0].inbox.push_back({from, server_, bytes});
   }
 
-  /// Runs for `length` with a foreign client, whose events are passed to `take`.
   template <class Take>
   void run_with(Foreign& client, Duration length, const Take& take) {
     for (const LocalTime end = now_ + length; now_ < end;) {
@@ -147,8 +144,7 @@ class SealedServer : public Servers {
       });
     }
   }
-  /// Runs a foreign controller for `length`. It answers each state with a valid force changed by `spoil`. Returns its
-  /// newest report.
+  /// Answers each state with a valid force changed by `spoil`. Returns its newest report.
   template <class Spoil>
   std::optional<LinkReport> run_foreign(Duration length, const Spoil& spoil) {
     Foreign client(wire_, "127.0.0.1:4000", server_, foreign_, now_);
@@ -167,8 +163,7 @@ class SealedServer : public Servers {
     });
     return report;
   }
-  /// Runs for `length` with a foreign client that names `features`, and passes its events to `see`. Returns the
-  /// features that were agreed on.
+  /// Names `features` and passes its events to `see`. Returns the features agreed on.
   template <class See>
   std::vector<std::string> run_seeing(const std::vector<std::string>& features, Duration length, const See& see,
                                       Role role = Role::kObserver) {
@@ -176,7 +171,6 @@ class SealedServer : public Servers {
     run_with(client, length, see);
     return client.welcome.value().features;
   }
-  /// Returns a controller whose session has been open for about 300 ms.
   Client opened(const std::optional<ClientKey>& key, const std::string& address,
                 const ForceClient::Config& config = {}) {
     Client client = controller(key, address, config);

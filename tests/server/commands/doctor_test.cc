@@ -19,7 +19,6 @@ namespace {
 using namespace std::chrono_literals;
 using testing::ScratchFolder;
 
-/// A machine simulated by files.
 class Machine {
  public:
   void say(const std::string& file, const std::string& text) {
@@ -109,7 +108,7 @@ TEST(Doctor, OfWhatTheKernelDoesNotSayItClaimsNothing) {
 }
 
 TEST(Doctor, MeasuresLatenessAgainstTheScheduleNotTheLastWakeUp) {
-  // Wake-up n is n µs late, from 0 to 99. The last one has an additional pause.
+  // Wake-up n is n µs late, from 0 to 99. The last one also has a pause.
   LocalTime now{5s};
   int sleeps = 0;
   LocalTime first_due{};

@@ -24,7 +24,7 @@ std::function<Duration()> ticking() {
   return [now = Duration{}]() mutable { return now += 1us; };
 }
 
-/// Returns the optional parts of a haptic step: device effects, tables, and one key.
+/// Device effects, tables, and one key.
 std::set<std::string> optional_parts() {
   std::set<std::string> keys = {
       "device.hand", "device.environment", "device.rotation", "device.gripper",     "loop.max_speed_m_per_s", "safety",
@@ -104,8 +104,8 @@ TEST(Explain, SaysHowACouplingIsFeltByEachMethod) {
 }
 
 TEST(Explain, ACostIsTheDifferenceToTheSceneWithoutThePart) {
-  // The clock ticks once in each round of 200 steps. It does not tick in the first trial without a part. This is the
-  // trial without viscous friction, so the cost of this part is the cost of a whole step.
+  // One tick in each round of 200 steps, but none in the first trial without a part, the one without viscous friction.
+  // So the cost of this part is the cost of a whole step.
   const Scene scene = shipped("demo_parts.toml");
   std::size_t looks = 0;
   const std::size_t trials =

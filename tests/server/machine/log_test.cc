@@ -17,7 +17,6 @@ namespace {
 
 using namespace std::chrono_literals;
 
-/// Captures std::cerr.
 class Written {
  public:
   Written() : before_(std::cerr.rdbuf(text_.rdbuf())) {}

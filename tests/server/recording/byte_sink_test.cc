@@ -122,7 +122,7 @@ TEST_F(FileSinkTest, CutsOffAPieceThatDidNotFit) {
   FileSink sink(path);
   ASSERT_TRUE(sink.append(bytes("whole")));
   {
-    const testing::FullDisk disk(8);  // has room for a part of the write
+    const testing::FullDisk disk(8);  // accepts only a part of the write
     EXPECT_FALSE(sink.append(bytes("too long")));
   }
   EXPECT_NE(sink.error().find("File too large"), std::string::npos) << sink.error();

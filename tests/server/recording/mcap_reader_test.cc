@@ -17,7 +17,7 @@
 namespace tendon::mcap_reader_test {
 namespace {
 
-/// Two chunks with three messages each. The messages are "0", "1" … "5", and the time of each is its number in ns.
+/// Two chunks of three messages, "0" to "5", with their number as the time in ns.
 std::string sample_file() {
   MemorySink sink;
   McapWriter writer("lib", sink);
@@ -85,19 +85,18 @@ TEST(McapReader, GivesTheWholeChunksOfAFileCutAnywhere) {
   EXPECT_EQ(seen, 6U);
 }
 
-/// Positions of the chunks in `sample_file`, see McapWriter.WritesTheBytesOfTheSpecification. A chunk has three
-/// messages of 32 bytes, and its index three entries of 16 bytes.
+/// In `sample_file`, see McapWriter.WritesTheBytesOfTheSpecification. A chunk has three messages of 32 bytes, and its
+/// index three entries of 16 bytes.
 constexpr std::size_t kFirstChunk = 8 + 20 + 26 + 28;
 constexpr std::size_t kChunk = 9 + 40 + 3 * 32;
 constexpr std::size_t kSecondChunk = kFirstChunk + kChunk + 9 + 6 + 3 * 16;
 
-/// Returns the messages of the chunks outside the range [from, to).
 std::string outside_of(std::size_t from, std::size_t to) {
   const auto whole = [&](std::size_t chunk) { return to <= chunk || from >= chunk + kChunk; };
   return std::string(whole(kFirstChunk) ? "012" : "") + (whole(kSecondChunk) ? "345" : "");
 }
 
-/// Checks that `outcome` contains at least the messages in `least`, and only complete chunks.
+/// The messages in `least`, and only complete chunks.
 void expect_at_least(const Outcome& outcome, const std::string& least) {
   EXPECT_EQ(outcome.error, "");
   for (const std::string& chunk : {std::string("012"), std::string("345")}) {
@@ -196,8 +195,7 @@ TEST(McapReader, NamesFileBytesAndTimesOfDamage) {
                                    ": the CRC of a chunk does not match; 145 bytes are skipped, after 0.000 s");
 }
 
-// A recorded datagram of a client may contain a chunk. The reader must not use it if the length of the outer chunk is
-// damaged.
+// A recorded datagram may contain a chunk, which must not be used if the length of the outer one is damaged.
 TEST(McapReader, ReadsNoChunkWithinAChunkWhoseLengthIsDamaged) {
   const std::string whole = sample_file();
   MemorySink sink;

@@ -40,7 +40,7 @@ Contents read_file(const fs::path& path) {
   return testing::read_all(reader);
 }
 
-/// Records `steps` steps from tick `first` on, with one tick of the log thread per step.
+/// Records `steps` steps from tick `first` on. The log thread has one tick per step.
 void record_run(PartRecorder& recorder, std::uint64_t first, std::uint64_t steps) {
   for (std::uint64_t tick = first; tick < first + steps; ++tick) {
     recorder.record(sample_step(tick));
@@ -163,7 +163,7 @@ TEST_F(PartRecorderTest, AFileThatIsDeletedAsItClosesIsMissing) {
   EXPECT_FALSE(recorder.status().complete());
 }
 
-/// Records ten steps per second, with a fault from `first_fault` to `last_fault` (s).
+/// Ten steps per second, with a fault from `first_fault` to `last_fault` (s).
 void record_seconds(PartRecorder& recorder, int from, int until, int first_fault = -1, int last_fault = -1) {
   for (int tick = 10 * from; tick < 10 * until; ++tick) {
     StepRecord step = sample_step(static_cast<std::uint64_t>(100 * tick));
@@ -258,7 +258,7 @@ TEST_F(PartRecorderTest, ABudgetDeletesItsOwnOldestPartsAndNothingElse) {
   }
   PartRecorder::Config config = config_at(path);
   config.budget_bytes = 4'000'000;
-  for (int run = 0; run < 2; ++run) {  // includes the parts of an earlier run
+  for (int run = 0; run < 2; ++run) {
     PartRecorder recorder(config);
     for (std::uint64_t tick = 0; tick < 20'000; ++tick) {
       recorder.record(sample_step(tick));
@@ -354,7 +354,7 @@ TEST_F(PartRecorderTest, HoldsNoMoreMemoryAfterADayThanAfterTwoHours) {
     if (quarter == std::int64_t{8} * 3600 - 10) after_two_hours = held();
   }
   EXPECT_GE(recorder.status().parts, 23U);
-  // Both are measured at the end of an hour. The index of a chunk has about 150 bytes.
+  // At the end of an hour. The index of a chunk has about 150 bytes.
   EXPECT_NEAR(held(), after_two_hours, 100e3);
 }
 

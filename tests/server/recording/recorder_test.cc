@@ -150,7 +150,7 @@ TEST(Recorder, LeavesAReadableFileAndAnHonestCountOnADiskOfAnySize) {
     recorder.close();
   }
   ASSERT_GE(endless.borders.size(), 8U);
-  // The result can only change at the end of a piece. The capacities on both sides of each end are tested.
+  // On both sides of the end of each piece, where alone the result can change.
   std::vector<std::size_t> capacities = {0};
   for (const std::size_t border : endless.borders) {
     capacities.push_back(border - 1);

@@ -55,7 +55,7 @@ TEST(RecordingCodec, TheSchemaStandsAlone) {
     EXPECT_NE(pool.FindMessageTypeByName(std::string(kind.schema)), nullptr) << kind.schema;
 }
 
-// PlotJuggler would interpret such a field as the time in seconds and treat it as a double.
+// PlotJuggler would take it for the time in seconds and treat it as a double.
 TEST(RecordingCodec, NoFieldIsCalledTimestamp) {
   const auto* file = pb::Step::descriptor()->file();
   for (int m = 0; m < file->message_type_count(); ++m)
@@ -137,7 +137,6 @@ PortRecord a_port() {
   return port;
 }
 
-/// Returns the names of the fields that have no value in `message` and in the messages within it.
 std::vector<std::string> unset_in(const google::protobuf::Message& message) {
   std::vector<std::string> unset;
   for (int i = 0; i < message.GetDescriptor()->field_count(); ++i) {

@@ -36,7 +36,7 @@ using testing::ScratchFolder;
 
 constexpr std::int64_t kYear = 31'557'600'000'000'000;  // ns
 
-/// Random doubles with additional NaN, infinities, subnormals and both zeros.
+/// Returns random doubles, including NaN, infinities, subnormals and both zeros.
 double any_double() {
   return *rc::gen::weightedOneOf<double>(
       {{8, rc::gen::arbitrary<double>()},
@@ -294,7 +294,7 @@ Chunked chunked() {
   return file;
 }
 
-// Damage: a flipped bit, a sector of zeros, a sector of random bytes, or missing bytes.
+// A flipped bit, a sector of zeros or of random bytes, or missing bytes.
 RC_GTEST_PROP(RecordingReader, DamageLosesOnlyTheStepsOfTheChunksThatItMeets, ()) {
   static const Chunked file = chunked();
   RC_PRE(file.chunks.size() >= 4U);
@@ -336,7 +336,6 @@ RC_GTEST_PROP(RecordingReader, DamageLosesOnlyTheStepsOfTheChunksThatItMeets, ()
   std::uint64_t lost = 0;
   for (const LossRecord& loss : contents.losses) lost += loss.steps;
   RC_ASSERT(lost <= 40U - given.size());
-  // The summary contains the number of steps missing at the end.
   if (!killed && to <= last.to) RC_ASSERT(lost == 40U - given.size());
 }
 

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// recording_sample FOLDER: writes a run of two seconds as FOLDER/whole.mcap, and the same run killed during a write as
-// FOLDER/killed.mcap. Used to test recordings with third-party readers.
+// recording_sample FOLDER: two seconds as FOLDER/whole.mcap, and killed during a write as FOLDER/killed.mcap, for
+// third-party readers.
 
 #include <exception>
 #include <filesystem>

@@ -333,8 +333,8 @@ upper_arm_mm = 140
 forearm_mm = 140
 [limiter]
 adaptive_friction = {places_mm = [[0, 0, 0]], viscous_friction_n_s_per_m = [0.5], coulomb_friction_n = [)";
-  // The torque of 0.4 N at the longest lever of the turntable (0.14 m plus the reach) gives a larger force at a lever
-  // of 0.14 m. The minimum at the center is set by the other two joints, whose levers are constant.
+  // 0.4 N·m at the longest lever of the turntable (0.14 m plus the reach) is more at 0.14 m. The other two joints,
+  // whose levers are constant, set the minimum at the center.
   EXPECT_TRUE(minimal_and(scene + "0.4]}\n").loop.control.friction_map);
   const std::string error = error_of_minimal_and(scene + "0.45]}\n");
   EXPECT_TRUE(error.starts_with("s.toml:11: limiter.adaptive_friction.coulomb_friction_n: expected at most 0.4"))

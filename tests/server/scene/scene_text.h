@@ -31,7 +31,6 @@ struct Setting {
   double expected;
   double (*made)(S scene);
 };
-/// Parses `text` with all settings and checks the value of each one.
 void expect_made(const std::string& text, const std::vector<Setting>& settings);
 
 /// Returns the error message, or "no error".

@@ -24,7 +24,7 @@ ScriptedMotion::Recorded load(const std::string& text, const RecordedMotionFile&
   return load_recorded_motion(csv, file);
 }
 
-/// Returns the error of a recording hand.csv with a header and its positions in the column x.
+/// hand.csv with a header and its positions in the column x.
 std::string complaint(const std::string& text) {
   return thrown_by<std::runtime_error>([&] { load(text, {.path = "hand.csv", .position = "x"}); });
 }

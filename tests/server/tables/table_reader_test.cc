@@ -151,8 +151,6 @@ TEST(TableReader, AColumnThatIsMissingOrThereTwiceIsNamed) {
   EXPECT_EQ(error("1,2"), "t.csv:1: expected a header line with a column 't_s', found '1,2'");
 }
 
-// ---- Properties -----------------------------------------------------------------------------------------------------
-
 struct Drawn {
   Rows rows;
   std::string plain;    ///< commas and decimal points

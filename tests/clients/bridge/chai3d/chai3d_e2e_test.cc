@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The whole path of a CHAI3D program to a device: chai3d_program, libhdPhantom.so, tendon-bridge, tendond.
+// chai3d_program, libhdPhantom.so, tendon-bridge, tendond.
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <unistd.h>
@@ -24,7 +24,6 @@ using testing::ScratchFolder;
 
 std::string old_program(const std::string& name) { return std::string(TENDON_OLD_PROGRAMS) + "/" + name; }
 
-/// Starts tendon-bridge chai3d, which starts the program. The output of both is captured.
 Process bridge(const std::string& server, const ScratchFolder& folder, std::vector<std::string> program,
                const std::vector<std::string>& options = {}) {
   std::vector<std::string> arguments = {"chai3d", "--server", server};
@@ -52,7 +51,6 @@ std::vector<std::string> lines_with(const std::string& text, const std::string& 
   return lines;
 }
 
-/// Returns the CPU time that the process has used, s.
 double processor_time(pid_t pid) {
   std::ifstream file("/proc/" + std::to_string(pid) + "/stat");
   std::string text;
@@ -82,13 +80,11 @@ TEST(Chai3d, AProgramFindsTheDeviceAndMovesWithItOneTurnAStep) {
   const double took = number_in(end, "took_s");
   EXPECT_EQ(old.wait(), 0);
   EXPECT_EQ(number_in(end, "failed"), 0);
-  // The program takes one turn per haptic step, or per 2 ms if the machine pauses. At the turning points of the hand,
-  // several steps have the same encoder count.
+  // One turn per haptic step, or per 2 ms if the machine pauses. Where the hand turns, steps have equal counts.
   EXPECT_GT(number_in(end, "moved"), 0.4 * number_in(end, "turns"));
   EXPECT_LT(number_in(end, "turns"), 1.02 * 1000 * number_in(end, "took_s") + 10);
   EXPECT_GT(number_in(end, "turns"), 0.5 * 1000 * number_in(end, "took_s"));
   EXPECT_EQ(number_in(end, "threads"), 1) << "the library has none of its own";
-  // The simulated hand moves along the device's x axis, which is CHAI3D's y axis.
   double least = 0;
   double most = 0;
   for (const std::string& line : lines_with(old.out(), R"("position")")) {
@@ -162,8 +158,7 @@ TEST(Chai3d, ASecondBridgeIsToldThatTheChannelIsTaken) {
   EXPECT_EQ(first.wait(), 0);
 }
 
-/// A program that pushes along the device's x axis, and a client that observes the device. The scene has no limiter,
-/// so the device outputs the requested force.
+/// Pushes along the device's x axis. The scene has no limiter, so the device outputs the requested force.
 struct Pushing {
   explicit Pushing(const ScratchFolder& folder)
       : server(folder.path(), write(folder.path() / "hand.toml", kPressingHand), {"--without-limiter"}),

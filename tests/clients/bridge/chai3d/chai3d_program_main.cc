@@ -1,11 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Calls libhdPhantom.so as CHAI3D does (cPhantomDevice, cHapticDeviceHandler).
+// Calls libhdPhantom.so as CHAI3D does (cPhantomDevice, cHapticDeviceHandler): loads both libraries by name with
+// RTLD_GLOBAL and looks up 14 symbols; reads the number of devices, then for each device the number again, radius and
+// type, and opens it; reads the handle and sets the force in a loop without sleep; then calls Close and StopServo.
 //
-// Loads both libraries by name with RTLD_GLOBAL and looks up 14 symbols. Reads the number of devices, then for each
-// device the number again, radius and type, and opens it. Reads position, velocity, rotation and buttons and sets the
-// force in a loop without sleep, then calls Close and StopServo.
-//
-//  chai3d_program [--seconds S] [--wall N_PER_M] [--push X Y Z] [--twist X Y Z] [--second-process]
+// chai3d_program [--seconds S] [--wall N_PER_M] [--push X Y Z] [--twist X Y Z] [--second-process]
 //
 // The wall is at y > 0 in CHAI3D's frame. Prints one JSON object per line.
 #include <dlfcn.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests the threads of libhdPhantom.so in this process, with shared memory that the test provides.
+// The threads of libhdPhantom.so in this process, with shared memory of the test.
 #include <dlfcn.h>
 #include <fcntl.h>
 #include <gtest/gtest.h>
@@ -23,7 +23,7 @@ namespace {
 /// The longest time for which the library waits for a state.
 constexpr auto kLongestPace = std::chrono::milliseconds(2);
 
-/// Two devices in shared memory. The library searches for devices once per process, so there is only one instance.
+/// The library searches for devices once per process, so there is only one instance.
 class Library {
  public:
   static Library& get() {
@@ -90,8 +90,7 @@ TEST(HdPhantom, AForceWaitsForAStateThatItsThreadHasNotRead) {
 }
 
 TEST(HdPhantom, AThreadThatLooksOnTakesNoStateFromTheThreadThatPushes) {
-  // A program may draw in one thread and set forces in another. The machine may delay one of the attempts, but not
-  // all.
+  // Drawing and forces may be in different threads. The machine may delay one of the attempts, but not all.
   Library& library = Library::get();
   library.come();
   Duration shortest = Duration::max();
@@ -114,7 +113,7 @@ TEST(HdPhantom, AThreadThatReadsNothingPushesOnceAState) {
 }
 
 TEST(HdPhantom, AThreadThatPushesTwoDevicesInTurnWaitsOnceATurn) {
-  // CHAI3D's example with several devices accesses them one after the other.
+  // An example of CHAI3D accesses several devices in sequence.
   Library& library = Library::get();
   library.come();
   std::thread([&] {

@@ -13,7 +13,6 @@
 namespace tendon::bridge::chai3d::host_test {
 namespace {
 
-/// The bridge, the shared memory, and a program whose turns follow the virtual time.
 struct Theatre {
   explicit Theatre(const std::string& scene, const std::vector<std::string>& settings = {}, Quat lies = {1, 0, 0, 0},
                    double max_torque = 0)

@@ -29,7 +29,7 @@ TEST(NeededLibraries, OfThisTestHaveTheCLibraryAmongThem) {
 }
 
 TEST(NeededLibraries, OfThePhantomLibraryHaveNothingOfOurs) {
-  // The library does not depend on Protocol Buffers, so it cannot conflict with the version that a program uses.
+  // Protocol Buffers could conflict with the version that a program uses.
   const auto needed = needed_libraries(bytes_of(TENDON_HD_PHANTOM));
   EXPECT_TRUE(has(needed, "libc.so"));
   for (const std::string& library : needed) {
@@ -46,7 +46,6 @@ TEST(NeededLibraries, OfAScriptOrOfNothingAreNone) {
 }
 
 TEST(NeededLibraries, OfADamagedFileAreReadWithinItsBytes) {
-  // The address sanitizer detects invalid reads.
   const std::vector<std::byte> whole = bytes_of(TENDON_HD_PHANTOM);
   std::mt19937_64 random(7);
   for (int i = 0; i < 2000; ++i) {

@@ -1,4 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-// A program that is linked to libHD.so.
+// Linked to libHD.so.
 int hdInitDevice();  // NOLINT(readability-identifier-naming): OpenHaptics' name
 int main() { return hdInitDevice(); }

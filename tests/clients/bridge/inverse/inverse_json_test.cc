@@ -18,7 +18,7 @@ namespace {
 
 using nlohmann::json;
 
-/// Returns all 48 signed permutations, each positive sign both written and omitted.
+/// Signed permutations, each positive sign both written and omitted.
 std::vector<std::string> every_permutation() {
   std::vector<std::string> all;
   for (const std::string letters : {"XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX"}) {
@@ -39,7 +39,6 @@ std::string force_message(const std::string& command) {
 }
 
 TEST(InverseBasis, EveryPermutationTurnsAllThereAndBack) {
-  // WoodenHaptics' base frame, and values that differ on each axis.
   const Quat lies = quaternion_of(operator_from_device("right=-y up=z user=-x"));
   const Vec3 base(0.1, -0.2, 0.3);
   const Mat3 turned = Eigen::AngleAxisd(0.7, Vec3(1, 2, 3).normalized()).toRotationMatrix();
@@ -54,7 +53,7 @@ TEST(InverseBasis, EveryPermutationTurnsAllThereAndBack) {
     EXPECT_EQ(view.base_position(view.position(base)), base) << permutation;
     EXPECT_EQ(view.base_force(view.force(base)), base) << permutation;
     EXPECT_EQ(view.base_torque(view.torque(base)), base) << permutation;
-    // A point of the rotated handle must have the same position in the base frame and in the client's frame.
+    // A point of the rotated handle has one position in the base frame.
     const Mat3 seen = view.orientation(quaternion_of(turned));
     EXPECT_NEAR(seen.determinant(), 1, 1e-12) << permutation;
     const Vec3 point = frame.position(Vec3(1, 2, 3));  // in the handle frame, whose axes are the operator's

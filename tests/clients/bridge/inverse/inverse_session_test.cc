@@ -52,7 +52,7 @@ struct Bridge {
     EXPECT_EQ(replies.size(), 1U);
     return json::parse(replies.at(0));
   }
-  /// Runs for `ms` milliseconds. The client sends `message` in each. Returns the last reply.
+  /// The client sends `message` each millisecond. Returns the last reply.
   json run(int ms, InverseSession& session, const std::string& message) {
     json last;
     world.run(ms, [&] {
@@ -156,8 +156,7 @@ TEST(InverseSession, ASpinningClientSendsOneForceForEachState) {
 }
 
 TEST(InverseSession, PositionAndForceAreRightAlongEachAxis) {
-  // WoodenHaptics' base frame: x forward, y left, z up. The hand moves along its x axis, which is the client's y
-  // axis.
+  // WoodenHaptics' base frame: x forward, y left, z up. The hand moves along x, the client's y axis.
   HandleDescription handle;
   handle.operator_from_device = quaternion_of(operator_from_device("right=-y up=z user=-x"));
   Bridge bridge("demo_parts.toml", {}, handle);

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The DDS side of `tendon-bridge ros2` without Tendon. It publishes known values on every topic at 1 kHz, stamped when
-// sent, and copies each wrench_command to `wrench`. Tests use it to check the message types, and measurements to
-// obtain the latency of DDS alone.
+// The DDS side of `tendon-bridge ros2` alone: publishes known values on every topic at 1 kHz, stamped when sent, and
+// copies each wrench_command to `wrench`. For tests of the message types and the latency of DDS.
 #include <poll.h>
 
 #include <array>

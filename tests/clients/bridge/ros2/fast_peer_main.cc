@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A client of `tendon-bridge ros2` that uses Fast DDS, as ROS 2 does, with independently written message types. It
-// reads topics and publishes wrench_command. Ten times per second it prints a flat JSON object with the newest
-// values.
+// A client that uses Fast DDS, as ROS 2 does, with independently written message types. It reads topics, publishes
+// wrench_command, and ten times per second prints a flat JSON object with the newest values.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <array>
@@ -59,7 +58,6 @@ constexpr std::string_view kPeers =
 
 double us(Clock::duration d) { return std::chrono::duration<double, std::micro>(d).count(); }
 
-/// Delays in µs.
 class Delays {
  public:
   void add(double value) { all_.push_back(value); }
@@ -104,7 +102,6 @@ void describe(ordered_json& line, const std::string& topic, const DiagnosticArra
 class Reader {
  public:
   virtual ~Reader() = default;
-  /// `last` adds the values that are only known at the end.
   virtual void write(ordered_json& line, bool last) = 0;
 };
 
@@ -170,7 +167,7 @@ class ReaderOf final : public Reader, public dds::DataReaderListener {
   Awaited& awaited_;
   std::mutex mutex_;
   std::uint64_t count_ = 0;
-  std::uint64_t back_ = 0;  ///< messages older than the previous one
+  std::uint64_t back_ = 0;  ///< number of messages that are older than the previous one
   std::chrono::nanoseconds first_{};
   std::chrono::nanoseconds newest_{};
   Clock::duration first_age_{};

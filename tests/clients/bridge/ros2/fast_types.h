@@ -14,8 +14,7 @@
 
 namespace tendon::fast {
 
-// The ROS 2 messages for Fast DDS, written from the definitions in the ROS packages and independently of
-// clients/bridge/ros2. `each` visits the fields in wire order.
+// From the definitions in the ROS packages, independently of clients/bridge/ros2. `each` visits fields in wire order.
 
 struct Header {
   std::int32_t sec = 0;
@@ -76,7 +75,6 @@ struct JointState {
   }
 };
 
-/// Visits the length and then the elements of a sequence of structures.
 template <class Element, class Visit>
 void each_of(std::vector<Element>& elements, Visit& visit) {
   auto count = static_cast<std::uint32_t>(elements.size());

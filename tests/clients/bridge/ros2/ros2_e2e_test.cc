@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests `tendon-bridge ros2` between a real tendond and programs with Fast DDS (fast_peer).
+// A real tendond and programs with Fast DDS (fast_peer).
 #include <arpa/inet.h>
 #include <gtest/gtest.h>
 #include <netinet/in.h>
@@ -30,8 +30,8 @@ namespace {
 using std::chrono::milliseconds;
 using tendon::testing::ScratchFolder;
 
-/// A stylus that oscillates along the operator's right, with torque motors, a gripper, and a button that is pressed
-/// from 1 s on. Its base frame is that of a Falcon.
+/// A stylus oscillates along the operator's right, with torque motors, a gripper, and a button from 1 s on. It has a
+/// Falcon's base frame.
 constexpr std::string_view kScene = R"([device]
 kind = "simulated"
 profile = "touch"
@@ -103,8 +103,8 @@ coulomb_friction_n = 0.05
 viscous_friction_n_s_per_m = 0.25
 )";
 
-/// Reserves a DDS domain that no other test on this machine uses. The owner binds a UDP port of the domain that
-/// participants with an index below 100 do not use.
+/// A DDS domain that no other test on this machine uses: reserved by binding a UDP port of the domain that participants
+/// with an index below 100 do not use.
 class Domain {
  public:
   Domain() {
@@ -168,7 +168,6 @@ class Peer : public Process {
   std::string until_pushed(double newtons) {
     return until([&](const std::string& line) { return std::abs(number(line, "wrench_y") - newtons) < 1e-6; });
   }
-  /// Returns 1e9 if the key is missing.
   static double number(const std::string& line, const std::string& key) {
     return line.find('"' + key + "\":") == std::string::npos ? 1e9 : number_in(line, key);
   }
@@ -190,8 +189,6 @@ struct Room {
   Server server;
   BridgeProcess bridge;
 };
-
-// ---- What is on the wire --------------------------------------------------------------------------------------------
 
 TEST(Ros2, EachTypeIsReadByFastDdsAndTheWrenchComesBack) {
   const ScratchFolder folder;
@@ -291,8 +288,6 @@ TEST(Ros2, AReaderOfRosLocalhostOnlyThatAsksNobodyIsFound) {
   late.until_pushed(0.3);
 }
 
-// ---- Forces ---------------------------------------------------------------------------------------------------------
-
 TEST(Ros2, AWrenchIsFeltAndItsEndLeavesTheHandToTheStages) {
   Room room;
   Peer peer(room.folder, room.domain,
@@ -330,8 +325,7 @@ TEST(Ros2, ASecondPublisherIsDroppedAndTold) {
   }
 }
 
-/// Seconds until a reader that receives ten updates per second sees no force. The force must not be zero at the
-/// start.
+/// By a reader of ten updates per second. The force must not be zero at the start.
 double seconds_to_no_force(Peer& reader) {
   const auto start = read_clock();
   reader.until_pushed(0);
@@ -369,8 +363,6 @@ TEST(Ros2, AFrozenReaderHoldsNobodyUp) {
   const double n = number(frozen.until_some("pose", 100), "pose_n");
   frozen.until([&](const std::string& all) { return number(all, "pose_n") > n + 500; });
 }
-
-// ---- The way to the server ------------------------------------------------------------------------------------------
 
 TEST(Ros2, TheServerDiesAndComesBack) {
   const ScratchFolder folder;

@@ -144,8 +144,6 @@ TEST(RosMessages, ATimeIsWholeSecondsAndTheRest) {
   EXPECT_EQ(ros_time(std::chrono::nanoseconds(1'795'618'182'807'085'500)), (RosTime{1'795'618'182, 807'085'500}));
 }
 
-// ---- The clutch -----------------------------------------------------------------------------------------------------
-
 RosPose pose_at(double x, double turned = 0) {
   return {.header = {{7, 8}, "right_base"}, .position = {x, 0, 0}, .orientation = rotation_by({0, 0, turned})};
 }

@@ -34,7 +34,7 @@ frequency_hz = 1
 kind = "none"
 )";
 constexpr double kPush = -2;  // N, along x: `vrpn_client.py … press`
-/// N/ms. A fade with a time constant of 50 ms changes a force of 2 N by 0.04 N in the first millisecond.
+/// N/ms. A fade of 50 ms changes a force of 2 N by 0.04 N in the first millisecond.
 constexpr double kFastest = 0.05;
 
 std::vector<StepRecord> after_the_last_fresh_one(const Recording& recording) {
@@ -65,7 +65,6 @@ void expect_that_it_fades(int signal) {
   Duration faded{};
   LocalTime before = steps.front().hand.at;
   for (const StepRecord& step : steps) {
-    // The fade continues while the machine pauses.
     const double passed = std::max(1.0, std::chrono::duration<double, std::milli>(step.hand.at - before).count());
     EXPECT_LT(std::abs(step.applied.x() - last), kFastest * passed) << "tick " << step.tick;
     last = step.applied.x();

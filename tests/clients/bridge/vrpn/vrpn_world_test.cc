@@ -32,7 +32,6 @@ class Old {
   Moment now() const { return {world_.now, world_.now.time_since_epoch()}; }
   void says(const Buffer& bytes) { peer.take_stream(now(), bytes); }
 
-  /// As the loop of tendon-bridge: sends the state, takes the received bytes, and runs the bridged device.
   void turn() {
     if (const auto sentence = station_.learn(bridged_)) sentences.push_back(*sentence);
     if (bridged_.state() && bridged_.states() != seen_) {
@@ -80,7 +79,6 @@ class Old {
   Vec3 force = Vec3::Zero();
 };
 
-/// A hand that only moves if a force acts on it.
 const std::vector<std::string> kStill = {"limiter.kind=\"none\"", "device.hand.motion.amplitude_mm=0"};
 
 Buffer constant(const Vec3& force) { return Program::draw(ForceField{.force = force, .radius = 1}); }
@@ -240,10 +238,9 @@ TEST(VrpnWorld, ASecondProgramIsToldAndTakesOverWhenTheFirstLeaves) {
   EXPECT_NE(other.texts[1].find("is rendered now"), std::string::npos);
 }
 
-/// Energy that the device gives out with 20 ms of delay in each direction, J. The program answers each pose with the
-/// force of a wall.
+/// Returns the energy (J) with 20 ms of delay in each direction and the force of a wall for each pose.
 double given_out(bool limited, bool as_plane) {
-  // Two scenes with the same simulated hand. The parts of the first scene's limiter cannot be used without a limiter.
+  // The same simulated hand. The parts of the first scene's limiter cannot be used without a limiter.
   Stage stage(limited ? "demo_parts.toml" : "left.toml",
               limited ? std::vector<std::string>{} : std::vector<std::string>{"limiter.kind=\"none\""}, 20);
   World& world = stage.world;

@@ -100,7 +100,7 @@ void FakeDns::run() {
       const int peer = ::accept(tcp_, nullptr, nullptr);
       bytes.resize(static_cast<std::size_t>(std::max<ssize_t>(::recv(peer, bytes.data(), bytes.size(), 0), 2)));
       ++asked_;
-      // DNS over TCP puts two bytes of length before the message. A question fits into one segment.
+      // TCP puts two bytes of length before the message. A question fits into one segment.
       if (bytes.size() == 2) bytes.resize(2 + static_cast<std::size_t>(::recv(peer, bytes.data() + 2, 4000, 0)));
       const std::string said = answer_(dns::question_in(bytes.substr(2)), true);
       const std::string framed = dns::two(static_cast<unsigned>(said.size())) + said;

@@ -21,9 +21,9 @@ inline constexpr std::uint16_t kTxt = 16;
 inline constexpr std::uint16_t kSrv = 33;
 
 std::string two(unsigned value);
-/// Encodes the labels of a name, which are separated by '/': "falcon at 3/_tendon/_udp/example/org".
+/// Labels are separated by '/': "falcon at 3/_tendon/_udp/example/org".
 std::string name(std::string_view labels);
-/// Encodes a record that belongs to the name in the question.
+/// Belongs to the name in the question.
 std::string record(std::uint16_t type, const std::string& data);
 std::string srv(unsigned priority, unsigned weight, unsigned port, const std::string& target);
 

@@ -21,7 +21,6 @@ const std::string kText =
     "device=falcon\x07"
     "hz=1000";
 
-/// The answers of a name server that knows the device "falcon".
 std::string sound(const Question& question, bool /*tcp*/) {
   if (question.type == kSrv) return answer(question, {srv(0, 0, 47100, name("localhost"))});
   if (question.type == kTxt) return answer(question, {record(kTxt, kText)});
@@ -108,14 +107,12 @@ TEST(UnicastDiscovery, AnAnswerToAnotherQuestionIsNone) {
 }
 
 TEST(UnicastDiscovery, NamesThatPointAtEachOtherLeadNowhere) {
-  // The target of the SRV record is a pointer to itself: header, question, 12 bytes of record header, 6 bytes of
-  // data.
+  // Its target points to itself: header, question, 12 bytes of record header, 6 bytes of data.
   const std::string problem = problem_with([](const Question& question, bool) {
     const auto here = static_cast<unsigned>(12 + question.bytes.size() + 12 + 6);
     return answer(question, {srv(0, 0, 47100, two(0xC000U | here))});
   });
   EXPECT_NE(problem.find("have no SRV record"), std::string::npos) << problem;
-  // The owner name of the record is a pointer to itself.
   const std::string ring = problem_with([](const Question& question, bool) {
     const auto here = static_cast<unsigned>(12 + question.bytes.size());
     return answer(question, {two(0xC000U | here) + two(kSrv) + two(1) + two(0) + two(60) + two(0)});

@@ -15,7 +15,7 @@
 namespace tendon::conversation_test {
 namespace {
 
-/// No value of this state is a round number, so rounding would be visible.
+/// No round numbers, so rounding would be visible.
 DeviceState odd_state(std::uint64_t tick) {
   const double t = 0.1 * static_cast<double>(tick);
   DeviceState hand;
@@ -35,7 +35,6 @@ DeviceState odd_state(std::uint64_t tick) {
   return hand;
 }
 
-/// An engine whose answer depends on all values of the state and on the previous states.
 Physics engine(double stiffness) {
   return [stiffness, memory = Vec3(0, 0, 0)](const DeviceState& hand) mutable -> Touch {
     memory = 0.9 * memory + hand.position / 3;

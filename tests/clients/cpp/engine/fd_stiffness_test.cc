@@ -49,7 +49,7 @@ TEST(FdStiffness, ShowsASurfaceThatIsWithinAStep) {
   EXPECT_NEAR(inside->kink, 0, 1e-7);
 }
 
-/// A spring whose rest position moves halfway to the hand at each call.
+/// The rest position moves halfway to the hand at each call.
 struct Creeping {
   Vec3 rest = Vec3::Zero();
   Vec3 saved = Vec3::Zero();

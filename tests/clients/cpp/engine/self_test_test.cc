@@ -85,7 +85,6 @@ TEST(SelfTest, OfAnElasticBodyWantsBackWhatAWayHasCost) {
       [](const DeviceState& hand) -> Touch { return Vec3(-kK * std::max(hand.position.x(), 0.0), 0, 0); }, script);
   EXPECT_TRUE(spring.passed()) << spring.text();
   EXPECT_EQ(count(spring, kPassed, "returns the stored energy"), 14) << spring.text();
-  // The damper dissipates energy: the engine is passive but not elastic.
   const SelfTest damped = self_test(wall, script);
   EXPECT_EQ(count(damped, kFailed, "generates"), 0) << damped.text();
   EXPECT_EQ(count(damped, kFailed, "returns the stored energy"), 14) << damped.text();
@@ -93,7 +92,7 @@ TEST(SelfTest, OfAnElasticBodyWantsBackWhatAWayHasCost) {
   const auto& press = damped.findings.at(1);
   EXPECT_EQ(press.what, "returns the stored energy: press and release, 0.025 m/s");
   EXPECT_GT(press.value, press.bound);
-  // The body snaps to a different equilibrium at the end of the slide. Only the check on the sideways motion fails.
+  // Snaps to another equilibrium at the end of the slide. Only the check on the sideways motion fails.
   const SelfTest snaps = self_test(
       [snapped = false](const DeviceState& hand) mutable -> Touch {
         const double depth = std::max(hand.position.x(), 0.0);
@@ -107,7 +106,7 @@ TEST(SelfTest, OfAnElasticBodyWantsBackWhatAWayHasCost) {
 }
 
 TEST(SelfTest, AllowsForWhatFewStatesASecondMakeOfAForceThatBends) {
-  // A ball of stiffening springs is conservative, even if the hand moves up to 2 mm between states at 50 Hz.
+  // Conservative, even if the hand moves up to 2 mm between states at 50 Hz.
   SelfTestScript script;
   script.rate_hz = 50;
   script.work_tolerance = 1e-5;
@@ -171,7 +170,6 @@ TEST(SelfTest, IsFailedByAStiffnessThatIsWrong) {
     EXPECT_EQ(count(result, kFailed, "stiffness"), 3) << "at one of the four depths nothing is touched";
     EXPECT_FALSE(result.passed());
   }
-  // A stiffness of the wrong sign.
   EXPECT_EQ(count(self_test([](const DeviceState& hand) {
                     Touch touch = wall(hand);
                     touch.stiffness = Mat3(touch.stiffness->norm() * Vec3::UnitY().asDiagonal().toDenseMatrix());
@@ -190,8 +188,7 @@ TEST(SelfTest, DoesNotJudgeAStiffnessWhereASurfaceIsWithinAStep) {
   EXPECT_TRUE(result.passed()) << result.text();
 }
 
-/// A spring whose rest position creeps towards the hand: passive, but the force is no function of position. It does
-/// not creep if no time passes.
+/// The rest position creeps towards the hand with time: passive, but the force is no function of position.
 struct Creeping {
   Vec3 rest = Vec3::Zero();
   Vec3 saved = Vec3::Zero();

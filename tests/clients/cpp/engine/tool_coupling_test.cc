@@ -9,7 +9,7 @@
 namespace tendon::tool_coupling_test {
 namespace {
 
-/// A rigid body in front of a wall at x = 0, integrated with semi-implicit Euler as in a typical engine.
+/// In front of a wall at x = 0, with semi-implicit Euler as in a typical engine.
 struct Tool {
   double mass;
   double step;

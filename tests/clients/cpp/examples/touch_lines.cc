@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// touch_lines EXAMPLE [ARGUMENT…]: prints the answers of a rendering example to given states, without a server.
-//
-// The example's source is linked unchanged to the run() below. For each input line "DEVICE X Y Z U V W" (m, m/s),
-// run() prints "FX FY FZ" in N and, if the example sends a stiffness, its nine elements in N/m by rows.
+// touch_lines EXAMPLE [ARGUMENT…]: a rendering example, linked unchanged, without a server. For each input line "DEVICE
+// X Y Z U V W" (m, m/s), prints "FX FY FZ" in N and, if the example sends a stiffness, its nine elements in N/m by
+// rows.
 #include <cstdio>
 #include <cstring>
 #include <iostream>
@@ -11,7 +10,7 @@
 
 #include "clients/cpp/run.h"
 
-// Declares the examples' main functions, which are renamed at compile time.
+// The examples' main functions are renamed at compile time.
 #define TENDON_EXAMPLE(name) int name##_main(int argc, char** argv);
 TENDON_EXAMPLES
 #undef TENDON_EXAMPLE

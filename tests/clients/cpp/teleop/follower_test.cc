@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The cases in tests/clients/follower_cases.json, which the Python and TypeScript clients run as well.
+// tests/clients/follower_cases.json, which the Python and TypeScript clients run as well.
 #include "clients/cpp/teleop/follower.h"
 
 #include <gtest/gtest.h>

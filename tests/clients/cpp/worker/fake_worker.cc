@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// fake_worker [WAY [AFTER]] SCENE: a worker that pulls the hand to the origin. WAY selects how it fails after
-// AFTER answers.
+// fake_worker [WAY [AFTER]] SCENE: pulls the hand to the origin. WAY selects how it fails after AFTER answers.
 #include <unistd.h>
 
 #include <csignal>
@@ -16,7 +15,7 @@ using namespace tendon;
 
 namespace {
 
-/// Starts a child in its own process group, like the ranks of Open MPI, that ignores all signals it can ignore.
+/// In its own process group, like the ranks of Open MPI; ignores all signals it can ignore.
 void leave_a_child() {
   if (::fork() != 0) return;
   ::setsid();

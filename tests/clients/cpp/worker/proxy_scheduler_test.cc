@@ -22,7 +22,6 @@ Seen at_tick(std::uint64_t tick) {
 
 Touch force(double newtons) { return Vec3(newtons, 0, 0); }
 
-/// A ProxyScheduler and the orders that it has given so far.
 class Played {
  public:
   explicit Played(const ProxyScheduler::Config& config = {}) : scheduler(config, now) { turn(); }
@@ -55,7 +54,6 @@ class Played {
     scheduler.answered(now, force(newtons));
     turn();
   }
-  /// Sends a state and answers it after `time`.
   void ask(std::uint64_t tick, Duration time, double newtons = 1) {
     see(tick);
     after(time);
@@ -65,7 +63,6 @@ class Played {
     scheduler.ended(now, "it was terminated by signal 9");
     turn();
   }
-  /// Returns the orders since the last call.
   std::string news() {
     std::string all;
     for (const std::string& one : said) all += (all.empty() ? "" : ", ") + one;
@@ -109,7 +106,7 @@ TEST(Scheduler, ALateAnswerIsNotSentAndTheWorkerStays) {
 TEST(Scheduler, TheDeadlineIsThreeTimesTheMedian) {
   Played played({.dead = seconds(9)});
   played.open();
-  for (std::uint64_t tick = 1; tick <= 63; ++tick) {  // 40 ms each: the deadline becomes 120 ms
+  for (std::uint64_t tick = 1; tick <= 63; ++tick) {  // the deadline becomes 120 ms
     played.ask(tick, milliseconds(40));
   }
   played.ask(100, milliseconds(119));
@@ -159,7 +156,7 @@ TEST(Scheduler, AnAnswerOfAQuickBodyHoldsAsLongAsTheClientSays) {
   }
 }
 
-/// Measured with 180 000 unknowns on two ranks: the first contact takes 0.8 s, later ones 0.2 s.
+/// For 180 000 unknowns on two ranks, the first contact takes 0.8 s and the others take 0.2 s.
 TEST(Scheduler, ASlowFirstTouchIsWaitedForAndTenTimesTheMedianAfterIt) {
   Played played;
   played.open();

@@ -78,7 +78,7 @@ TEST(WorkerStream, AnswersOfAnotherStateAndOfNonsenseAreRefused) {
   Record right = codec.answer(7, hand, full_touch());
   EXPECT_EQ(codec.read_answer(right, 8, hand).refused, "it answers a state that was not requested");
   EXPECT_EQ(codec.read_answer(right, 7, other).refused, "its force answers another state");
-  right.sequence = 8;  // the record's number, but not that of the force in it
+  right.sequence = 8;  // the number of the record
   EXPECT_EQ(codec.read_answer(right, 8, hand).refused, "its force answers another state");
   EXPECT_EQ(codec.read_answer(codec.state(7, hand), 7, hand).refused, "it does not contain exactly one force");
   EXPECT_EQ(codec.read_answer({.sequence = 7, .body = {std::byte{0xff}, std::byte{0xff}}}, 7, hand).refused,
@@ -140,7 +140,7 @@ TEST(WorkerStream, TheBytesAreThoseOfItsDescription) {
   Touch unknown;
   unknown.unknown = true;
   const std::vector<std::byte> bytes = to_bytes(codec.answer(0x0102, DeviceState{}, unknown));
-  // proto3 omits tx_time_ns = 0: the body is empty.
+  // proto3 omits tx_time_ns = 0.
   const std::vector<std::byte> expected = {std::byte{8}, std::byte{0}, std::byte{0}, std::byte{0},
                                            std::byte{2}, std::byte{1}, std::byte{0}, std::byte{0},
                                            std::byte{0}, std::byte{0}, std::byte{0}, std::byte{0}};

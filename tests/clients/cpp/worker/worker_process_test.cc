@@ -57,7 +57,6 @@ int running(const std::string& text) {
   return count;
 }
 
-/// Waits until all processes have ended, at most kPatienceMs.
 bool gone(WorkerProcess& process, const std::string& text) {
   for (int i = 0; i < kPatienceMs / 10; ++i) {
     process.next();
@@ -153,7 +152,6 @@ TEST(WorkerProcess, TheNextWorkerIsLeftAloneWhileTheLastOneIsEnded) {
   EXPECT_TRUE(gone(process, "987125"));
 }
 
-/// Connects to a Unix socket without the secret.
 int connect_to(const std::string& address) {
   const std::string path = address.substr(5);
   sockaddr_un to{};

@@ -30,14 +30,14 @@ Cut across(double x, double depth) {
 /// A cut in the center of the top, half as wide as the block.
 Cut narrow(double depth) { return {Vec3(0, -0.025, 0.05 - depth), Vec3(0, 0.05, 0), Vec3(0, 0, depth)}; }
 
-/// A horizontal cut through the whole block at height z.
+/// Horizontal, through the whole block at height z.
 Cut below(double z) { return {Vec3(-0.06, -0.06, z), Vec3(0.12, 0, 0), Vec3(0, 0.12, 0)}; }
 
 Solid after(const Solid& solid, const Division& division) {
   return {division.mesh, solid.element(), solid.material(), solid.law(), division.fixed};
 }
 
-/// A body that is cut while it is pressed at `where`, by default at the center of its top.
+/// Cut while it is pressed at `where`, by default at the center of its top.
 template <class PressedModel, class... Options>
 struct Cuttable {
   Cuttable(Element element, int n, Law law, const Options&... options, const Vec2& where = Vec2::Zero())
@@ -66,7 +66,6 @@ struct Cuttable {
 using CutLinear = Cuttable<LinearModel>;
 using CutNewton = Cuttable<QuasiStaticModel, QuasiStaticModel::Config>;
 
-/// The reaction of a body that is built with the cuts.
 template <class PressedModel, class... Options>
 Reaction cut_from_the_start(Element element, int n, Law law, const std::vector<Cut>& cuts, double depth,
                             const Options&... options) {
@@ -167,7 +166,7 @@ TEST(CutUnderLoad, WhatIsLeftBelowALostPieceGivesWayAsOneThatWasAlwaysAlone) {
 }
 
 TEST(CutUnderLoad, ACutLinearBodyAnswersAsOneBuiltWithItsCuts) {
-  // Small cuts in the finer mesh update the factorization. The other cuts need a new one.
+  // Small cuts in the finer mesh update the factorization; the others need a new one.
   for (const auto& [element, n] : {std::pair(Element::kTet4, 4), std::pair(Element::kHex8Sri, 8),
                                    std::pair(Element::kHex8Sri, 4), std::pair(Element::kHex27, 4)}) {
     CutLinear body(element, n, Law::kLinear);
@@ -291,7 +290,6 @@ TEST(Factor, SplitsAreSolvedAsByANewFactorOrRefused) {
   const MatrixXd expected = fresh.solve(right);
   EXPECT_LT((kept.solve(right) - expected).norm(), 1e-10 * expected.norm());
 
-  // A split node without support, and a split of every unknown.
   SymmetricMatrix loose = before;
   loose.rows.push_back(loose.size);
   loose.values.push_back(0);
@@ -304,7 +302,7 @@ TEST(Factor, SplitsAreSolvedAsByANewFactorOrRefused) {
   const MatrixXd back = again.solve(right.topRows(before.size));
   EXPECT_LT((before.times(back.col(0)) - right.col(0).head(before.size)).norm(), 1e-9);
 
-  // With new values, the ordering of the grown pattern is reused and the splits are included.
+  // The ordering of the grown pattern is reused and the splits are included.
   for (double& value : matrix.values) value *= 2;
   ASSERT_TRUE(kept.factorize(matrix));
   EXPECT_LT((kept.solve(right) - expected / 2).norm(), 1e-10 * expected.norm());
@@ -321,7 +319,7 @@ TEST(Cutting, IsMadeInItsOrderAtItsTimeOrForceAndSaidOnce) {
     const Feel feel = body.touch(Vec3(0, 0, 0.05 - depth));
     return std::pair(feel.force.z() / depth, feel.topology_changed);
   };
-  const auto [whole, nothing_yet] = stiffness(2e-3);  // more than 0.5 N, but the cut before it is not made yet
+  const auto [whole, nothing_yet] = stiffness(2e-3);  // the force exceeds 0.5 N, but the previous cut has not been made
   EXPECT_FALSE(nothing_yet);
   body.tick(0.9);
   EXPECT_EQ(stiffness(2e-3).first, whole);

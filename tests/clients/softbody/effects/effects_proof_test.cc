@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Effects that a scene does not list must cost nothing. Callgrind counts the instructions per step of a body without
-// effects in the complete program and in one that is built without the effects (see CMakeLists.txt).
+// Effects that a scene does not list must cost nothing: instructions per step (callgrind) of a body without effects, in
+// the complete program and in one built without the effects (see CMakeLists.txt).
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -22,7 +22,7 @@ namespace tendon::softbody::effects_proof_test {
 namespace {
 
 constexpr int kSteps = 6 - 2;  // between the two run lengths of softbody-proof
-/// Instructions per step by which the cost of copying arrays varies with their heap address.
+/// Per step; copying arrays varies with their heap address.
 constexpr double kCopies = 200;
 
 struct Cost {
@@ -36,7 +36,7 @@ struct Body {
   Cost cost;
 };
 
-/// Keeps the minimum of several runs, because CHOLMOD executes some hundred instructions only in some of them.
+/// The minimum of several runs, because CHOLMOD executes some hundred instructions only in some.
 class Counted {
  public:
   Counted(std::string program, std::string which) : program_(std::move(program)), which_(std::move(which)) { again(); }
@@ -116,9 +116,8 @@ TEST_F(EffectsProof, WhatIsNotListedCostsNoInstructionAndNoByte) {
   }
 }
 
-/// Returns the bodies whose effect costs no measurable instructions. Effects that are too cheap to measure are
-/// skipped: the shape changes the work of Newton's method by 0.01 %, and the heap address changes the cost of a copy
-/// by about a hundred instructions.
+/// Effects too cheap to measure are skipped: the shape changes the work of Newton's method by 0.01 %, and the heap
+/// address the cost of a copy by about a hundred instructions.
 std::string free_of_charge(const std::vector<Body>& bodies) {
   std::string found;
   std::map<std::string, Cost> none;

@@ -67,8 +67,7 @@ TEST(Gravity, TheToolMeetsTheSurfaceWhereItHasSunkTo) {
   }
 }
 
-/// A cube of 100 mm between frictionless walls: a mass of 0.5 kg (the other half is at the fixed nodes) and a spring
-/// of 1 kN/m.
+/// A cube of 100 mm between frictionless walls: 0.5 kg (the other half is at the fixed nodes) and 1 kN/m.
 Solid one_mass() {
   Mesh mesh = block(Shape::kHex8, Vec3(0.1, 0.1, 0.1), {1, 1, 1});
   Fixed fixed = fix_where(mesh, [](const Vec3& node) { return node.z() < 1e-9; });

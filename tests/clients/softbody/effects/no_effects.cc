@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Replaces cutting.cc, effects.cc, friction.cc, self_collision.cc and stiffening.cc in a program that is built
-// without effects (see CMakeLists.txt).
+// Replaces the sources of the effects in a program without them (see CMakeLists.txt).
 #include <cstdlib>
 
 #include "clients/softbody/effects/cutting.h"
@@ -12,7 +11,6 @@
 namespace tendon::softbody {
 namespace {
 
-/// Uses the members that would otherwise be unused.
 [[noreturn]] void abort_with(double) { std::abort(); }
 
 }  // namespace

@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// The program whose instructions effects_proof_test.cc counts: bodies that a tool presses and strokes in turn.
-// Callgrind counts within `touch_in_turn` and writes a file each time it returns, so that one run measures all
-// bodies.
+// For effects_proof_test.cc: a tool presses and strokes several bodies in turn. Callgrind counts within `touch_in_turn`
+// and writes a file each time it returns, so that one run measures all bodies.
 //
-//    softbody-proof none     each model with only the effects that it requires
-//    softbody-proof each     some of them with one additional effect at a time
+// softbody-proof none     each model with only the effects that it requires
+// softbody-proof each     some of them with one additional effect at a time
 //
 // Prints a line for each body: its name, its heap memory in bytes, and the memory that it reports.
 #include <iostream>
@@ -63,7 +62,7 @@ void list(EffectKind effect, BodyConfig& config) {
 
 }  // namespace
 
-/// The symbol for callgrind, neither inlined nor mangled.
+/// Neither inlined nor mangled, for callgrind.
 extern "C" [[gnu::noinline]] void touch_in_turn(Body& body, int steps) {
   for (int i = 0; i < steps; ++i) {
     body.tick(0.01 * i);

@@ -26,7 +26,7 @@ constexpr double kYoung = 1e4;       // Pa
 constexpr double kBed = 1e4 / 1e-4;  // Pa/m: 0.1 mm at a pressure of Young's modulus
 constexpr Law kLaws[] = {Law::kCorotational, Law::kStVenantKirchhoff, Law::kNeoHookean};
 
-/// A C-shaped body of 40 × 20 × 41 mm with a slot 1 mm high, open to +x, between two jaws. The lower jaw is fixed.
+/// C-shaped, 40 × 20 × 41 mm, with a slot 1 mm high, open to +x. The lower jaw is fixed.
 struct Jaws {
   static constexpr double kFloor = 0.020;  // m, of the slot
   static constexpr double kRoof = 0.021;
@@ -59,8 +59,7 @@ struct Jaws {
   }
   Reaction press(double depth) { return model.press(patch, Prescribed::kDepth, depth); }
 
-  /// Largest penetration of the slot's roof below its floor, m. The floor is the line through its nodes with the same
-  /// y at rest.
+  /// Largest penetration of the slot's roof below its floor, the line through its nodes with the same y at rest, m.
   double overlap() const {
     double deepest = -std::numeric_limits<double>::infinity();
     const auto now = [&](int node) {
@@ -133,7 +132,6 @@ TEST(SelfCollision, WhereNothingTouchesEveryAnswerIsTheSameToTheLastBit) {
   }
 }
 
-/// Displacements that push the upper jaw unevenly into the lower one.
 VectorXd bitten(const Solid& solid, std::uint64_t seed) {
   Dice dice(seed);
   VectorXd u = VectorXd::Zero(solid.size());
@@ -214,7 +212,7 @@ TEST(SelfCollision, ASystemIsSolvedWithTheBedAsIfItWereInTheMatrix) {
   EXPECT_GT((k.times(x) - b).norm(), 0.1 * b.norm());
 }
 
-/// A bar of 20 × 20 × 40 mm with ν = 0 under a uniform load on its top, with a slit across its middle.
+/// 20 × 20 × 40 mm, ν = 0, a uniform load on its top, a slit across its middle.
 struct SlitBar {
   explicit SlitBar(std::optional<double> bed, bool slit)
       : solid(solid_of(slit)), top(solid.mesh(), Vec3::UnitZ(), 0.01), model(solid, top, {.self_collision = bed}) {
@@ -309,7 +307,6 @@ TEST(SelfCollision, StiffnessIsTheSlopeOfTheForceAlsoWithTheJawsShut) {
 }
 
 TEST(SelfCollision, AHeavyJawFallsOnTheOtherAndStaysThere) {
-  // So heavy that it would pass through the lower jaw.
   const EffectsConfig heavy{
       .density = 1200, .step = 0.01, .gravity = Vec3(0, 0, -9.81), .inertia = true, .damping = 20};
   EffectsConfig at_rest = heavy;

@@ -28,7 +28,7 @@ struct At {
   int i, j, k;
 };
 
-/// Writes a block of 100 × 100 × 50 mm with 8 × 8 × 4 elements in format 2.2 of gmsh.
+/// 100 × 100 × 50 mm, 8 × 8 × 4 elements, format 2.2 of gmsh.
 struct BlockFile {
   std::function<int(At)> times = [](At) { return 1; };
   std::function<int(At)> side = [](At) { return 0; };      ///< elements with different values share no nodes

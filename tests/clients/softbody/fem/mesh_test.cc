@@ -78,7 +78,7 @@ TEST(Meshes, BlocksOfEveryShapeFillTheirVolumeAndAreClosed) {
   for (const Shape shape : kShapes) {
     const Mesh mesh = block(shape, Vec3(0.1, 0.08, 0.05), {4, 3, 2});
     EXPECT_NEAR(check(mesh, "block"), 4e-4, 1e-15);
-    EXPECT_NEAR(area(mesh), 2 * (0.1 * 0.08 + 0.1 * 0.05 + 0.08 * 0.05), 1e-15);  // an open seam would add to it
+    EXPECT_NEAR(area(mesh), 2 * (0.1 * 0.08 + 0.1 * 0.05 + 0.08 * 0.05), 1e-15);  // an open seam would increase this
   }
   EXPECT_EQ(block(Shape::kTet4, Vec3(0.1, 0.1, 0.05), {8, 8, 4}).element_count(), 1536);
 }
@@ -96,7 +96,6 @@ TEST(Meshes, CylindersApproachTheirVolumeFromBelowWithMoreCells) {
 
 TEST(Meshes, AnEvenBlockOfTetrahedraIsItsOwnMirrorImage) {
   const Mesh mesh = block(Shape::kTet4, Vec3(2, 2, 1), {2, 2, 1});
-  // The centroid of every tetrahedron and its mirror image.
   std::vector<std::array<double, 3>> middles;
   std::vector<std::array<double, 3>> mirrored;
   for (int e = 0; e < mesh.element_count(); ++e) {

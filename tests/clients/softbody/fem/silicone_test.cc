@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Silicone cylinders compressed between two plates ($TENDON_DATA, silicone-tissue-phantoms: Dawood et al. 2026, CC BY
-// 4.0), and the constitutive laws published with them.
+// Cylinders compressed between two plates ($TENDON_DATA, silicone-tissue-phantoms: Dawood et al. 2026, CC BY 4.0), and
+// the constitutive laws published with them.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -47,8 +47,8 @@ double measured(const std::filesystem::path& file, double compression) {
   return 0;
 }
 
-/// Yeoh's law for an incompressible cylinder that can widen: F = −2 A (λ − λ⁻²) Σ i Cᵢ (I₁ − 3)ⁱ⁻¹, Cᵢ in kPa. With
-/// one constant it is the neo-Hookean law with µ = 2 C₁.
+/// An incompressible cylinder that can widen: F = −2 A (λ − λ⁻²) Σ i Cᵢ (I₁ − 3)ⁱ⁻¹, Cᵢ in kPa. With one constant it is
+/// the neo-Hookean law with µ = 2 C₁.
 double yeoh(const std::vector<double>& constants, double compression) {
   const double stretch = 1 - compression / kHeight;
   const double invariant = stretch * stretch + 2 / stretch - 3;
@@ -59,7 +59,7 @@ double yeoh(const std::vector<double>& constants, double compression) {
   return -2 * kArea * (stretch - 1 / (stretch * stretch)) * slope;
 }
 
-/// Force on a neo-Hookean cylinder between two plates, N. It can slide on oiled plates and sticks to dry ones.
+/// N, neo-Hookean. It can slide on oiled plates and sticks to dry ones.
 double pressed_cylinder(double mu, double compression, bool oiled) {
   constexpr double kPoisson = 0.4995;  // silicone
   const Material material{.young = 2 * (1 + kPoisson) * mu, .poisson = kPoisson};
@@ -105,11 +105,10 @@ TEST(Silicone, DryPlatesThatHoldItMakeItStiffer) {
   EXPECT_GT(pressed_cylinder(22e3, 0.002, false), 1.15 * pressed_cylinder(22e3, 0.002, true));
 }
 
-/// Yeoh's three constants fit the whole curve up to 66 % compression. At 10 mm they agree within the scatter of two
-/// specimens of the same silicone (2 %). At 2 mm they are 10 % too soft, because the published fit of stresses gives
-/// little weight to small strains. A single neo-Hookean constant fitted to the whole curve is too stiff up to 10 mm,
-/// because silicone stiffens beyond. So the 10 to 60 % error of the engine is due to this law with its published
-/// constant, not to the mesh.
+/// Yeoh's constants fit the whole curve up to 66 % compression: within the scatter of two specimens (2 %) at 10 mm, but
+/// 10 % too soft at 2 mm, because the published fit of stresses gives little weight to small strains. One neo-Hookean
+/// constant is too stiff up to 10 mm, because silicone stiffens beyond. So the 10 to 60 % error of the engine is due to
+/// this law with its published constant, not to the mesh.
 TEST(Silicone, MeasuredCylindersAreThePublishedYeohLawAndNotTheNeoHookeanOne) {
   const char* const data = std::getenv("TENDON_DATA");  // NOLINT(concurrency-mt-unsafe): one thread
   if (data == nullptr) GTEST_SKIP() << "TENDON_DATA is not set: the measured cylinders are not part of this repository";
@@ -132,7 +131,6 @@ TEST(Silicone, MeasuredCylindersAreThePublishedYeohLawAndNotTheNeoHookeanOne) {
       const double ratio = pressed_cylinder(mu, compression, true) / measured(file, compression);
       EXPECT_GT(ratio, 1.1) << silicone << " at " << compression;
       EXPECT_LT(ratio, 1.6) << silicone << " at " << compression;
-      // The engine reproduces its own law.
       EXPECT_NEAR(ratio * measured(file, compression) / yeoh({0.5e-3 * mu}, compression), 1, 2e-3);
     }
   }

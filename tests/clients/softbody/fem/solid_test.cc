@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-// Basic verification of the finite elements: patch test, bar, and cantilever.
 #include "clients/softbody/fem/solid.h"
 
 #include <gtest/gtest.h>
@@ -16,7 +15,6 @@ namespace {
 
 constexpr double kPi = std::numbers::pi;
 
-/// A block with irregularly displaced inner nodes.
 Mesh crooked_block(Shape shape) {
   Mesh mesh = block(shape, Vec3(0.1, 0.08, 0.05), {3, 3, 2});
   for (Vec3& node : mesh.nodes) {
@@ -27,7 +25,7 @@ Mesh crooked_block(Shape shape) {
   return mesh;
 }
 
-/// Solves for the free displacements, given the prescribed ones in `u` and the loads on the free nodes.
+/// The free displacements, given the prescribed ones in `u` and the loads on the free nodes.
 VectorXd at_rest(const Solid& solid, VectorXd u, const VectorXd& loads) {
   SymmetricMatrix k = solid.pattern();
   solid.stiffness(u, Solid::Curvature::kExact, k);
@@ -86,13 +84,12 @@ TEST(Reference, ABarIsStretchedByStressOverYoung) {
   }
 }
 
-/// Ratio of the tip deflection of a 10 × 1 × 1 beam to Timoshenko's solution F·L³/(3EI) + F·L/(κGA). With ν = 0 a
-/// clamp does not restrain lateral contraction, so the theory holds up to the clamp.
+/// Tip deflection of a 10 × 1 × 1 beam over Timoshenko's F·L³/(3EI) + F·L/(κGA). With ν = 0 a clamp does not restrain
+/// lateral contraction, so the theory holds up to the clamp.
 double cantilever(Element element, int along, int across) {
   Mesh mesh = block(info(element).shape, Vec3(10, 1, 1), {along, across, across});
   Fixed fixed = fix_where(mesh, [](const Vec3& node) { return node.x() < -5 + 1e-9; });
   const Solid solid(std::move(mesh), element, {.young = 1000, .poisson = 0}, Law::kLinear, std::move(fixed));
-  // A shear load of 1 N along z, uniform over the free end.
   VectorXd loads = VectorXd::Zero(solid.size());
   const auto& nodes = solid.mesh().nodes;
   double area = 0;

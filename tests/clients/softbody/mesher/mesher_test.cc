@@ -23,7 +23,7 @@
 namespace tendon::softbody::mesher_test {
 namespace {
 
-/// A block of 100 × 100 × 50 mm in mm. The center of its bottom is the origin.
+/// A block of 100 × 100 × 50 mm, whose bottom is centered at the origin.
 Triangles block_surface() {
   Triangles surface;
   for (const double z : {0.0, 50.0}) {
@@ -187,7 +187,6 @@ class Meshing : public ::testing::Test {
     if (!has_gmsh()) GTEST_SKIP() << "gmsh is not installed (package gmsh)";
   }
   std::string path(const char* name) const { return (scratch_.path() / name).string(); }
-  /// Returns the exit code. said() returns the output.
   int run(const std::string& arguments) const {
     const std::string command = std::string(TENDON_MESH) + " " + arguments + " > " + path("said") + " 2>&1";
     return WEXITSTATUS(std::system(command.c_str()));  // NOLINT(concurrency-mt-unsafe): one thread
@@ -308,7 +307,7 @@ TEST_F(Meshing, NothingThatIsThereIsOverwrittenAndABadSurfaceMakesNothing) {
   EXPECT_EQ(run(path("block.off") + " --size 10 --at 0,0,50 --out " + path("new.msh")), 2) << "how far from there?";
 }
 
-/// An ellipsoid of 110 × 58 × 44 mm with an indentation in its side, in mm; roughly a kidney.
+/// mm, an ellipsoid of 110 × 58 × 44 with an indentation in its side; roughly a kidney.
 Triangles bean_surface() {
   constexpr int kRound = 36;
   constexpr int kUp = 18;
@@ -338,7 +337,7 @@ Triangles bean_surface() {
   return surface;
 }
 
-// If all nodes move fully to the surface, the worst quality is −0.2. If none moves, a tenth of the volume is missing.
+// Moving all nodes fully to the surface gives a quality of −0.2; moving none loses a tenth of the volume.
 TEST_F(Meshing, OnACurvedSurfaceNodesGoAsFarAsElementsStayWellShaped) {
   const Triangles bean = bean_surface();
   check(bean, "bean");

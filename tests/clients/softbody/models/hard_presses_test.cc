@@ -104,8 +104,7 @@ TEST(HardPress, AMillionTimesStifferFarFieldIsCoveredByTheErrorSaid) {
         // Rounding errors of the stiff part affect the soft part.
         EXPECT_LT(whole.error, 1e-3 * whole.force) << ratio << ' ' << depth;
         EXPECT_LE(std::abs(near.force - whole.force), near.error) << ratio << ' ' << depth;
-        // With a rigid far field, the first answer is exact. A far field softer than the near field moves as much as
-        // the near field, and rotates.
+        // The first answer is exact with a rigid far field. One softer than the near field moves and rotates as much.
         const double share = ratio > 1 ? 1e-5 : 0.05;
         EXPECT_LT(std::abs(near.force - whole.force), share * whole.force) << ratio << ' ' << depth;
         EXPECT_LT(near.error, 0.2 * near.force) << ratio << ' ' << depth;

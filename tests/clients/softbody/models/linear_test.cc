@@ -116,7 +116,7 @@ TEST(Patches, WeightsAreAMeanAndTheirSlopesTheirChange) {
       mean += patch.weights[i] * place;
       change += patch.slopes.col(i) * place.transpose();
     }
-    EXPECT_LT((mean - middle).norm(), 2e-5);                         // its centroid is at the requested place
+    EXPECT_LT((mean - middle).norm(), 2e-5);
     EXPECT_LT((change - Eigen::Matrix2d::Identity()).norm(), 0.02);  // and moves with it
     const Patch moved = *top.patch(middle + Vec2(1e-6, 0));
     ASSERT_EQ(moved.nodes, patch.nodes);

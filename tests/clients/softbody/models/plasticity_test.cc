@@ -23,7 +23,7 @@ using testing::pressed_body;
 constexpr Law kLaws[] = {Law::kLinear, Law::kCorotational};
 constexpr Yield kSoft{.stress = 200, .hardening = 3e3};  // Pa; Young's modulus is 10 kPa
 
-/// A bar of 20 × 20 × 40 mm along z, held at the bottom and free to widen. All nodes of its top move together.
+/// 20 × 20 × 40 mm along z, held at the bottom and free to widen. The nodes of its top move together.
 struct Bar {
   explicit Bar(Law law, Element element = Element::kHex8Sri)
       : solid(solid_of(law, element)),
@@ -59,7 +59,7 @@ struct Bar {
   Patch patch;
 };
 
-/// The one-dimensional reference: kinematic hardening.
+/// Kinematic hardening in one dimension.
 struct PaperBar {
   double plastic = 0;
   double lost = 0;  // J/m³
@@ -89,7 +89,6 @@ TEST(Plasticity, ABarFollowsTheBilinearCurveDrawnBackPressedAndDrawnAgain) {
         EXPECT_NEAR(bar.stress_at(strain * kFirst), paper.stress_at(strain * kFirst), 1e-7 * kSoft.stress)
             << strain << ' ' << static_cast<int>(law);
       }
-      // The slopes of the curve: E, then E H/(E + H), then E again.
       Bar fresh(law, element);
       const double at_2 = fresh.stress_at(2 * kFirst);
       const double at_3 = fresh.stress_at(3 * kFirst);
@@ -163,7 +162,6 @@ TEST(Plasticity, BelowTheYieldTheAnswersAreThoseOfTheElasticBody) {
   }
 }
 
-/// A block with random plastic strains and a random shape and direction.
 struct Crumpled {
   explicit Crumpled(Law law, std::uint64_t seed) : solid(pressed_block(Element::kHex8Sri, 2, 0.4, law), kSoft) {
     Dice dice(seed);
@@ -197,7 +195,6 @@ TEST(Plasticity, ForcesAreTheSlopeOfAStepsEnergyAndStiffnessThatOfTheForces) {
       body.solid.stiffness(body.u, Solid::Curvature::kExact, k);
       const VectorXd change = body.solid.to_free(high.force - low.force) / (2 * kStep);
       EXPECT_LT((k.times(d) - change).norm(), 2e-5 * change.norm()) << static_cast<int>(law);
-      // The plastic strains contribute significantly.
       const PlasticSolid fresh(pressed_block(Element::kHex8Sri, 2, 0.4, law), {.stress = 1e9, .hardening = 1});
       EXPECT_GT((fresh.forces(body.u).force - here.force).norm(), 0.1 * here.force.norm());
     }
@@ -220,7 +217,7 @@ TEST(Plasticity, ADentTurnsWithABodyThatTurns) {
   }
 }
 
-/// Block B1 with a material that yields under a press of a few mm.
+/// B1, yielding under a press of a few mm.
 BodyConfig soft_body(ModelKind model) {
   BodyConfig config = pressed_body(model, Element::kHex8Sri, 4);
   config.plasticity = Yield{.stress = 300, .hardening = 2e3};
@@ -252,7 +249,7 @@ TEST(Plasticity, OnEveryClosedWayTheHandGivesMoreThanItGets) {
     Body body(soft_body(model));
     double depth = 0;
     double force = 0;
-    double given = 0;  // work of the hand since the beginning, J
+    double given = 0;  // total work of the hand, J
     double largest = 0;
     for (int way = 0; way < 8; ++way) {
       const double before = given;

@@ -98,8 +98,7 @@ TEST(QuasiStatic, OneIterationPerAnswerFollowsTheToolAndTellsItsError) {
   }
 }
 
-/// Block B1, pressed 5 mm deep and stroked 20 mm sideways in steps of 1 mm, about ten times as fast as a hand at 1
-/// kHz.
+/// B1, pressed 5 mm deep and stroked 20 mm sideways in steps of 1 mm, about ten times as fast as a hand at 1 kHz.
 TEST(QuasiStatic, HalfAPercentIsWorthFewStepsAndNoFactorOnAHardPath) {
   for (const Law law : {Law::kNeoHookean, Law::kCorotational}) {
     const Solid solid = pressed_block(Element::kHex8Sri, 8, 0.45, law);
@@ -127,8 +126,7 @@ TEST(QuasiStatic, HalfAPercentIsWorthFewStepsAndNoFactorOnAHardPath) {
   }
 }
 
-/// If the hand hardly moves, no Newton step is taken. The force must still follow the requested place, in normal and
-/// tangential direction.
+/// Even without a Newton step, the force follows the requested place, in normal and tangential direction.
 TEST(QuasiStatic, AnswersWithoutAStepHaveTheStiffnessSentAsTheirSlope) {
   for (const Law law : {Law::kNeoHookean, Law::kCorotational}) {
     const Solid solid = pressed_block(Element::kHex8Sri, 8, 0.45, law);

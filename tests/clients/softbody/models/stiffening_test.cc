@@ -65,7 +65,7 @@ TEST(Stiffening, AViscousBodyCreepsAsOneOfThatModulusAndTheSameRelaxation) {
 }
 
 TEST(Stiffening, ATensedBodyGivesOutWhatTensingPutInAndNoMore) {
-  // The stiffness doubles at a depth of δ = 2 mm. The hand receives ½ k δ² more than it gave when it retracts.
+  // The stiffness doubles at δ = 2 mm, so the hand receives ½ k δ² more than it gave when it retracts.
   BodyConfig config = pressed_body(ModelKind::kCondensed, Element::kHex8Sri, 4);
   config.stiffening = StiffnessOverTime{.at = {0, 1}, .factor = {1, 2}};
   Body body(config);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Compares tendon-fem under mpirun with the engine in a single process.
+// tendon-fem under mpirun against the engine in a single process.
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <sys/wait.h>
@@ -57,7 +57,6 @@ class Fem : public ::testing::Test {
   }
   std::string said() const { return contents(path("said")); }
 
-  /// Largest difference relative to the largest entry.
   static double off(const SurfaceTable& table, const SurfaceTable& truth) {
     return (table.compliance - truth.compliance).cwiseAbs().maxCoeff() / truth.compliance.maxCoeff();
   }
@@ -128,8 +127,8 @@ TEST_F(Fem, RefusesASceneOfAnotherModelInOneSentence) {
   EXPECT_EQ(text.find("tendon-fem-worker:", at + 1), std::string::npos) << "said once";
 }
 
-/// A rank that is killed during its start may hold a lock in shared memory, and mpirun then never ends (observed once
-/// with PMIx 4.2; openpmix #1233). Without the shared memory there is no such lock.
+/// A rank killed during its start may hold a lock in shared memory, and mpirun then never ends (observed once with PMIx
+/// 4.2; openpmix #1233).
 TEST_F(Fem, ARankThatIsKilledLeavesNoTable) {
   const std::string file = scene("hex27", 12, 0.45);
   const std::string command = "PMIX_MCA_gds=hash " + mpirun(2) + " condense " + file + " " + path("killed.table") +
@@ -140,8 +139,6 @@ TEST_F(Fem, ARankThatIsKilledLeavesNoTable) {
   EXPECT_NE(std::system(command.c_str()), 0);  // NOLINT(concurrency-mt-unsafe): one thread
   EXPECT_FALSE(std::filesystem::exists(path("killed.table")));
 }
-
-// ---- Live answers ---------------------------------------------------------------------------------------------------
 
 TEST_F(Fem, MultigridMakesTheSameTable) {
   const std::string file = scene("hex27", 4, 0.45);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tendon-bench-fem: measures the duration and the reported error of a worker's answers.
+// tendon-bench-fem: duration and reported error of a worker's answers.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>

@@ -39,7 +39,6 @@ Reaction press(const PressedBefore& block, Model& model, const Vec2& place, doub
   return model.press(*block.top.patch_with_curvatures(place), Prescribed::kLeastDepth, depth);
 }
 
-/// Energy balance of the hand on a closed path, J.
 struct ClosedWay {
   double work = 0;
   double given = 0;  ///< largest amount given by the hand
@@ -121,7 +120,6 @@ TEST(Levels, TheFirstLevelThatIsGoodEnoughAnswers) {
   EXPECT_EQ(both->steps()[0].answers, 1);
   EXPECT_EQ(both->steps()[1].answers, 0);
   EXPECT_EQ(both->steps()[0].size.name, "tabulated");
-  // A tolerance between the error of the table and that of the shapes.
   const auto exact = fallbacks_with(block, true, 1e-3);
   EXPECT_EQ(press(block, *exact, Vec2(0.001, 0.002), 0.003).way, SolverPath::kLearned);
   EXPECT_EQ(exact->steps()[0].answers, 0);
@@ -172,8 +170,7 @@ TEST(Levels, WhereAnotherLevelTakesOverNothingJumps) {
   }
 }
 
-/// The level reports 10 % more force than the body has. The transition depends on the position only, so it is the same
-/// in both directions.
+/// 10 % more than the body. The transition depends on the position only, so it is the same in both directions.
 TEST(Levels, FromALevelThatIsStifferTheForceGoesOverByThePlace) {
   KnownBlock block(Law::kNeoHookean, 1.1);
   constexpr double kStep = 1e-4;
@@ -219,7 +216,6 @@ TEST(Levels, ClosedWaysAcrossLevelsGiveNoMoreThanAHundredthOfWhatTheyTook) {
     PressedBefore& block = small_block(law);
     const auto fallbacks = fallbacks_with(block, true, 0.02);
     PatchContact contact(*fallbacks, block.top, 0, PatchContact::Side::kUnilateral);
-    // Down at the center, out beyond the edge, and back at another depth or sideways, in both directions.
     for (const double aside : {0.0, 0.004}) {
       for (const bool back : {false, true}) {
         std::vector<Vec3> corners{Vec3(0, 0, 0.0505),          Vec3(0, 0, 0.046),  Vec3(0.012, aside, 0.0455),
@@ -242,7 +238,6 @@ TEST(Levels, ClosedWaysOnWhichFieldsTakeOverUnderALevelGiveNoMoreEither) {
       Elsewhere thread;
       if (beside) block.near->make_fields_by(thread.background());
       PatchContact contact(*block.fallbacks, block.top, 0, PatchContact::Side::kUnilateral);
-      // Leaves the region of the level at one depth, returns at another, and leaves it downward.
       const std::vector<Vec3> corners{Vec3(0, 0, 0.0505),         Vec3(0, 0, 0.047),  Vec3(0.019, 0.004, 0.0465),
                                       Vec3(0.021, 0, 0.0478),     Vec3(0, 0, 0.0478), Vec3(-0.004, 0.01, 0.0475),
                                       Vec3(-0.004, 0.01, 0.0455), Vec3(0, 0, 0.0505)};
@@ -260,7 +255,6 @@ TEST(Levels, ClosedWaysOnWhichFieldsTakeOverUnderALevelGiveNoMoreEither) {
   }
 }
 
-/// First within the region of the level, then beyond it.
 TEST(Levels, WhereTheNearFieldTakesOverAfterAFarWayNoAnswerMakesAWholeField) {
   for (const Law law : kBothLaws) {
     // step per answer, m

@@ -17,7 +17,7 @@ namespace {
 using testing::kB1PatchRadius;
 using testing::pressed_block;
 
-/// A block that is quick to learn: n = 4, and nine places at the center of the grid.
+/// Quick to learn: n = 4, and nine places at the center of the grid.
 class Learn : public ::testing::Test {
  protected:
   struct Run {

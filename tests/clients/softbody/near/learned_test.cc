@@ -135,7 +135,6 @@ TEST(LearnedShapes, WhereASolutionWasNotGoodNothingIsAnswered) {
   EXPECT_EQ(fallback_level.press(*block.top.patch(Vec2::Zero()), 0.9 * step)->share, 1);
 }
 
-/// A wrong force at one knot invalidates only the eight cells around it.
 TEST(LearnedShapes, WhereTheForcesAreNotThoseThatWereSolvedNothingIsAnswered) {
   PressedBefore& block = small_block(Law::kCorotational);
   SolvedPresses presses = block.presses;

@@ -38,8 +38,7 @@ TEST(LeastSquares, NoEntryBecomesNegativeAndTheRestIsTheLeastThatIsLeft) {
   problem.b = problem.g * drawn(dice, 20, 1);
   const VectorXd x = few_not_negative(problem.squares(), 0, 20);
   EXPECT_TRUE((x.array() >= 0).all());
-  // Karush–Kuhn–Tucker conditions: the gradient vanishes on the active set and no other variable would reduce the
-  // residual.
+  // Karush–Kuhn–Tucker: no gradient on the active set, and no other variable would reduce the residual.
   const VectorXd pull = problem.g.transpose() * (problem.b - problem.g * x);
   for (Eigen::Index i = 0; i < 20; ++i) {
     if (x[i] > 0) {

@@ -47,7 +47,6 @@ struct AtRest {
   VectorXd load;
 };
 
-/// The same block pressed by 4 mm, and a near body about this shape.
 struct Pressed : AtRest {
   Pressed(Law law, double radius, int modes)
       : AtRest(8, 0.45, law), whole(solid, top, {.max_iterations = 100, .tolerance = 1e-10, .glides = false}) {
@@ -118,7 +117,6 @@ TEST(NearBody, WithItsExactInterfaceItIsTheWholeBodyAtFirstTouch) {
     return load.dot(factor.solve(load).col(0));
   };
   EXPECT_NEAR(compliance(100'000) / whole, 1, 1e-7);
-  // Fewer modes make it stiffer.
   EXPECT_LT(compliance(60), whole);
   EXPECT_NEAR(compliance(60) / whole, 1, 5e-3);
   EXPECT_LT(compliance(10), compliance(60));

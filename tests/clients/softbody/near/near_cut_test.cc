@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Cuts in a body with the model "near". The tests decide when the work of the second thread is done.
+// The tests decide when the second thread's work is done.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -48,7 +48,7 @@ Solid with_cuts(const Solid& solid, const std::vector<Cut>& cuts) {
   return {std::move(division.mesh), solid.element(), solid.material(), solid.law(), std::move(division.fixed)};
 }
 
-/// The reference: Newton's method on the whole body with these cuts, N along z.
+/// Newton's method on the whole body with these cuts, N along z.
 struct Truth : AskedAndExact {
   Truth(Law law, const std::vector<Cut>& cuts)
       : AskedAndExact(with_cuts(pressed_block(Element::kHex8Sri, 8, 0.45, law), cuts)) {}
@@ -131,7 +131,6 @@ TEST(NearCut, WithoutAnotherThreadTheNextAnswerMakesTheFieldOfTheCutBody) {
     EXPECT_TRUE(feel.topology_changed);
     EXPECT_LT(feel.force.z(), 0.999 * whole);
     expect_covered(feel, truth.at(tool), 0.02, "cut");
-    // The following near fields are those of the cut body as well.
     for (int i = 0; i < 40; ++i) {
       const Vec3 there = tool + Vec3(0, 5e-4 * i, 0);
       expect_covered(body.touch(there), truth.at(there), 0.02, std::to_string(i));
@@ -139,8 +138,8 @@ TEST(NearCut, WithoutAnotherThreadTheNextAnswerMakesTheFieldOfTheCutBody) {
   }
 }
 
-/// A refresh of the near field is requested before the cut and finishes at any time. The cut is next to the patch, so
-/// a field of the uncut body could still contain the patch.
+/// A refresh requested before the cut finishes at any time. The cut is next to the patch, so a field of the uncut body
+/// could still contain the patch.
 TEST(NearCut, AFieldOfTheBodyBeforeTheCutIsThrownAwayWheneverItIsDone) {
   const BodyConfig config = cut_body(Law::kNeoHookean, {slit(0.025, 0.0375)});
   const Vec3 tool(0.002, 0, 0.046);
@@ -151,7 +150,6 @@ TEST(NearCut, AFieldOfTheBodyBeforeTheCutIsThrownAwayWheneverItIsDone) {
     body.tick(1);
     ASSERT_EQ(thread.given.size(), 2U) << "the cut";
   };
-  // The reference: the refresh never finishes.
   Body never(config);
   Elsewhere of_never;
   asked(never, of_never);
@@ -166,7 +164,7 @@ TEST(NearCut, AFieldOfTheBodyBeforeTheCutIsThrownAwayWheneverItIsDone) {
     if (when == 0) thread.given[0]();
     EXPECT_EQ(body.touch(tool).force, expected[0].force) << when;
     if (when != 1) thread.given[1]();
-    if (when == 1) {  // between the cut and the answer that uses it
+    if (when == 1) {
       thread.given[1]();
       thread.given[0]();
     }
@@ -227,7 +225,7 @@ TEST(NearCut, AThreadOfItsOwnCutsWhileAnswersGoOn) {
   body.tick(1);
   int cut_at = 0;
   int made = 0;
-  // Runs until a field of the cut body is in use. The pause between answers gives the second thread time to work.
+  // The pause between answers gives the second thread time to work.
   for (int i = 1; i < 20'000 && (cut_at == 0 || body.near_field()->made == made); ++i) {
     const Feel feel = body.touch(place(i));
     EXPECT_GE(feel.error, std::abs(feel.force.z() - truth.at(place(i)))) << i;
@@ -302,7 +300,7 @@ TEST(NearCut, WhatWasLearnedOfTheUncutBodyAnswersNoCutOne) {
   }
 }
 
-/// Uncut for some answers, then cut once. The second thread takes `slow` answers for a field.
+/// The body is cut once after some answers.
 class CutMeanwhile : public Model {
  public:
   CutMeanwhile(const AskedAndExact& cut, Solid whole, const NearModel::Config& config, int slow, int at)

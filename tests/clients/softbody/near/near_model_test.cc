@@ -137,8 +137,8 @@ TEST(Near, AHandThatHoversWhereTheFieldChangesMakesOneNewField) {
   EXPECT_EQ(near.model.size().made, 2);
 }
 
-/// Each answer computes one piece of the next field. The field must be complete before the old one no longer contains
-/// the patch, because the rest would otherwise be computed in one answer.
+/// One piece per answer. The field must be complete before the old one no longer contains the patch, because the rest
+/// would be computed in one answer.
 TEST(Near, AHandOfATenthOfAMillimetreAnAnswerNeverWaitsForAField) {
   for (const Law law : {Law::kNeoHookean, Law::kCorotational}) {
     Near near(12, 0.45, law, 5e-3);
@@ -170,7 +170,7 @@ TEST(Near, AFieldIsMadeOnWhileTheHandIsStill) {
   EXPECT_EQ(near.model.size().pieces - pieces, answers);
 }
 
-/// Differences fade with the distance that the hand moves, and not with time.
+/// Differences fade with the hand's distance, not with time.
 TEST(Near, WhileAHandIsStillItsForceIsToo) {
   for (const Law law : kLaws) {
     Near near(8, 0.45, law, 5e-3);
@@ -191,7 +191,6 @@ TEST(Near, AFieldThatTheHandHasLeftBeforeItIsWholeIsNotMadeToItsEnd) {
   EXPECT_NEAR(near.press(place, 3e-3).force, truth, 0.02 * truth);
   EXPECT_EQ(near.model.size().made, 2);
   EXPECT_LE(near.model.size().pieces - pieces, 31);
-  // The new field is centered here.
   near.press(place, 3e-3);
   EXPECT_LE(near.model.size().pieces - pieces, 31);
 }
@@ -294,7 +293,6 @@ TEST(Near, WhereAFieldTakesOverForceAndStiffnessGoOnAndFadeTogether) {
   EXPECT_NEAR(kept(met, 1, more).force, 4.1, 1e-12);
   before.slope = Vec2(0.12, -0.2);
   EXPECT_EQ(kept(handover(before, one, one.depth), 1, one).slope, before.slope);
-  // Without a force before or after, nothing is carried over.
   EXPECT_EQ(kept(handover({}, one, one.depth), 1, one).force, one.force);
   EXPECT_EQ(kept(handover(one, {}, one.depth), 1, one).force, one.force);
 }

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// NearModel with a second thread. In most tests its work is done at a given answer, so that they do not depend on
-// time.
+// In most tests the second thread's work is done at a given answer, so that they do not depend on time.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -77,7 +76,6 @@ TEST(NearOracle, NoAnswerMakesAPieceAndOneFieldAtATimeIsAskedFor) {
   EXPECT_EQ(near.model.size().pieces, pieces);
   EXPECT_EQ(near.model.size().linear, 0);
   EXPECT_GE(near.model.size().made, 3);
-  // No field is requested while the hand stays where the field was computed.
   near.thread.work();
   near.press(Vec2(0.01, 0), 4e-3);
   near.thread.work();
@@ -152,7 +150,7 @@ TEST(NearOracle, AThreadThatHasStoppedLeavesTheFieldAndTheLinearBody) {
   }
 }
 
-/// Block B1 without a near field: the second thread never works.
+/// The second thread never works.
 struct NoField : AskedAndExact {
   NoField(int n, Law law, double poisson)
       : AskedAndExact(pressed_block(Element::kHex8Sri, n, poisson, law)),
@@ -243,7 +241,7 @@ TEST(NearOracle, AFieldThatTheHandHasLeftIsThrownAway) {
 }
 
 TEST(NearOracle, AHandThatHoversAtTheEdgeOfAFieldStaysWithinTheErrorSaid) {
-  for (const double middle : {0.0045, 0.009}) {  // where the next field is requested, and where this one ends
+  for (const double middle : {0.0045, 0.009}) {  // the next field is requested here
     NearBeside near(8, Law::kCorotational);
     for (int i = 0; i < 100; ++i) {
       const Vec2 place(middle + (i % 2 == 0 ? -6e-4 : 6e-4), 0);
@@ -307,7 +305,6 @@ TEST(NearOracle, TheErrorSaidCoversTheTrueOneOfDrawnAnswers) {
     using AskedAndExact::AskedAndExact;
     Elsewhere thread;
   };
-  /// The second thread takes `slow` answers for a field.
   class Slow : public Model {
    public:
     Slow(std::unique_ptr<NearModel> model, Elsewhere& thread, int slow)
@@ -339,7 +336,6 @@ TEST(NearOracle, TheErrorSaidCoversTheTrueOneOfDrawnAnswers) {
   testing::expect_covered(said);
 }
 
-/// A cantilever that is pressed at its end until it bends strongly, so that the far field rotates.
 TEST(NearOracle, AFarFieldThatTurnsIsRefusedAtRestAndRightAboutTheShapeThere) {
   Mesh mesh = block(info(Element::kHex8Sri).shape, Vec3(0.12, 0.024, 0.024), {20, 4, 4});
   const Fixed fixed = fix_where(mesh, [](const Vec3& node) { return node.x() < -0.06 + 1e-9; });
@@ -389,7 +385,7 @@ TEST(NearOracle, AThreadOfItsOwnKeepsAnswersRight) {
   std::vector<Reaction> found;
   const auto place = [](int i) { return Vec2(1e-4 * (i % 400 < 200 ? i % 400 : 400 - i % 400), 0); };
   const auto depth = [](int i) { return std::min(4e-3, 1e-4 * (i + 1)); };
-  // Runs until several fields have been used. The pause between answers gives the second thread time to work.
+  // The pause between answers gives the second thread time to work.
   for (int i = 0; i < 100 || (near.model.size().made < 3 && i < 20'000); ++i) {
     found.push_back(near.press(place(i), depth(i)));
     std::this_thread::sleep_for(std::chrono::milliseconds(2));

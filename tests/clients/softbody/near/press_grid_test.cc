@@ -57,7 +57,7 @@ TEST(SolvedPresses, ForceStiffnessGlideAndEnergyAreThoseByAFactorOfTheirOwn) {
   }
 }
 
-/// A patch of 30 mm, pressed so deep that the force decreases and the body folds: elements would be inverted.
+/// 30 mm, so deep that the force decreases and the body folds: elements would be inverted.
 TEST(SolvedPresses, WhereTheBodyFallsToAnotherShapeNoneIsGood) {
   const Solid solid = pressed_block(Element::kHex8Sri, 6, 0.45, Law::kNeoHookean);
   const TouchSurface top(solid.mesh(), Vec3::UnitZ(), 0.03);

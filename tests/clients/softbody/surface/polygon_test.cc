@@ -31,8 +31,8 @@ double area(const Flat& polygon) {
   return twice / 2;
 }
 
-/// Checks a triangulation: n − 2 triangles, their orientation, the total area, each side of the polygon in one
-/// triangle, and every other side in two triangles with opposite directions. Returns the first violation.
+/// Returns the first violation: n − 2 triangles, their orientation, the total area, each side of the polygon in one
+/// triangle, and every other side in two with opposite directions.
 std::string wrong_with(const Flat& polygon, const std::vector<std::array<int, 3>>& triangles) {
   if (triangles.size() + 2 != polygon.size()) return std::to_string(triangles.size()) + " triangles";
   const double whole = area(polygon);
@@ -122,7 +122,7 @@ Flat star(Dice& dice) {
   return made;
 }
 
-/// The boundary of a random set of grid cells, with a corner at each grid point.
+/// The boundary of a random set of cells, with a corner at each grid point.
 Flat around_cells(Dice& dice) {
   using At = std::pair<int, int>;
   std::set<At> cells{{0, 0}};
@@ -132,7 +132,6 @@ Flat around_cells(Dice& dice) {
     const int x = static_cast<int>(dice.within(-6, 6));
     const int y = static_cast<int>(dice.within(-6, 6));
     if (has(x, y)) continue;
-    // The new cell must not create a hole or a corner that is used twice.
     constexpr std::array<std::array<int, 2>, 8> kRing{
         {{1, 0}, {1, 1}, {0, 1}, {-1, 1}, {-1, 0}, {-1, -1}, {0, -1}, {1, -1}}};
     int changes = 0;

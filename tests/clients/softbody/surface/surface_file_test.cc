@@ -163,7 +163,7 @@ TEST(SurfaceFile, APointThatNoFacetHasChangesNothing) {
               kItsVolume, 1e-12);
 }
 
-/// An OBJ file of a prism over a counterclockwise polygon. Each cap is one facet that starts at corner `start`.
+/// OBJ. The polygon is counterclockwise; each cap is one facet that starts at corner `start`.
 std::string prism(const std::vector<std::array<int, 2>>& polygon, std::size_t start) {
   const std::size_t count = polygon.size();
   std::ostringstream text;

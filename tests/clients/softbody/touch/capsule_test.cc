@@ -51,8 +51,8 @@ Pressed& coarse() {
   return pressed;
 }
 
-/// A capsule whose axis is tilted by `tilt` (rad) and rotated by `aside` (rad) from the x axis. The center of its
-/// lower end is above (x, y), `deep` (m) below first contact.
+/// Tilted by `tilt` (rad) and rotated by `aside` (rad) from the x axis. The center of its lower end is above (x, y),
+/// `deep` (m) below first contact.
 ContactIntegral::Tool oblique(double tilt, double aside, double deep, double x, double y) {
   const Vec3 axis(std::cos(tilt) * std::cos(aside), std::cos(tilt) * std::sin(aside), std::sin(tilt));
   return {Vec3(x, y, 0.05 + kRadius - deep) + kHalfLength * axis, axis, kRadius, kHalfLength};
@@ -71,7 +71,6 @@ TEST(Capsule, PressedObliquelyIsWithin2PercentOfAContactIntegral) {
   EXPECT_LT((feel.force - truth.force).norm(), 0.02 * truth.force.norm());
   EXPECT_LT((feel.torque->torque - truth.torque).norm(), 0.02 * truth.torque.norm());
   EXPECT_LT(feel.error, 1e-5 * feel.force.norm());
-  // The support balances the tool's force and moment.
   EXPECT_LT((truth.support - truth.force).norm(), 1e-6 * truth.force.norm());
   EXPECT_LT((truth.support_torque - feel.torque->torque).norm(), 0.02 * truth.torque.norm());
 }
@@ -111,7 +110,6 @@ TEST(Capsule, AMirroredPressGivesTheMirroredForceAndTorque) {
   const Feel mirrored = coarse().at(tool, mirror.cwiseProduct(about));
   EXPECT_GT(std::abs(feel.torque->torque.y()), 1e-3);
   EXPECT_LT((mirrored.force - mirror.cwiseProduct(feel.force)).norm(), 1e-5 * feel.force.norm());
-  // A torque is an axial vector.
   EXPECT_LT((mirrored.torque->torque + mirror.cwiseProduct(feel.torque->torque)).norm(),
             1e-5 * feel.torque->torque.norm());
 }
@@ -149,7 +147,7 @@ TEST(Capsule, AClosedWayOfPlacesAndTurnsGivesBackExactlyWhatItTook) {
   EXPECT_LT(std::abs(work), 2e-3 * most);
 }
 
-/// −∂force/∂position and −∂torque/∂θ about `about`, by central differences.
+/// −∂force/∂position and −∂torque/∂θ about `about`.
 std::pair<Mat3, Mat3> slopes(const ContactIntegral::Tool& tool, const Vec3& about) {
   Mat3 moved;
   Mat3 turned;
@@ -171,7 +169,7 @@ std::pair<Mat3, Mat3> slopes(const ContactIntegral::Tool& tool, const Vec3& abou
 TEST(Capsule, ItsStiffnessesAreTheSlopesOfForceAndTorque) {
   for (const double tilt : {0.2, 0.7, 1.5}) {
     const ContactIntegral::Tool tool = oblique(tilt, 0.4, 0.002, -0.003, -0.001);
-    const Vec3 about = tool.middle + Vec3(0.05, 0.02, 0);  // next to the tool, so that a rotation presses it
+    const Vec3 about = tool.middle + Vec3(0.05, 0.02, 0);
     const Feel feel = coarse().at(tool, about);
     const auto [moved, turned] = slopes(tool, about);
     EXPECT_LT((feel.stiffness - not_negative(moved)).norm(), 0.01 * moved.norm()) << tilt;

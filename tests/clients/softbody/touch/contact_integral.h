@@ -15,8 +15,7 @@
 
 namespace tendon::softbody::testing {
 
-/// Block B1 with cells of width `cell` (m) within ± `fine_x` and ± `fine_y` of the center of its top, and growing
-/// cells outside.
+/// B1 with cells of width `cell` (m) within ± `fine_x` and ± `fine_y` of the center of its top, growing outside.
 struct FineBlock {
   FineBlock(double cell, double fine_x, double fine_y, double poisson = 0.45)
       : xs(across(cell, fine_x)), ys(across(cell, fine_y)), zs(up(cell)), solid(make(poisson)) {}

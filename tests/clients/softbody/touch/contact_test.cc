@@ -149,7 +149,6 @@ TEST(ExactStiffness, OfTheLiverIsRightToTwoNewtonsAMetreAlsoBelowZero) {
   EXPECT_LT(lowest, -20);  // N/m: the patch tends to slip away
 }
 
-/// Configurations of models that may omit parts of the stiffness.
 std::vector<BodyConfig> linear_ones(BodyConfig config) {
   std::vector<BodyConfig> all;
   config.max_iterations = 100;
@@ -175,7 +174,7 @@ void expect_slope_of_its_force(const BodyConfig& config, const Vec2& aside, doub
   body.tick(0);
   const auto touched = [&](const Vec3& tool) { return body.touch(tool); };
   const Vec3 above = body.touch_point() + Vec3(aside.x(), aside.y(), 0);
-  body.touch(above + Vec3(1e-3, 1e-3, -depth));  // the state kept from another place must not matter
+  body.touch(above + Vec3(1e-3, 1e-3, -depth));  // the state from another place must be ignored
   const Mat3 given = body.touch(above - depth * Vec3::UnitZ()).stiffness;
   EXPECT_LT((given - by_differences(touched, above - depth * Vec3::UnitZ())).norm(), share * given.norm())
       << info(config.model).name << '\n'
@@ -207,7 +206,6 @@ TEST(ExactStiffness, IsNotPaidForOnAFlatSideUnlessItIsAskedFor) {
   EXPECT_FALSE(LinearModel(flat, top).glides());
   EXPECT_TRUE(LinearModel(flat, top, {}, true).glides());
   EXPECT_FALSE(LinearModel(flat, top, {.density = 1000, .step = 1e-3, .inertia = true}, true).glides());
-  // the patch spans an edge
   EXPECT_TRUE(TouchSurface(flat.mesh(), Vec3(1, 0, 1).normalized(), kB1PatchRadius).curved());
   EXPECT_FALSE(TouchSurface(flat.mesh(), Vec3(0.1, 0, 1).normalized(), kB1PatchRadius).curved());
   const LinearModel still(flat, top);

@@ -57,7 +57,6 @@ TEST(DistanceGrid, ItsDerivativesAreThoseOfItsValueAndNoneJumps) {
   Dice dice(12);
   for (int i = 0; i < 3000; ++i) {
     Vec3 x(dice.within(-0.0077, 0.0077), dice.within(-0.0077, 0.0077), dice.within(-0.0077, 0.0077));
-    // Every second point is on a cell boundary.
     if (i % 2 == 0) x[i / 2 % 3] = -0.008 + kCell * std::round((x[i / 2 % 3] + 0.008) / kCell);
     const Distance here = grid.at(x);
     for (int axis = 0; axis < 3; ++axis) {
@@ -84,7 +83,6 @@ TEST(DistanceGrid, OverTheBordersOfItsBoxValueAndDirectionGoOn) {
     const Distance outside = grid.at(x + 1e-9 * Vec3::Unit(axis));
     EXPECT_NEAR(outside.value, inside.value, 5e-9);
     EXPECT_LT((outside.gradient - inside.gradient).norm(), 1e-3);
-    // Far away the distance is overestimated by at most 2 %.
     const Vec3 far = x + dice.within(0, 0.1) * Vec3::Unit(axis);
     EXPECT_GT(grid.at(far).value, ball_distance(far) - 1e-7);
     EXPECT_LT(grid.at(far).value, ball_distance(far) * 1.02);

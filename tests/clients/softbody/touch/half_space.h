@@ -9,8 +9,7 @@
 
 namespace tendon::softbody::testing {
 
-/// Layer boundaries from 0 to `length`. The first layer is `first` thick, and the thickness grows by a constant
-/// factor.
+/// From 0 to `length`. The first layer is `first` thick, and the thickness grows by a constant factor.
 inline std::vector<double> graded(double first, double length, int count) {
   double low = 1;
   double high = 4;
@@ -24,8 +23,7 @@ inline std::vector<double> graded(double first, double length, int count) {
   return layers;
 }
 
-/// A quarter of a half space below z = 0, touched at x = y = 0. The layer boundaries are at distances `out` from
-/// there.
+/// A quarter of a half space below z = 0, touched at x = y = 0. The layer boundaries are at distances `out` from there.
 inline Solid quarter_of_half_space(Element element, const std::vector<double>& out, const Material& material) {
   const double length = out.back();
   std::vector<double> down;

@@ -17,7 +17,7 @@ namespace {
 constexpr double kThickness = 2e-4;  // m
 constexpr double kYoung = 1e4;       // Pa
 
-/// A box that covers the whole top of B1, so that every point is equally deep.
+/// The whole top of B1, so that every point is equally deep.
 struct Covered {
   Covered() : solid(testing::pressed_block(Element::kHex8Sri, 4, 0.45)), layer(solid, config()) {}
   static Layer::Config config() {
@@ -27,7 +27,7 @@ struct Covered {
     made.piece = 0.01;
     return made;
   }
-  /// The press with this overlap of box and layer, m.
+  /// Overlap of box and layer, m.
   Layer::Press at(double overlap) const {
     const std::vector<Layer::Placed> placed{{&tool, Pose{.position = Vec3(0, 0, 0.05 + 0.01 + kThickness - overlap)}}};
     const VectorXd rest = VectorXd::Zero(solid.size());
@@ -57,7 +57,6 @@ TEST(Layer, PressesWithYoungsModulusAndBeginsWithoutAStepInForceOrStiffness) {
     const Layer::Press press = covered.at(overlap);
     EXPECT_NEAR(press.felt[0].curve(2, 2), kStiff, 1e-6 * kStiff) << overlap;
     EXPECT_NEAR(-press.felt[0].slope[2], kStiff * (overlap - kOnset / 2), 1e-6 * kStiff * kThickness) << overlap;
-    // The forces on tool and nodes are opposite.
     double nodes = 0;
     for (Eigen::Index i = 2; i < press.slope.size(); i += 3) nodes += press.slope[i];
     EXPECT_NEAR(nodes, -press.felt[0].slope[2], 1e-12);

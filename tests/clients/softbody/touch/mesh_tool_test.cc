@@ -72,7 +72,6 @@ TEST(MeshTool, ItsStiffnessesAreTheSlopesOfForceAndTorque) {
   }
 }
 
-/// A closed path from outside to outside with a rotation.
 Pose stroke(double t) {
   const double angle = 2 * std::numbers::pi * t;
   Pose pose = palpating(0.001 - 0.0022 * std::cos(angle), std::sin(angle));
@@ -116,7 +115,6 @@ TEST(MeshTool, APoseThatIsNotFiniteChangesNoBit) {
     EXPECT_EQ(pressed.at(Pose{.position = place, .turn = Mat3::Constant(bad)}).force, Vec3::Zero());
   }
   EXPECT_EQ(pressed.model.displacements(), before);
-  // Far beyond the grid the gap is the distance to the surface.
   EXPECT_NEAR(pressed.at(Vec3(0, 0, 1.05)).gap, 1 - 0.0015 - 1e-4, 1e-3);
 }
 

@@ -59,7 +59,6 @@ inline Layer::Mat6 slopes(PressedByTools& pressed, const Pose& handle) {
   return all;
 }
 
-/// Force of the supports on the body, N.
 inline Vec3 support(const PressedByTools& pressed) {
   const VectorXd force = pressed.solid.forces(pressed.model.displacements()).force;
   Vec3 sum = Vec3::Zero();
@@ -69,11 +68,10 @@ inline Vec3 support(const PressedByTools& pressed) {
   return sum;
 }
 
-/// Energy of a closed path of one hand, J.
 struct ClosedWay {
-  double work = 0;     ///< from the hand to the body, total
+  double work = 0;     ///< total work of the hand on the body
   double most = 0;     ///< largest intermediate value
-  double turning = 0;  ///< of rotations, sum of absolute values
+  double turning = 0;  ///< sum of the absolute values for rotations
   double lost = 0;
   double least = 0;  ///< smallest loss of a friction point in one answer
 };

@@ -137,7 +137,7 @@ TEST(RigidContact, AClosedWayOfPlacesAndTurnsGivesBackExactlyWhatItTook) {
   EXPECT_LT(std::abs(way.work), 2e-3 * way.most);
 }
 
-/// Energy lost in a press of 3 mm, a slide of 3 mm along an axis and the release, as a share of the energy put in.
+/// 3 mm down, 3 mm along an axis and up; as a share of the energy put in.
 double lost_by_sliding(const BodyConfig& config, int axis, bool to_and_fro) {
   Body body(config);
   const Vec3 outside = body.touch_point() - lowest_of_tool(config, Mat3::Identity()) + Vec3(0, 0, 2e-4);
@@ -290,7 +290,7 @@ TEST(RigidContact, FrictionDragsTheShapeAndEveryPointLosesEnergy) {
   EXPECT_GT(stuck, 100);
   EXPECT_GT(slid, 100);
   EXPECT_GT(lost, 1e-4);
-  // The tool slides: the drag is µ times the force, and slightly more because material piles up in front of it.
+  // µ times the force, and slightly more because material piles up in front of the tool.
   EXPECT_NEAR((feel.force.x() - without.force.x()) / feel.force.z(), -kFriction, 0.25 * kFriction);
   EXPECT_GT(below(pressed), shape_before + 0.0003);
   EXPECT_GT(below(pressed), below(smooth) + 0.0003);
@@ -324,7 +324,6 @@ TEST(RigidContact, FrictionIsBoundedByThePressureOfItsOwnAnswer) {
   PressedByTools rough(Law::kNeoHookean, one(RigidShape::sphere(0.015)), kFriction);
   PressedByTools smooth(Law::kNeoHookean, one(RigidShape::sphere(0.015)));
   for (double z = 0.064; z > 0.0599; z -= 0.0005) rough.at(Vec3(0, 0, z));
-  // In one answer almost out of the body and sideways.
   const Vec3 light(0.002, 0, 0.0635);
   const Feel feel = rough.at(light);
   EXPECT_GT(feel.force.z(), 0.01);
@@ -359,7 +358,6 @@ TEST(RigidContact, FarApartEachHandFeelsWhatItFeelsAlone) {
     EXPECT_LT((feels[i].force - feel.force).norm(), 0.005 * feel.force.norm()) << i;
     EXPECT_LT((feels[i].stiffness - feel.stiffness).norm(), 0.005 * feel.stiffness.norm()) << i;
   }
-  // An absent hand does not affect the other.
   const std::vector<Feel> one_left = both.contact.press(std::vector{hands[0], std::optional<Pose>()});
   EXPECT_EQ(one_left[1].force, Vec3::Zero());
   PressedByTools alone(Law::kNeoHookean, {sphere});
@@ -460,7 +458,6 @@ TEST(RigidScene, ItsKeysAreItsOwnAndItRefusesWhatItCannotDo) {
         std::string("tool = \"box\"\ntool_size_mm = [20, 0, 12]\ntool_edge_mm = 2"), std::string("layer_mm = 1")}) {
     EXPECT_THROW(scene(wrong), SceneError) << wrong;
   }
-  // A mesh file is read when the body is created.
   const std::string mesh = "tool = \"mesh\"\ntool_file = \"spoon.off\"\ntool_units_per_m = 1000\n";
   const BodyConfig spoon = scene(mesh + "tool_cell_mm = 0.8").body;
   const MeshTool tool = std::get<MeshTool>(spoon.tool);

@@ -102,7 +102,6 @@ TEST(RigidShape, ItsSignSaysWhichSideOfTheSurfaceAPointIsOn) {
   EXPECT_NEAR(box.distance(Vec3(0, 0, 0.007)).value, 0.001, 1e-15);
   EXPECT_NEAR(box.distance(Vec3(0.009, 0, 0)).value, -0.001, 1e-15);
   EXPECT_GT(box.distance(Vec3(0.01, 0.015, 0.006)).value, 0.001);
-  // a rounded corner
   EXPECT_NEAR(box.distance(Vec3(0.008, 0.013, 0.004) + 0.005 * Vec3(2, 1, 2) / 3).value, 0.003, 1e-15);
   EXPECT_NEAR(box.distance(Vec3(1000, 0, 0)).value, 999.99, 1e-9);
 }
@@ -128,7 +127,6 @@ TEST(RigidShape, NoPointOfItsSurfaceIsFartherThanItsFarthest) {
       const Vec3 far = shape.farthest(way);
       EXPECT_NEAR(shape.distance(far).value, 0, 1e-12) << name;
       EXPECT_LE(far.norm(), shape.reach() + 1e-12) << name;
-      // The tangent plane separates the tool from the outside.
       EXPECT_GT(shape.distance(far + 0.001 * way).value, 0.001 - 1e-12) << name;
       Vec3 beside = 1e3 * (Mat3::Identity() - way * way.transpose()) * Vec3(0.3, 0.5, -0.7);
       beside.normalize();
@@ -149,7 +147,7 @@ TEST(RigidShape, AMeshOfABallIsThatBallToWhatItsFactsSay) {
   EXPECT_NEAR(facts.size.z(), 0.02, 1e-4);
   EXPECT_LT(facts.error, 0.05 * facts.cell);
   EXPECT_NEAR(shape.reach(), 0.01, 2e-5);
-  EXPECT_NEAR(shape.thinnest(), 6 * facts.cell, 1e-12);  // it is thicker; the search ends at this value
+  EXPECT_NEAR(shape.thinnest(), 6 * facts.cell, 1e-12);  // the search ends at this value
   Dice dice(8);
   for (int i = 0; i < 1000; ++i) {
     const Vec3 way = Vec3(dice.within(-1, 1), dice.within(-1, 1), dice.within(-1, 1)).normalized();

@@ -20,10 +20,10 @@ namespace tendon::softbody::sphere_test {
 namespace {
 
 constexpr double kRadius = 0.01;            // m
-constexpr double kDeepest = 0.1 * kRadius;  // Hertz's theory holds up to this depth
+constexpr double kDeepest = 0.1 * kRadius;  // Hertz's theory is valid up to this depth
 constexpr Material kSoft{.young = 1e4, .poisson = 0.3};
 
-/// A quarter of a half space. The cells near the contact are 1/8 of its largest radius.
+/// A quarter. The cells near the contact are 1/8 of its largest radius.
 Solid half_space() {
   const double widest = std::sqrt(kRadius * kDeepest);
   std::vector<double> out{0};
@@ -47,7 +47,7 @@ TEST(Sphere, OnAHalfSpaceIsWhatHertzSays) {
     const double hertz = 4.0 / 3 * modulus * std::sqrt(kRadius) * std::pow(depth, 1.5);
     EXPECT_NEAR(force.back() / hertz, 1, 0.06) << depth;
     EXPECT_NEAR(4 * feel.stiffness(2, 2) / (1.5 * hertz / depth), 1, 0.08) << depth;
-    EXPECT_NEAR(sphere.contact_radius() / std::sqrt(kRadius * depth), 1, 0.15) << depth;  // a cell is 1/8 of the radius
+    EXPECT_NEAR(sphere.contact_radius() / std::sqrt(kRadius * depth), 1, 0.15) << depth;
   }
   EXPECT_NEAR(std::log2(force[1] / force[0]), 1.5, 0.04);  // 1 for a contact of constant size
 }
@@ -75,8 +75,7 @@ TEST_F(Spheres, NoNodeIsPulledAndNoneIsInside) {
 TEST_F(Spheres, AClosedWayThroughTheBodyGivesBackExactlyWhatItTook) {
   const auto place = [](double turn) {
     const double angle = 2 * std::numbers::pi * turn;
-    // Off center, where the body is softer on one side, so that the energy is only conserved with the tangential
-    // force.
+    // Off center, where the energy is only conserved with the tangential force.
     return Vec3(0.018 + 0.008 * std::cos(angle), -0.012 + 0.008 * std::sin(angle), 0.067 + 0.001 * std::sin(2 * angle));
   };
   double work = 0;

@@ -42,7 +42,7 @@ TEST(SurfaceDistance, OfManyFacetsItIsTheLeastOfAllAndACavityIsOutside) {
   }
 }
 
-/// A tetrahedron with a corner so sharp that the facet normals disagree about the side of a point.
+/// The facet normals disagree about the side of a point.
 TEST(SurfaceDistance, AtASharpCornerTheSideIsRightWhereSingleFacetsAreWrong) {
   Triangles needle;
   needle.points = {Vec3(0, 0, 0), Vec3(0.1, 0, -4), Vec3(-0.1, 0.15, -4), Vec3(-0.3, -0.1, -4)};

@@ -9,8 +9,7 @@
 
 namespace tendon::softbody::testing {
 
-/// A ball with `round` facets along the equator. The corners are moved outward so that the facets are at `radius` on
-/// average.
+/// `round` facets along the equator, which are at `radius` on average.
 inline Triangles ball(double radius, int round) {
   const int up = round / 2;
   const double step = std::numbers::pi / up;

@@ -7,8 +7,8 @@
 #include <string_view>
 #include <vector>
 
-// What clients/precice uses of preCICE 3's interface, with a partner in this process: springs that hold each node. It
-// refuses, as preCICE does, calls in the wrong order and names that it does not know.
+// What clients/precice uses of preCICE 3, with a partner in this process: springs that hold each node. As preCICE, it
+// refuses calls in the wrong order and names that it does not know.
 
 // NOLINTBEGIN(readability-identifier-naming): the names are preCICE's
 namespace precice {
