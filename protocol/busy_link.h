@@ -9,16 +9,13 @@
 
 namespace tendon {
 
-/// A link for threads that poll instead of sleeping. Polling avoids the wake-up latency of about 10 to 50 µs in each
-/// direction, but keeps one processor core busy.
+/// A link for threads that poll to avoid a wake-up latency of about 10 to 50 µs per direction. Polling occupies a core.
 ///
 ///     while (now < due && !busy.look(now)) {}
 ///     due = turn(now);                            // receives from `busy`
 ///
 /// If the previous look() was empty, the next datagram is assumed to be alone: after it, receive() returns 0 without a
-/// system call, which would delay the answer.
-///
-/// Thread-safe: no. Realtime-safe: as the wrapped link.
+/// system call, which would delay the answer. Thread-safe: no. Realtime-safe: as the wrapped link.
 class BusyLink : public Link {
  public:
   /// `link` must outlive this object, must have a clock (Link::present), and must not be used for receiving elsewhere.
@@ -35,14 +32,12 @@ class BusyLink : public Link {
   LocalTime arrived(LocalTime now) const override { return by_look_ ? std::max(now, looked_) : link_.arrived(now); }
 
  private:
-  /// If more time than this has passed since the start of an empty look, the thread was preempted, and more than one
-  /// datagram may have arrived.
+  /// If an empty look took longer, the thread was preempted, and more than one datagram may have arrived.
   static constexpr Duration kAtOnce = std::chrono::microseconds(20);
 
   Link& link_;
   Address from_;
-  /// The extra byte marks datagrams that are too large.
-  std::array<std::byte, kMaxDatagram + 1> ahead_;
+  std::array<std::byte, kMaxDatagram + 1> ahead_;  ///< the extra byte marks datagrams that are too large
   std::size_t size_ = 0;
   bool alone_ = false;
   bool by_look_ = false;

@@ -5,8 +5,7 @@
 
 namespace tendon {
 
-/// Removes the UTF-8 byte order mark, which some Windows programs write, from the start of a text. Must be called for
-/// all text files from users.
+/// Removes the UTF-8 byte order mark that some Windows programs write. Must be called for all text files from users.
 constexpr std::string_view without_byte_order_mark(std::string_view text) noexcept {
   constexpr std::string_view kMark = "\xef\xbb\xbf";
   return text.starts_with(kMark) ? text.substr(kMark.size()) : text;

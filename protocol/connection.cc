@@ -57,8 +57,7 @@ const Connection::Event* Connection::next_of_session(LocalTime now) {
 }
 
 const Connection::Event* Connection::receive(LocalTime& now) {
-  // The extra byte marks datagrams that are too large.
-  std::array<std::byte, kMaxDatagram + 1> buffer;
+  std::array<std::byte, kMaxDatagram + 1> buffer;  // the extra byte marks datagrams that are too large
   Address from;
   const std::size_t size = link_.receive(from, buffer);
   if (size == 0) {

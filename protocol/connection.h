@@ -15,8 +15,7 @@
 
 namespace tendon {
 
-/// Connects a client to one server and reconnects after failures. It does not use sockets, clocks, threads or
-/// callbacks; the owner polls for events.
+/// Connects a client to one server and reconnects after failures. Uses no sockets, clocks, threads or callbacks.
 ///
 ///     connection.begin_turn();
 ///     while (const auto event = connection.next(now)) handle(event);     // `now` grows with each datagram
@@ -27,7 +26,6 @@ namespace tendon {
 ///   exponential backoff up to retry_max. The first state received in a session resets the backoff. Each attempt uses a
 ///   new random and a new ephemeral key.
 /// * Before each attempt, GreetingDue asks the owner to call greet(), because the contents of the Hello may change.
-///
 /// Thread-safe: no. Realtime-safe: no.
 class Connection {
  public:
@@ -41,8 +39,7 @@ class Connection {
     int max_datagrams = 256;                              ///< limit per turn; > 0
   };
 
-  /// Call greet() now.
-  struct GreetingDue {};
+  struct GreetingDue {};  ///< call greet() now
   struct Opened {
     Welcome welcome;
   };
@@ -51,24 +48,22 @@ class Connection {
     kRefused = 2,     ///< an attempt was refused
     kLost = 3,        ///< a session ended
   };
-  /// An attempt or a session ended. GreetingDue follows after the backoff.
+  /// The attempt or session has ended. GreetingDue follows after the backoff.
   struct Ended {
     Cause cause;
     Code code;
     std::string reason;
   };
-  /// Never contains Session::Closed, which is reported as Ended.
+  /// Session::Closed is reported as Ended.
   using Event = std::variant<GreetingDue, Opened, Ended, const Session::Event*>;
 
   Connection(Link& link, const Address& server, const Config& config);
 
-  /// Begins an attempt. Adds the random and the keys to `hello`. Throws std::invalid_argument if the Hello is too large
-  /// for a datagram.
+  /// Begins an attempt. Adds random and keys to `hello`. Throws std::invalid_argument if the Hello is too large.
   void greet(LocalTime now, const Hello& hello);
 
   void begin_turn() noexcept;
-  /// Returns the next event of this turn, or null. The event is valid until the next call. Advances `now` to a time by
-  /// which the received datagram had certainly arrived.
+  /// Returns the next event of this turn, or null; valid until the next call. Advances `now` to after its arrival.
   const Event* next(LocalTime& now);
   /// Returns true if this turn reached Config::max_datagrams, so that the next turn is due at once.
   bool more() const noexcept { return more_; }
@@ -77,20 +72,16 @@ class Connection {
 
   /// Sends a Bye and closes the session or the attempt without an event. The owner may call greet() again.
   void close(LocalTime now, std::string reason);
-  /// Closes the session without a Bye. GreetingDue follows after the backoff.
-  void drop(LocalTime now);
+  void drop(LocalTime now);  ///< without a Bye; GreetingDue follows after the backoff
 
   /// Changes the address for the next attempt. Must not be called during a session.
   void move_to(const Address& server) { server_ = server; }
   const Address& server() const noexcept { return server_; }
 
-  /// Null if there is no session.
   Session* session() noexcept { return session_ ? &*session_ : nullptr; }
   const Session* session() const noexcept { return session_ ? &*session_ : nullptr; }
-  /// Of the current or the last session.
   const LinkStats& link_stats() const noexcept { return session_ ? session_->stats() : last_stats_; }
-  /// The number of datagrams from other addresses, which were dropped.
-  std::uint64_t foreign() const noexcept { return foreign_; }
+  std::uint64_t foreign() const noexcept { return foreign_; }  ///< datagrams from other addresses, which were dropped
 
  private:
   const Event* next_of_session(LocalTime now);

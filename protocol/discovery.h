@@ -11,16 +11,13 @@
 /// Names and TXT records for finding servers by DNS-SD (RFC 6763): service _tendon._udp, with one instance per device.
 /// The server announces them (server/machine/announcer.h) and clients look them up (clients/cpp/discovery).
 ///
-/// Names are not authenticated: any host can announce any name. Only the client's key authenticates a server
-/// (SESSION.md).
-///
+/// Any host can announce any name. Only the client's key authenticates a server (SESSION.md).
 /// Thread-safe. Realtime-safe: no (heap).
 namespace tendon::dns_sd {
 
 inline constexpr const char* kService = "_tendon._udp";
 inline constexpr const char* kLocal = "local";
-/// The maximum size of an instance name, which is a DNS label.
-inline constexpr std::size_t kMaxName = 63;
+inline constexpr std::size_t kMaxName = 63;  ///< of an instance name, which is a DNS label
 
 /// Returns true if `name` has 1 to 63 bytes of UTF-8 and contains no control characters (RFC 6763, 4.1.1).
 bool is_instance_name(std::string_view name) noexcept;
@@ -43,7 +40,7 @@ struct Instance {
 /// std::invalid_argument: `expected NAME or NAME.DOMAIN like "falcon at bench 3", got "…": …`.
 Instance parse_instance(std::string_view text);
 
-/// The inverse of parse_instance(). Omits the domain "local".
+/// The inverse of parse_instance(), without the domain "local".
 std::string to_string(const Instance& instance);
 
 /// Returns "falcon at bench 3._tendon._udp.example.org", or "_tendon._udp.example.org" without a name.

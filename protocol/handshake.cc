@@ -76,8 +76,7 @@ void ClientHandshake::receive(LocalTime now, std::span<const std::byte> datagram
   if (outcome_) return;
   const Suite suite = noise_ ? Suite::kNoise : Suite::kPlain;
   if (const auto retry = decode_retry(datagram); retry && retry->suite == suite && retry->random == random_) {
-    // Replies immediately only to the first cookie. A server that rejects our cookies could otherwise cause an endless
-    // exchange without delay.
+    // Replies at once to the first cookie only, or a server that rejects cookies could cause an endless fast exchange.
     if (!cookie_) {
       due_ = true;
       next_tick_ = now;

@@ -24,9 +24,9 @@
 
 namespace tendon {
 
-/// The client's half of the handshake, without I/O. It repeats its Hello until a Retry provides a cookie, and then
-/// repeats it with the cookie until an Answer arrives. It does not time out. Ignores datagrams that are malformed, of
-/// another suite, not authentic, or do not contain this attempt's `random`.
+/// The client's half of the handshake, without I/O. It repeats its Hello until a Retry provides a cookie, then repeats
+/// it with the cookie until an Answer arrives. It never times out. It ignores datagrams that are malformed, not
+/// authentic, of another suite, or without this attempt's `random`.
 class ClientHandshake {
  public:
   struct Config {
@@ -38,11 +38,9 @@ class ClientHandshake {
       Key ephemeral;  ///< cryptographically random, new for each attempt
     };
     std::optional<Secret> secret{};
-    /// The allowed suites of a sealed session. Suite 2 is offered as kFeatureAesGcm. If the server chooses a suite that
-    /// is not allowed, the outcome is Refused with kUnsupported.
+    /// Allowed in a sealed session. Suite 2 is offered as kFeatureAesGcm. Other answers are Refused with kUnsupported.
     Suites suites = suites_of_this_machine();
-    /// A lost Hello delays the client by 0.1 s. An unreachable server receives 12 kB/s.
-    Duration resend = std::chrono::milliseconds(100);
+    Duration resend = std::chrono::milliseconds(100);  ///< delay after a loss; an unreachable server receives 12 kB/s
   };
   struct Accepted {
     std::uint32_t connection_id;
@@ -59,10 +57,8 @@ class ClientHandshake {
   void tick(LocalTime now);
   /// Writes the Hello and returns its size, or returns 0 if it is not due.
   std::size_t next_datagram(LocalTime now, std::span<std::byte, kMaxDatagram> buffer);
-  /// Set if the server has answered.
-  const std::optional<Outcome>& outcome() const noexcept { return outcome_; }
-  /// When to call `tick`. Not in the future if a Hello is due.
-  LocalTime next_tick() const noexcept { return next_tick_; }
+  const std::optional<Outcome>& outcome() const noexcept { return outcome_; }  ///< set when the server has answered
+  LocalTime next_tick() const noexcept { return next_tick_; }  ///< when to call `tick`; at once if a Hello is due
 
  private:
   void settle(const AnswerDatagram& datagram);
@@ -80,9 +76,8 @@ class ClientHandshake {
   LocalTime next_tick_;
 };
 
-/// The server's half of the handshake, without I/O. It answers a Hello that does not contain a valid cookie with a
-/// Retry, stores no state for it, and never sends more bytes than it has received. Spoofed Hellos therefore cannot
-/// exhaust the memory or flood a third party.
+/// The server's half of the handshake, without I/O. If a Hello has no valid cookie, it sends a Retry and stores no
+/// state. It never sends more bytes than it has received, so spoofed Hellos cannot exhaust the memory or flood anyone.
 ///
 ///     key n  = HMAC-SHA-256(secret, "tendon-cookie-key" ‖ n as 8 bytes LE),  n = ⌊now / key_lifetime⌋
 ///     cookie = HMAC-SHA-256(key n, "tendon-cookie" ‖ ip[16] ‖ port as 2 bytes LE ‖ client random)[0..16)
@@ -95,19 +90,17 @@ class ServerHandshake {
     /// Random bytes drawn at startup, from which all cookie keys and ephemeral keys are derived. Must be erased after
     /// construction, because it can be used to decrypt later handshakes.
     Bytes32 secret{};
-    /// The keys that are accepted in suites 1 and 2.
-    std::vector<ClientKey> keys{};
+    std::vector<ClientKey> keys{};  ///< accepted in suites 1 and 2
     /// The allowed suites. A session uses the first of kSealedSuites that is also supported by the client.
     Suites suites = suites_of_this_machine();
     std::uint32_t version_min = kProtocolVersion;
     std::uint32_t version_max = kProtocolVersion;
     /// Long enough for any client to return its cookie, but too short for a stolen cookie to be useful.
     Duration key_lifetime = std::chrono::seconds(120);
-    /// Instances with the same secret accept each other's cookies. They must have different numbers, so that they do
-    /// not draw the same ephemeral keys.
+    /// Instances with one secret accept each other's cookies. Different numbers give them different ephemeral keys.
     std::uint32_t number = 0;
   };
-  /// A Hello whose sender has proved that it owns its address and, in suite 1, its key.
+  /// A Hello whose sender has proved that it owns its address and, in suites 1 and 2, its key.
   struct Client {
     Hello hello;
     ClientRandom random;                  ///< the same if the Hello was resent
@@ -124,7 +117,6 @@ class ServerHandshake {
     std::size_t size = 0;             ///< 0: do not reply
     std::optional<SessionKeys> keys;  ///< only for clients with a key
   };
-  /// Reasons for which a Hello did not lead to a Client.
   struct Stats {
     std::uint64_t retries = 0;  ///< no valid cookie: a Retry was sent
     std::uint64_t malformed = 0;
@@ -137,8 +129,7 @@ class ServerHandshake {
   };
 
   /// Throws std::invalid_argument if `key_lifetime` is not positive, the version range is empty, two clients have the
-  /// same key, or this processor does not support one of the suites. Throws std::runtime_error if libsodium cannot be
-  /// initialized.
+  /// same key, or this processor does not support one of the suites. Throws std::runtime_error if libsodium fails.
   explicit ServerHandshake(const Config& config);
   // A Client points into `keys_`.
   ServerHandshake(const ServerHandshake&) = delete;
@@ -148,9 +139,8 @@ class ServerHandshake {
   Reply receive(LocalTime now, const Address& from, std::span<const std::byte> datagram,
                 std::span<std::byte, kMaxDatagram> answer);
 
-  /// Writes an Answer, which is always shorter than a Hello. With a key, each call uses new session keys, so the bytes
-  /// must be kept and sent again if the Hello is resent. welcome() requires a `suite` and adds kFeatureAesGcm in suite
-  /// 2.
+  /// Writes an Answer, always shorter than a Hello. With a key, each call uses new session keys, so the bytes must be
+  /// kept for a resent Hello. welcome() requires a `suite` and adds kFeatureAesGcm in suite 2.
   Answered welcome(const Client& client, std::uint32_t connection_id, const Welcome& welcome,
                    std::span<std::byte, kMaxDatagram> buffer);
   Answered refuse(const Client& client, const Refused& refused, std::span<std::byte, kMaxDatagram> buffer);

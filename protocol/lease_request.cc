@@ -43,7 +43,7 @@ bool LeaseRequest::take(const Session::RequestAnswered& answer, LocalTime now) n
 bool LeaseRequest::take(const LeaseLost& lost, Session& session, LocalTime now) {
   if (lost.device != place_.device || lost.channel != place_.channel) return false;
   holds_ = false;
-  // The answer to an earlier request can still arrive after this message. A new request is answered after both.
+  // The answer to an earlier request can still arrive after this message, so ask again.
   if (asked_ && ask(session)) return true;
   if (keep_asking_) ask_at_ = now + again_;
   return true;

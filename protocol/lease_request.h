@@ -10,9 +10,7 @@
 
 namespace tendon {
 
-/// A controller's side of the lease of one channel (SESSION.md, "Channels and leases"): whether it holds the lease, and
-/// when to request it.
-///
+/// The controller's side of the lease of one channel (SESSION.md, "Channels and leases").
 /// Thread-safe: no. Realtime-safe: no.
 class LeaseRequest {
  public:

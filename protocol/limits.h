@@ -7,9 +7,9 @@
 #include "core/base/output.h"
 #include "core/base/time.h"
 
-// The bounds of the wire, with their reasons. They are part of the protocol (WIRE.md) and cannot be configured, because
-// both peers must use the same values. A receiver refuses and counts values that are out of bounds, and a sender
-// truncates texts and lists. tendon.proto contains the same bounds, which are tested with protocol/vectors/bounds.json.
+// The bounds of the wire. They are part of the protocol (WIRE.md) and cannot be configured, because both peers must use
+// the same values. A receiver refuses and counts values that are out of bounds, and a sender truncates texts and lists.
+// tendon.proto contains the same bounds, which are tested with protocol/vectors/bounds.json.
 
 namespace tendon::limits {
 
@@ -20,15 +20,13 @@ inline constexpr double kMaxValue = 1e12;
 /// 36 years, for all clock readings. A round trip is the sum of four such times and cannot overflow 64 bits.
 inline constexpr Duration kMaxTime{std::int64_t{1} << 60};
 
-/// A longer validity would exceed all timeouts and render the force of a dead peer.
+/// A longer validity would exceed all timeouts, and the force of a dead peer would still be rendered.
 inline constexpr Duration kMaxValidFor = std::chrono::seconds(10);
 
-/// A correct peer uses at most 48: both request windows and sixteen states or forces. Without this bound, a datagram of
-/// 1200 bytes could contain 590 empty frames.
+/// A correct peer uses at most 48: both request windows and 16 states or forces. 590 empty ones fit into 1200 bytes.
 inline constexpr int kMaxFrames = 64;
 
-/// The maximum number of pending requests. Both peers keep this many slots, so that answers survive loss (see
-/// requests.h). 16 allow for a burst of clicks.
+/// Pending requests. Both peers keep this many slots, so that answers survive loss. 16 allow for a burst of clicks.
 inline constexpr std::uint32_t kRequestWindow = 16;
 
 /// The widest deadband of states. Half the speed is far above the thresholds of touch (7 … 15 %). A hand at 1 m/s moves
@@ -38,22 +36,17 @@ inline constexpr double kMaxDeadbandFloor = 0.1;  ///< m/s
 inline constexpr Duration kMinStateSilence = std::chrono::milliseconds(1);
 inline constexpr Duration kMaxStateSilence = std::chrono::milliseconds(20);
 
-/// Ten fingers of two hands, and six more for tools.
-inline constexpr std::uint32_t kMaxDevices = 16;
-/// Each channel adds a reconstruction to every haptic step.
-inline constexpr std::uint32_t kMaxChannels = 8;
+inline constexpr std::uint32_t kMaxDevices = 16;  ///< ten fingers of two hands, and six more for tools
+inline constexpr std::uint32_t kMaxChannels = 8;  ///< each one adds a reconstruction to every haptic step
 inline constexpr int kMaxClaims = 16;
-/// In bytes, for devices and channels.
-inline constexpr std::size_t kMaxLabel = 24;
+inline constexpr std::size_t kMaxLabel = 24;  ///< bytes, for devices and channels
 inline constexpr std::size_t kMaxButtons = 16;
 inline constexpr std::size_t kMaxJoints = 8;
 inline constexpr std::size_t kMaxOutputs = kMostOutputs;
-/// Engines use at most five solver paths, and a Hello does not have room for sixteen (see below).
-inline constexpr std::size_t kMaxWays = 8;
+inline constexpr std::size_t kMaxWays = 8;  ///< engines use at most five; a Hello has no room for sixteen
 
-/// For a pulse. It must be finite, so that a vibration always stops.
-inline constexpr Duration kMaxVibration = std::chrono::seconds(10);
-/// Hz. Slower pulses are felt as motion, and faster ones are not felt.
+inline constexpr Duration kMaxVibration = std::chrono::seconds(10);  ///< of a pulse; vibrations must always stop
+/// Hz. The hand feels slower pulses as motion, and does not feel faster ones.
 inline constexpr double kMinVibrationHz = 20;
 inline constexpr double kMaxVibrationHz = 1000;
 
@@ -63,16 +56,13 @@ inline constexpr double kMaxVibrationHz = 1000;
 inline constexpr std::size_t kMaxName = 64;
 inline constexpr std::size_t kMaxFeature = 32;
 inline constexpr int kMaxFeatures = 16;
-/// For the reason of a refusal, an answer or a Bye.
-inline constexpr std::size_t kMaxDetail = 128;
+inline constexpr std::size_t kMaxDetail = 128;  ///< for the reason of a refusal, an answer or a Bye
 
-/// Powers of two of 1 µs. The last but one ends at 4.2 s, after every safe stop.
+/// Powers of two of 1 µs. The second to last one ends at 4.2 s, after every safe stop.
 inline constexpr std::size_t kLatenessBuckets = 24;
-/// The maximum divisor of the state rate, fifty times larger than the one used by RateAdaptation.
-inline constexpr std::uint32_t kMaxOneIn = 1000;
+inline constexpr std::uint32_t kMaxOneIn = 1000;  ///< divides the state rate; 50 times that of RateAdaptation
 
-/// Ten times faster than the fastest known loop (100 kHz, on FPGAs).
-inline constexpr std::uint32_t kMaxLoopHz = 1'000'000;
+inline constexpr std::uint32_t kMaxLoopHz = 1'000'000;  ///< ten times the fastest known loop (100 kHz, on FPGAs)
 
 /// The maximum silence that a server may grant. Sums of such times are still small.
 inline constexpr Duration kMaxTimeout = std::chrono::hours(1);
@@ -80,8 +70,7 @@ inline constexpr Duration kMaxTimeout = std::chrono::hours(1);
 /// Far below 2⁶⁴ − 1, the nonce used for renewing a key. At 1 MHz this takes 36 000 years.
 inline constexpr std::uint64_t kMaxPacketNumber = std::uint64_t{1} << 60;
 
-/// The confidentiality of AES-GCM decreases with each block. RFC 9001, 6.6 allows 2²³ packets of any size. Rekey is far
-/// below.
+/// The confidentiality of AES-GCM decreases with each block. RFC 9001, 6.6 allows 2²³ packets. Rekey is far below.
 inline constexpr std::uint64_t kMaxDatagramsOfKey = std::uint64_t{1} << 23;
 /// Datagrams that may fail authentication in a session, since each one is a guess at a tag. RFC 9001, 6.6 allows 2³⁶
 /// per connection for ChaCha20-Poly1305 and 2⁵² for AES-GCM. At 1 MHz this takes 19 h.

@@ -13,8 +13,7 @@
 
 namespace tendon {
 
-/// Below all common path MTUs, so that datagrams are not fragmented.
-inline constexpr std::size_t kMaxDatagram = 1200;
+inline constexpr std::size_t kMaxDatagram = 1200;  ///< below all common path MTUs, so that datagrams are not fragmented
 
 /// An IPv6 or IPv4-mapped address and a UDP port.
 struct Address {
@@ -23,7 +22,6 @@ struct Address {
   auto operator<=>(const Address&) const = default;
 };
 
-/// The inverse of parse_address().
 std::string to_string(const Address& address);
 
 /// Parses "127.0.0.1:47100", "[::1]:47100" or "localhost:47100" (127.0.0.1). Never blocks, because names are not
@@ -37,9 +35,7 @@ bool is_ipv4(const Address& address) noexcept;
 
 bool is_loopback(const Address& address) noexcept;
 
-/// An unreliable datagram transport: a UDP socket, or a simulated network used in tests.
-///
-/// Thread-safe: no.
+/// An unreliable datagram transport: a UDP socket, or a simulated network used in tests. Thread-safe: no.
 class Link {
  public:
   virtual ~Link() = default;
@@ -47,19 +43,16 @@ class Link {
   /// May lose the datagram. Errors are not reported.
   virtual void send(const Address& to, std::span<const std::byte> datagram) = 0;
 
-  /// Copies the next datagram into `buffer` and returns its full size, even if it was truncated. Returns 0 if there are
-  /// no more datagrams. Never blocks.
+  /// Copies the next datagram and returns its full size, even if truncated, or 0 if there is none. Never blocks.
   virtual std::size_t receive(Address& from, std::span<std::byte> buffer) = 0;
 
-  /// Returns the present time, at least `now`. A link without a clock returns `now`.
+  /// Returns the present time, at least `now`. If a link has no clock, it returns `now`.
   ///
-  /// This is used because a thread can be preempted after reading `now`, or delayed by an engine. Datagrams received
-  /// afterwards may have arrived after `now`. Their round trips would be underestimated, and ClockOffsetEstimator
-  /// relies on the shortest round trips.
+  /// A thread can be preempted after reading `now`, or delayed by an engine. Datagrams received afterwards may have
+  /// arrived after `now`. Their round trips would be too short, and ClockOffsetEstimator uses the shortest.
   virtual LocalTime present(LocalTime now) const { return now; }
 
-  /// Returns a time, at least `now`, by which the last received datagram had certainly arrived. A link that knows an
-  /// earlier time than present() saves reading the clock.
+  /// Like present(), for the arrival of the last datagram. A link that knows this saves reading the clock.
   virtual LocalTime arrived(LocalTime now) const { return present(now); }
 };
 

@@ -48,7 +48,7 @@ enum class Code : std::uint8_t {
 };
 
 // Devices and channels are numbered from 0, below limits::kMaxDevices and limits::kMaxChannels. Each channel takes the
-// forces of one engine, and the device renders the combination of all channels.
+// forces of one engine. The device renders the combination of all channels.
 
 /// Server → client, unreliable, newest wins for each device: the device at one haptic step.
 struct DeviceState {
@@ -65,13 +65,11 @@ struct DeviceState {
   Mode mode = Mode::kIdle;
   std::uint32_t device = 0;
   std::uint32_t channel = 0;  ///< for `force_sequence`, `force_age` and `mode`
-  /// N, requested by the engines, after hold or local model and before all limits. Only for observers with
-  /// kFeatureDiagnostics.
+  /// N, requested by the engines, after hold or local model, before all limits. For observers with kFeatureDiagnostics.
   std::optional<Vec3> force_wanted{};
   /// N/m, −∂force_wanted/∂position, using the engines' models. Empty if there is no model.
   std::optional<Mat3> stiffness_wanted{};
-  /// Bit i is set while button i is held, only for clients with kFeatureHandle. Short presses are included in the next
-  /// state that is sent.
+  /// Bit i is set if button i is held or was pressed since the last state that was sent. Requires kFeatureHandle.
   std::uint32_t buttons = 0;
   // Only for clients with kFeatureHandle, and only if the device has such a sensor or motor:
   std::optional<Turning> turning{};
@@ -79,8 +77,7 @@ struct DeviceState {
   std::optional<Grip> grip{};
   std::optional<double> grip_applied{};  ///< N, on the fingers, > 0 opens them
   std::optional<Vec3> hand_force{};      ///< N, of the hand on the handle
-  /// In the order of HandleDescription::joints. Only for clients with kFeatureJoints.
-  std::optional<Joints> joints{};
+  std::optional<Joints> joints{};        ///< in the order of HandleDescription::joints; requires kFeatureJoints
 };
 
 /// Client → server, unreliable, newest wins for each device and channel: the force from the physics engine.
@@ -96,8 +93,7 @@ struct ForceCommand {
   std::optional<double> error{};         ///< N, estimated by the engine
   std::optional<RemoteTorque> torque{};  ///< requires kFeatureHandle, like `grip_force`
   std::optional<double> grip_force{};    ///< N, on the fingers; > 0 opens them
-  /// The number, starting at 1, of the entry of Hello::ways that was used, or 0. Requires kFeatureWays.
-  std::uint32_t way = 0;
+  std::uint32_t way = 0;                 ///< entry of Hello::ways that was used, from 1, or 0; requires kFeatureWays
 };
 
 /// Quantiles of a delay. They can be negative if two clocks were compared.
@@ -115,9 +111,8 @@ struct RefusedForces {
   bool operator==(const RefusedForces&) const = default;
 };
 
-/// Server → client, unreliable, newest wins: statistics of the client's forces and datagrams, sent once per `span`
-/// while forces arrive, are missing or are refused. Delays that were not measured are empty. One-way delays are
-/// accurate to ± `clock_error`.
+/// Server → client, unreliable, newest wins: statistics of the client's forces and datagrams. Sent once per `span`
+/// while forces arrive, are missing or are refused. Unmeasured delays are empty. One-way delays: ± `clock_error`.
 struct LinkReport {
   std::uint64_t number = 0;  ///< 1, 2, 3 … per session
   PeerTime until{};          ///< end of the span, on the server's clock
@@ -143,8 +138,7 @@ struct LinkReport {
   std::string words;  ///< reasons, for people; at most 128 bytes
   // During the span:
   std::uint64_t late_unknown = 0;  ///< not yet known, because the client is silent
-  /// Of all channels together, because some refused forces do not have a readable channel.
-  RefusedForces refused{};
+  RefusedForces refused{};         ///< of all channels, because some refused forces do not have a readable channel
 };
 
 /// The state of a device and its safety layer. Part of the wire: never renumber.
@@ -169,8 +163,8 @@ constexpr std::size_t lateness_bucket(Duration late) noexcept {
   return std::min(bucket, limits::kLatenessBuckets - 1);
 }
 
-/// Both directions, unreliable: one end of a coupling, sent to the other end, and both ends sent to observers. For each
-/// device, channel and end, the highest sequence of the highest epoch wins. Requires kFeatureTeleoperation.
+/// Both directions, unreliable: one end of a coupling, sent to the other end and to observers. For each device, channel
+/// and end, the highest sequence of the highest epoch wins. Requires kFeatureTeleoperation.
 struct PortFrame : PortState {
   std::uint32_t device = 0;  ///< always of the session's server
   std::uint32_t channel = 0;
@@ -185,11 +179,10 @@ struct DeviceReport {
   Duration span{};
   std::uint32_t device = 0;
   std::uint64_t steps = 0;
-  std::uint64_t missed = 0;    ///< periods skipped because of a late step
-  std::uint64_t overruns = 0;  ///< late enough for Reason::kOverrun
-  std::uint64_t unseen = 0;    ///< steps without a position
-  /// The sum can be less than `steps` if the server lost count.
-  LatenessHistogram lateness{};
+  std::uint64_t missed = 0;      ///< periods skipped because of a late step
+  std::uint64_t overruns = 0;    ///< late enough for Reason::kOverrun
+  std::uint64_t unseen = 0;      ///< steps without a position
+  LatenessHistogram lateness{};  ///< the sum can be below `steps` if the server lost count
   Safety safety = Safety::kAbsent;
   std::string fault{};     ///< why there is no force; at most 128 bytes
   std::string degraded{};  ///< services reduced by the server; at most 128 bytes
@@ -200,57 +193,53 @@ struct DeviceReport {
 struct PeerReport {
   std::uint32_t device = 0;
   std::uint32_t channel = 0;
-  std::string name{};  ///< at most 64 bytes
-  /// Due to congestion, only one of this many requested states is sent.
-  std::uint32_t state_one_in = 1;
-  bool forces_refused = false;  ///< due to excessive loss
-  LinkReport link{};            ///< for this channel only
+  std::string name{};              ///< at most 64 bytes
+  std::uint32_t state_one_in = 1;  ///< due to congestion, one of this many requested states is sent
+  bool forces_refused = false;     ///< due to excessive loss
+  LinkReport link{};               ///< for this channel only
   // Of the force with the largest ForceCommand::error, or of the newest force if errors are not reported.
   std::optional<double> error{};  ///< N
   std::string way{};              ///< from Hello::ways; at most 24 bytes
 };
 
-/// Client → server, reliable: sets the state rate of a device. The server uses the nearest rate that divides its own
-/// rate, and never a higher one.
+/// Sets the state rate of a device. The server uses the nearest rate that divides its own rate, and never a higher one.
 struct SetStateRate {
   std::uint32_t hz = 0;
   std::uint32_t device = 0;
 };
 
-/// Client → server, reliable: omits states that the client can predict (see StateDeadband). The bounds are in limits.h.
+/// Omits states that the client can predict (see StateDeadband). The bounds are in limits.h.
 struct SetStateDeadband {
   double share = 0;        ///< of the speed
   double floor = 0;        ///< m/s
   Duration max_silence{};  ///< 0 disables the deadband; whole µs
 };
 
-/// Client → server, reliable: clears a latched fault or a Disarm. Only for controllers of the device.
+/// Clears a latched fault or a Disarm. Can only be used by controllers of the device.
 struct Rearm {
   std::uint32_t device = 0;
 };
 
-/// Client → server, reliable: no force until a Rearm, starting with the next step. Only for controllers of the device.
+/// Disables all forces from the next step until a Rearm. Can only be used by controllers of the device.
 struct Disarm {
   std::uint32_t device = 0;
 };
 
-/// Client → server, reliable: sets a lamp or starts a vibration pulse. Only for controllers that hold a channel of the
-/// device. Requires kFeatureOutputs.
+/// Sets a lamp or starts a vibration pulse. The client must hold a channel of the device. Requires kFeatureOutputs.
 struct SetOutput {
   std::uint32_t device = 0;
   std::uint32_t output = 0;  ///< index in HandleDescription::outputs
   OutputSetting setting{};   ///< duration of a pulse: whole ms, rounded up
 };
 
-/// Client → server, reliable: asks for the DeviceDescription, or for the HandleDescription if `handle` is set, which
-/// requires kFeatureHandle because older servers ignore it.
+/// Asks for the DeviceDescription, or for the HandleDescription if `handle` is set, which requires kFeatureHandle
+/// because older servers ignore it.
 struct Describe {
   std::uint32_t device = 0;
   bool handle = false;
 };
 
-/// Client → server, reliable: requests the lease of a channel that this client has claimed. The channel takes the
-/// forces of the holder.
+/// Requests the lease of a channel that this client has claimed. Its holder's forces are used.
 struct TakeLease {
   std::uint32_t device = 0;
   std::uint32_t channel = 0;
@@ -261,14 +250,14 @@ struct GiveLease {
   std::uint32_t channel = 0;
 };
 
-/// Server → client, reliable: another client has taken the lease.
+/// Server → client: notifies a client that another one has taken the lease.
 struct LeaseLost {
   std::uint32_t device = 0;
   std::uint32_t channel = 0;
   std::string to;  ///< name of the holder; at most 64 bytes
 };
 
-/// Client → server, reliable: couples the client's device to this one. Only for clients that claimed the channel.
+/// Couples the client's device to this one. The client must have claimed the channel.
 struct Couple {
   std::uint32_t device = 0;
   std::uint32_t channel = 0;
@@ -295,28 +284,26 @@ struct Couple {
   bool operator==(const Couple&) const = default;
 };
 
-/// Client → server, reliable: changes the scales while the leader is not engaged or uses its clutch. Only for
-/// controllers of the leader's device.
+/// Changes the scales while the leader is not engaged or uses its clutch. The client must control the leader's device.
 struct SetScale {
   std::uint32_t device = 0;
   double position_scale = 1;  ///< follower / leader; 0.01 … 100
   double force_scale = 1;     ///< leader / follower; 0.01 … 100
 };
 
-/// Client → server, reliable: sets the weight of the leader of that channel. Only for controllers of the follower's
-/// device.
+/// Sets the weight of the leader of that channel. The client must control the follower's device.
 struct SetShare {
   std::uint32_t device = 0;
   std::uint32_t channel = 0;
   double share = 0;  ///< 0 … 1
 };
 
-/// Client → server, reliable: engages the coupling. Only for controllers of the device.
+/// Engages the coupling. Can only be used by controllers of the device.
 struct Engage {
   std::uint32_t device = 0;
 };
 
-/// Client → server, reliable: disengages the coupling. Only for controllers of the device.
+/// Disengages the coupling. Can only be used by controllers of the device.
 struct Disengage {
   std::uint32_t device = 0;
 };
@@ -327,8 +314,7 @@ using Request = std::variant<SetStateRate, Rearm, Disarm, Describe, TakeLease, G
 struct ChannelDescription {
   std::string name;  ///< at most 24 bytes
   ChannelRule rule = ChannelRule::kSum;
-  /// A holder that does not send usable forces for this long can be replaced. 0 disables this.
-  Duration lease{};
+  Duration lease{};      ///< if a holder sends no usable forces for this long, it can be replaced; 0: never
   std::string holder{};  ///< empty if the channel is free; cut to 24 bytes
 };
 
@@ -354,8 +340,7 @@ struct DeviceDescription {
 
 enum class Hand : std::uint8_t { kAny = 0, kLeft = 1, kRight = 2 };
 
-/// Describes the handle of a device. This is a separate message, because together with the longest DeviceDescription it
-/// is too large for a datagram.
+/// Describes the handle of a device. Together with the longest DeviceDescription, it would not fit into a datagram.
 struct HandleDescription {
   std::uint32_t device = 0;
   /// Device base frame → operator's frame: x right, y up, z to the user (core/base/frames.h). Empty if unknown.
@@ -367,9 +352,9 @@ struct HandleDescription {
   double max_gripper_force = 0;          ///< N, on the fingers; 0: no motor
   std::string group{};                   ///< same for devices of one body; at most 24 bytes
   Hand hand = Hand::kAny;
-  /// At most 8 names of at most 24 bytes, in the order of DeviceState::joints. Only for clients with kFeatureJoints.
+  /// At most 8 names of at most 24 bytes, in the order of DeviceState::joints. Requires kFeatureJoints.
   std::vector<std::string> joints{};
-  /// Indexed by SetOutput::output; at most 8, with names of at most 24 bytes. Only for clients with kFeatureOutputs.
+  /// The index is SetOutput::output. At most 8, with names of at most 24 bytes. Requires kFeatureOutputs.
   std::vector<OutputDescription> outputs{};
 };
 
@@ -380,17 +365,13 @@ inline constexpr std::string_view kFeatureLocalModel = "local-model";
 /// Claims use the names of devices and channels, and the client is notified if it loses a lease.
 inline constexpr std::string_view kFeatureChannels = "channels";
 
-/// The client receives the orientation of the device, the names of the buttons, and their states.
-inline constexpr std::string_view kFeatureHandle = "handle";
+inline constexpr std::string_view kFeatureHandle = "handle";  ///< orientation, button names and button states
 
-/// The client receives joint angles and their names.
-inline constexpr std::string_view kFeatureJoints = "joints";
+inline constexpr std::string_view kFeatureJoints = "joints";  ///< joint angles and their names
 
-/// The client receives the list of outputs (lamps, vibration) and can set them.
-inline constexpr std::string_view kFeatureOutputs = "outputs";
+inline constexpr std::string_view kFeatureOutputs = "outputs";  ///< lamps and vibration, which the client can set
 
-/// The client can be the remote end of a coupling, using Couple and PortState. Observers receive the PortStates of both
-/// ends.
+/// The client can be the remote end of a coupling (Couple, PortState). Observers receive the PortStates of both ends.
 inline constexpr std::string_view kFeatureTeleoperation = "teleoperation";
 
 /// States of several devices at the same step are sent in columns if this halves the size, using single precision
@@ -424,11 +405,9 @@ struct Hello {
   Role role = Role::kObserver;
   std::string name;                   ///< for logs; at most 64 bytes
   std::vector<std::string> features;  ///< at most 16 of at most 32 bytes
-  /// At most 16, without duplicates. If not empty, `role` is the highest of their roles. The default is device 0,
-  /// channel 0, `role`.
+  /// At most 16, without duplicates; `role` is the highest of their roles. Default: device 0, channel 0, `role`.
   std::vector<Claim> claims{};
-  /// Solver paths, if kFeatureWays is named; at most limits::kMaxWays of at most 24 bytes.
-  std::vector<std::string> ways{};
+  std::vector<std::string> ways{};  ///< solver paths, with kFeatureWays; at most limits::kMaxWays of at most 24 bytes
 };
 
 struct Welcome {
@@ -441,8 +420,7 @@ struct Welcome {
   std::uint32_t loop_hz = 0;
   Duration timeout{};  ///< maximum silence of the client
   std::string server;
-  /// In the order of the claims. The fields from device_name to loop_hz describe the first device. Empty if the server
-  /// does not support claims.
+  /// In the order of the claims; empty if not supported. The fields device_name to loop_hz describe the first device.
   std::vector<Grant> grants{};
 };
 

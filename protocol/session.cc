@@ -39,7 +39,7 @@ class Newest {
 
   bool empty() const noexcept { return waiting_ == 0; }
 
-  /// Streams are in the order of their first values.
+  /// Streams are sorted by the time of their first value.
   const Kept* first() const noexcept { return empty() ? nullptr : &next_waiting()->value; }
   /// The value is valid until the next `put`.
   const Kept* take() noexcept {
@@ -120,7 +120,6 @@ class Newest {
 template <class... Newests>
 struct Streams : Newests... {
   bool empty() const noexcept { return (Newests::empty() && ...); }
-  /// Returns a value of the first kind that is not empty, or null.
   const auto* take() noexcept {
     const std::common_type_t<typename Newests::Kept...>* taken = nullptr;
     ((!taken && !Newests::empty() ? void(taken = Newests::take()) : void()), ...);
@@ -128,7 +127,7 @@ struct Streams : Newests... {
   }
 };
 
-/// Selects a kind, as in of<DeviceState>(streams).
+/// For example, of<DeviceState>(streams).
 template <class Value, class Told>
 Newest<Value, Told>& of(Newest<Value, Told>& streams) noexcept {
   return streams;
@@ -276,8 +275,7 @@ bool Session::receive(LocalTime now, std::span<const std::byte> datagram) {
   if (!body) return false;
   const DataContent* content = my.reader.read(*body);
   if (!content) {
-    // If the datagram is authentic, its number must not be accepted again. In suite 0, a damaged copy must not block
-    // the original.
+    // An authentic datagram uses up its number. In suite 0, a damaged copy must not block the original.
     if (my.opener) my.seen.insert(header->packet_number);
     ++my.stats.malformed;
     return false;
@@ -285,7 +283,7 @@ bool Session::receive(LocalTime now, std::span<const std::byte> datagram) {
   return my.accept(now, header->packet_number, *content);
 }
 
-/// Returns the plaintext. Datagrams that are not authentic are counted.
+/// Returns the plaintext, or nullopt if the datagram is not authentic, which is counted.
 std::optional<std::span<const std::byte>> Session::State::open_body(LocalTime now, const Header& header,
                                                                     std::span<const std::byte> datagram) {
   if (!opener) return datagram.subspan(kHeaderSize);
@@ -452,8 +450,7 @@ void Session::State::fill_with() {
   (add(of<Value>(to_send)), ...);
 }
 
-/// Adds as much data as possible, starting with the most urgent. The rest is sent in the next datagram. There is always
-/// room for a state and a force.
+/// Adds as much as possible, most urgent first, and the rest to the next datagram. A state and a force always fit.
 void Session::State::fill(LocalTime now) {
   if (config.states_in_columns) fill_columns();
   fill_with<DeviceState, PortFrame, ForceCommand>();

@@ -18,8 +18,7 @@
 
 namespace tendon {
 
-/// Statistics of a conversation. Each received datagram increments exactly one of `datagrams_received`, `duplicated`,
-/// `malformed`, `forged` and `old_key`.
+/// Statistics of a conversation. Counts a datagram once: received, duplicated, malformed, forged or old_key.
 struct LinkStats {
   std::uint64_t datagrams_sent = 0;
   std::uint64_t datagrams_received = 0;
@@ -39,41 +38,35 @@ struct LinkStats {
   Duration round_trip_variation{};  ///< RFC 6298 RTTVAR
 };
 
-/// A conversation between a client and a server, used by both. It does not use sockets, clocks, threads or random
-/// numbers: its inputs are bytes and times, and its owner pulls bytes and events.
+/// A conversation between a client and a server, used by both. It has no sockets, clocks, threads or random numbers.
+/// Its inputs are bytes and times, and its owner pulls bytes and events.
 ///
 /// All queues are bounded: one state and one report per device, one force, port and report per channel, one link
 /// report, and limits::kRequestWindow requests in each direction. If an event was not pulled in time, a newer one of
 /// the same stream replaces it.
 ///
-/// Call `receive` with each datagram and `tick` when `next_tick()` is due, and then pull `next_event` and
-/// `next_datagram` until both are empty. `now` must never decrease. See SESSION.md for the behavior and WIRE.md for the
-/// bytes.
-///
+/// Call `receive` with each datagram and `tick` when `next_tick()` is due. Then pull `next_event` and `next_datagram`
+/// until both are empty. `now` must never decrease. See SESSION.md for the behavior and WIRE.md for the bytes.
 /// Thread-safe: no. Realtime-safe: no.
 class Session {
  public:
   struct Config {
     std::uint32_t connection_id = 0;
-    /// The longest silence of this peer. The safe stop of a server (250 ms) is only reached if five keep-alives are
-    /// lost.
+    /// The longest silence of this peer. A server's safe stop (250 ms) is only reached if five keep-alives are lost.
     Duration keep_alive = std::chrono::milliseconds(50);
-    /// The longest silence of the other peer: longer than a Wi-Fi roam, but shorter than a person would wait.
+    /// The longest silence of the other peer. This is longer than a Wi-Fi roam, but shorter than a person would wait.
     Duration timeout = std::chrono::seconds(2);
     /// Requests are resent after max(this, SRTT + 4 RTTVAR). Scheduling delays of tens of ms, which are usual on
     /// virtual machines, would otherwise cause duplicates.
     Duration min_resend = std::chrono::milliseconds(20);
-    /// Requires kFeatureStateColumns.
-    bool states_in_columns = false;
+    bool states_in_columns = false;  ///< requires kFeatureStateColumns
 
     // Only used in suites 1 and 2:
     Rekey rekey{};
     /// The maximum age, after which a session is closed with kExpired and the client repeats the handshake.
     Duration life = std::chrono::hours(24);
-    /// The maximum number of sent datagrams, because packet numbers must not be reused.
-    std::uint64_t max_datagrams = limits::kMaxPacketNumber;
-    /// The maximum number of datagrams that fail authentication, because each one is a guess at a tag.
-    std::uint64_t max_forged = limits::kMaxForged;
+    std::uint64_t max_datagrams = limits::kMaxPacketNumber;  ///< sent, because packet numbers must not be reused
+    std::uint64_t max_forged = limits::kMaxForged;           ///< each one is a guess at a tag
   };
 
   /// Opens a conversation of suite 0 after the handshake has completed at `opened`. The first datagram is due at once,
@@ -135,15 +128,14 @@ class Session {
   void send(const PeerReport& report);
   void send(const PortFrame& port);
   /// Queues a reliable request and returns its id, or nullopt if limits::kRequestWindow requests are pending. A request
-  /// is pending until its RequestAnswered was pulled.
+  /// remains pending until its RequestAnswered has been pulled.
   std::optional<std::uint32_t> request(const Request& request);
   /// Answers a request. Every request must be answered. Unknown ids are ignored.
   void answer(std::uint32_t id, Code code, std::string detail, Duration wait = {});
   /// Answer a Describe with kOk.
   void answer(std::uint32_t id, DeviceDescription device);
   void answer(std::uint32_t id, HandleDescription handle);
-  /// Closes the session without a Closed event. limits::kByes copies of a Bye can be pulled from `next_datagram`, but
-  /// unsent data are dropped.
+  /// Closes the session without a Closed event. Only kByes copies of a Bye remain in `next_datagram`.
   void close(Code code, std::string reason);
   /// Closes the session if the peer was silent for too long or the session is too old.
   void tick(LocalTime now);
@@ -151,11 +143,9 @@ class Session {
   // Output.
   /// Writes the next datagram and returns its size, or 0 if there is no data to send.
   std::size_t next_datagram(LocalTime now, std::span<std::byte, kMaxDatagram> buffer);
-  /// Returns the next event, or null. The last one is Closed. The event is valid until the next call of this function
-  /// or of `receive`.
+  /// Returns the next event, or null; Closed is the last one. Valid until the next call of this function or `receive`.
   const Event* next_event();
-  /// When to call `tick` and `next_datagram`. Not in the future if data must be sent.
-  LocalTime next_tick() const noexcept;
+  LocalTime next_tick() const noexcept;  ///< when to call `tick` and `next_datagram`; at once if data must be sent
 
   bool open() const noexcept;
   std::uint32_t connection_id() const noexcept;

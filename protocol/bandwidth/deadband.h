@@ -9,16 +9,14 @@
 
 namespace tendon {
 
-/// Omits changes that cannot be felt (Weber's law). A vector is sent if it differs from the last one sent by more than
-/// a share of its norm, and also after a maximum silence, so that lost vectors are replaced.
+/// Omits changes that cannot be felt (Weber's law): sends a vector if it differs from the last one sent by more than a
+/// share of its norm, or after a maximum silence, so that lost vectors are replaced.
 ///
 ///     ‖v − v_sent‖ > max(share · ‖v_sent‖, floor)   or   now − sent ≥ longest_silence
 ///
 /// The result can contain more energy than the input, so the receiver must use a limiter, as Tendon does.
-///
 /// Source: Hinterseer, Hirche, Chaudhuri, Steinbach, Buss, "Perception-based data reduction and transmission of haptic
 /// data in telepresence and teleaction systems", IEEE TSP 56(2), 2008.
-///
 /// Thread-safe: no. Realtime-safe: yes.
 class Deadband {
  public:
@@ -51,8 +49,7 @@ class Deadband {
 /// m, from the middle of a handle to its end. Used to convert N to N·m, and m/s to rad/s.
 inline constexpr double kHandleLever = 0.05;  // m
 
-/// A deadband for a vector, its rotational equivalent, and a gripper. All are sent together if one of them should be
-/// sent, or if one of them appears or disappears.
+/// A deadband for a vector, its rotational equivalent, and a gripper. If one is sent, or comes or goes, all are sent.
 /// Thread-safe: no. Realtime-safe: yes.
 class HandleDeadband {
  public:
@@ -71,9 +68,7 @@ class HandleDeadband {
     return {config, config.floor / kHandleLever, config.floor / kHandleLever};
   }
 
-  /// Returns true if `value` should be sent, and records it as sent.
   bool passes(LocalTime now, const Value& value) noexcept;
-  /// Must be called if `value` was sent for another reason.
   void sent(LocalTime now, const Value& value) noexcept;
 
  private:
@@ -95,19 +90,16 @@ class HandleDeadband {
 /// Copies all other fields. A negative `later` is treated as zero. Realtime-safe: yes.
 DeviceState predict(const DeviceState& sent, Duration later, Duration haptic_period) noexcept;
 
-/// Omits device states that the receiver can predict using predict(), by a deadband on all velocities. States with new
-/// modes or buttons are always sent.
+/// Omits states that the receiver can predict(), by a deadband on all velocities. New modes or buttons are always sent.
 /// Thread-safe: no. Realtime-safe: yes.
 class StateDeadband {
  public:
-  /// Returns the reason for refusing a request, or an empty string. A request to turn the deadband off is always
-  /// granted.
+  /// Returns the reason for refusing a request, or an empty string. Turning the deadband off is always granted.
   static std::string objection(const SetStateDeadband& asked);
 
   /// `asked` must be valid and must not turn the deadband off.
   explicit StateDeadband(const SetStateDeadband& asked);
 
-  /// Returns true if the state should be sent, and records it as sent.
   bool passes(const DeviceState& state) noexcept;
 
  private:

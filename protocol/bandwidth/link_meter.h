@@ -15,10 +15,8 @@ namespace tendon {
 ///
 ///     round trip = (T4 − T1) − (T3 − T2)      to the peer = T2 − θ − T1      from the peer = T4 − (T3 − θ)
 ///
-/// θ is the estimated offset of the peer's clock. An error of θ changes the one-way delays by the same amount, in
-/// opposite directions. Keeps up to 1024 samples of each delay by dropping every other sample if necessary. Allocates
-/// memory only in the constructor.
-///
+/// θ is the estimated offset of the peer's clock. An error of θ changes the one-way delays by opposite amounts. Keeps
+/// up to 1024 samples of each delay by dropping every other sample if necessary. Only the constructor allocates memory.
 /// Thread-safe: no. Realtime-safe: yes, except report().
 class LinkMeter {
  public:
@@ -42,7 +40,6 @@ class LinkMeter {
    public:
     Samples() { kept_.reserve(kMost); }
     void add(Duration sample) noexcept;
-    /// Clears the samples. Empty if there are no samples.
     std::optional<Delays> take();
 
    private:

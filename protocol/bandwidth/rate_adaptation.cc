@@ -9,11 +9,9 @@
 namespace tendon {
 namespace {
 
-/// Allows a queue to drain at least once, but also follows a new route quickly.
-constexpr Duration kLeastWindow = std::chrono::seconds(10);
+constexpr Duration kLeastWindow = std::chrono::seconds(10);  ///< lets a queue drain, but follows a new route quickly
 
-/// A single lost datagram must not exceed 5 %.
-constexpr std::uint64_t kLossSample = 20;
+constexpr std::uint64_t kLossSample = 20;  ///< a single lost datagram must not exceed 5 %
 
 }  // namespace
 

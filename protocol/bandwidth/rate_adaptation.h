@@ -15,13 +15,10 @@ namespace tendon {
 ///
 /// * Step down: if the round trip has exceeded its minimum of the last 10 to 20 s by `queueing` for `patience`, or if
 ///   more than `loss` of our datagrams were lost in a window of at least `patience` and 20 datagrams.
-/// * Step up: after `clean` without congestion. If this causes congestion again, the next wait is doubled, up to
-///   `longest_clean`.
+/// * Step up: after `clean` without congestion. If congestion returns, the next wait is doubled, up to `longest_clean`.
 /// * unusable(): if more than `unusable_loss` is lost at the lowest rate for `unusable_after`. This is a circuit
-///   breaker as described in RFC 8084, and the owner should stop sending.
-///
+///   breaker (RFC 8084), and the owner should stop sending.
 /// Source: RFC 8085 (a sender of UDP must not overload the path).
-///
 /// Thread-safe: no. Realtime-safe: yes.
 class RateAdaptation {
  public:
@@ -36,12 +33,10 @@ class RateAdaptation {
   };
   static constexpr std::array<std::uint32_t, 5> kOneIn = {1, 2, 4, 10, 20};
 
-  /// Throws std::invalid_argument if a duration of `config` is not positive, longest_clean is below clean, or a share
-  /// is not within 0 … 1.
+  /// Throws std::invalid_argument if a duration is not positive, longest_clean < clean, or a share is not in 0 … 1.
   RateAdaptation(const Config& config, LocalTime now);
 
-  /// `seen` and `missed` are the numbers of our datagrams that the peer has seen and missed so far. They must not
-  /// decrease, and neither must `now`.
+  /// `seen` and `missed` count our datagrams that the peer has seen and missed. They and `now` must not decrease.
   void observe(LocalTime now, Duration round_trip, std::uint64_t seen, std::uint64_t missed) noexcept;
 
   std::uint32_t one_in() const noexcept { return kOneIn[step_]; }

@@ -9,12 +9,11 @@ namespace tendon {
 /// Records packet numbers, so that each packet is accepted only once. The ring of bits is described in RFC 6479: the
 /// bit of a number never moves, and advancing clears the words in between.
 ///
-/// Call `contains` before decrypting a packet, but `insert` only after authenticating it. Otherwise a forged packet
-/// could use up the number of a genuine one.
+/// Call `contains` before decrypting, but `insert` after authenticating, so that forged packets cannot use up a number.
 class ReplayWindow {
  public:
-  /// The newest word may be nearly empty, so only 1984 of 2048 numbers are always remembered, about two seconds at 1
-  /// kHz. This is longer than haptic data are useful.
+  /// The newest word may be nearly empty, so only 1984 of 2048 numbers are always remembered. At 1 kHz, this is about
+  /// two seconds, which is longer than haptic data are useful.
   static constexpr std::uint64_t kBits = 2048;
   static constexpr std::uint64_t kRemembered = kBits - 64;
 

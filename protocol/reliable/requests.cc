@@ -10,7 +10,7 @@
 namespace tendon {
 
 std::optional<std::uint32_t> OutgoingRequests::add(const Request& request) {
-  // At one request per second, the ids last for 136 years.
+  // The ids are sufficient for 136 years at one request per second.
   if (next_ - oldest_ == limits::kRequestWindow || next_ == std::numeric_limits<std::uint32_t>::max()) return {};
   slot(next_) = {.control = {.id = next_, .request = request}, .due = LocalTime::min(), .times_sent = 0, .answer = {}};
   return next_++;

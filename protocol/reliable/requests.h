@@ -16,23 +16,20 @@ namespace tendon {
 
 class OutgoingRequests {
  public:
-  /// The maximum time between two copies of a request, starting with `timeout` and doubling. At least two copies are
-  /// sent within the session timeout of 2 s, even if the round trip is longer. One copy per second is cheap.
+  /// The delay before a copy of a request starts with `timeout`, is doubled for each copy, and is limited to this
+  /// value. At least two copies are sent within the session timeout of 2 s, even if the round trip is longer.
   static constexpr Duration kMaxWait = std::chrono::seconds(1);
 
-  /// Returns the id, or nullopt if kRequestWindow requests are pending.
-  std::optional<std::uint32_t> add(const Request& request);
+  std::optional<std::uint32_t> add(const Request& request);  ///< nullopt if kRequestWindow requests are pending
 
   /// Returns the first request that must be sent or resent, or null.
   const Control* next_due(LocalTime now) const noexcept { return oldest_ == next_ ? nullptr : first_due(now); }
-  /// Must be called after sending a request. It is due again after `timeout`, which is doubled for each copy, up to
-  /// kMaxWait.
+  /// Must be called after sending a request. Sets the time for the next copy (see kMaxWait).
   void sent(std::uint32_t id, LocalTime now, Duration timeout) noexcept;
   /// LocalTime::min() if a request was not sent yet, LocalTime::max() if all are answered.
   LocalTime next_due_time() const noexcept { return oldest_ == next_ ? LocalTime::max() : first_due_time(); }
 
-  /// Returns false if the request was not sent.
-  bool acknowledge(const ControlAck& ack);
+  bool acknowledge(const ControlAck& ack);  ///< false if the request was not sent
   /// Returns the answers in the order of the requests.
   std::optional<ControlAck> next_answer();
   bool has_answer() const noexcept { return oldest_ != next_ && slot(oldest_).answer.has_value(); }
@@ -56,17 +53,13 @@ class OutgoingRequests {
 
 class IncomingRequests {
  public:
-  /// Requests may arrive in any order. Resends the answer to an earlier request. Returns false if a correct peer could
-  /// not use this id.
+  /// In any order. Resends the answer to an earlier request. Returns false if a correct peer could not use this id.
   bool take(const Control& control);
-  /// Returns each request exactly once and in order, or null. It is valid until the next call of `take`. Answers
-  /// unknown and invalid requests without returning them.
+  /// Returns each request once and in order, or null; valid until `take`. Answers unknown and invalid ones itself.
   const Control* next();
   bool has_next() const noexcept { return slots_[next_ % limits::kRequestWindow].stage == Slot::Stage::kArrived; }
-  /// Ignores ids that were not returned by `next`.
-  void answer(ControlAck ack);
+  void answer(ControlAck ack);  ///< ignores ids that were not returned by `next`
 
-  /// Returns the first answer that must be sent, or null.
   const ControlAck* next_due() const noexcept { return due_ == 0 ? nullptr : first_due(); }
   void sent(std::uint32_t id) noexcept;
 

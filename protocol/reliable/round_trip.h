@@ -15,8 +15,7 @@ namespace tendon {
 ///     timeout:         max(minimum, SRTT + 4 RTTVAR)
 class RoundTrip {
  public:
-  /// RFC 6298 uses 1 s. After a handshake, 100 ms is sufficient, since haptics is not possible with a longer round
-  /// trip.
+  /// RFC 6298 uses 1 s. 100 ms are sufficient after a handshake, because haptics requires a shorter round trip.
   static constexpr Duration kFirstTimeout = std::chrono::milliseconds(100);
 
   void observe(Duration sample) noexcept {

@@ -38,7 +38,7 @@ std::vector<std::string_view> words_of(std::string_view line) {
   }
 }
 
-/// Returns the words of the only line that is not a comment.
+/// Returns the two words of the line that is not empty or a comment. Throws unless there is exactly one.
 std::vector<std::string_view> only_line(std::string_view text) {
   std::vector<std::string_view> found;
   text = without_byte_order_mark(text);

@@ -12,7 +12,6 @@
 
 namespace tendon {
 
-/// A key that is shared by a client and a server.
 struct ClientKey {
   std::string name;               ///< for people; not secret, not in the file
   Role role = Role::kController;  ///< highest role granted
@@ -27,14 +26,12 @@ KeyId key_id(const Key& key) noexcept;
 std::string key_file_text(const ClientKey& key);
 
 /// Parses a key file with the permissions `mode` (st_mode). Throws std::invalid_argument if other users have access to
-/// the file, if the text is not a key file, or if the key is weak. The message does not contain the file name or the
-/// key.
+/// the file, if the text is not a key file, or if the key is weak. The message contains neither file name nor key.
 ClientKey read_key_file(std::string_view text, unsigned mode, std::string name);
 
-/// In bytes.
-inline constexpr std::size_t kMaxKeyFile = 4096;
+inline constexpr std::size_t kMaxKeyFile = 4096;  ///< bytes
 
-/// Explains why a key is weak, or returns nullopt. The probability for a random key is below 10⁻⁹.
+/// Returns the reason if a key is weak. A random key is considered weak with a probability below 10⁻⁹.
 std::optional<std::string> weakness(const Key& key);
 
 }  // namespace tendon

@@ -32,11 +32,9 @@ class Key {
 
 namespace crypto {
 
-/// Parts of a message, which are used as if concatenated.
-using Pieces = std::initializer_list<std::span<const std::byte>>;
+using Pieces = std::initializer_list<std::span<const std::byte>>;  ///< used as if concatenated
 
-/// Initializes libsodium, which selects the fastest implementation. Can be called repeatedly. Throws std::runtime_error
-/// if libsodium cannot be initialized.
+/// Initializes libsodium and its fastest implementation, once. Throws std::runtime_error on failure.
 void start();
 
 Bytes32 sha256(Pieces message) noexcept;
@@ -56,8 +54,7 @@ void seal(const Key& key, std::uint64_t number, std::span<const std::byte> assoc
 bool open(const Key& key, std::uint64_t number, std::span<const std::byte> associated,
           std::span<const std::byte> sealed, std::span<std::byte> text) noexcept;
 
-/// REKEY(key) of Noise. The old key cannot be computed from the new one.
-Key renewed(const Key& key) noexcept;
+Key renewed(const Key& key) noexcept;  ///< REKEY(key) of Noise; the old key cannot be computed from it
 
 /// Returns true if this processor supports AES-256-GCM (AES-NI, CLMUL). Initializes libsodium, which does not provide a
 /// software implementation because it would be slow or vulnerable to timing attacks.

@@ -21,12 +21,10 @@ struct SessionKeys {
 
 /// When to renew keys. The receiver follows the epoch in the header.
 struct Rekey {
-  /// 17 min at 1 kHz; at most limits::kMaxDatagramsOfKey. Both ciphers allow more, but a compromised key should only
-  /// reveal a few minutes.
+  /// At most kMaxDatagramsOfKey. 17 min at 1 kHz, because a compromised key should only reveal a few minutes.
   std::uint64_t datagrams = std::uint64_t{1} << 20;
   Duration age = std::chrono::minutes(10);
-  /// How long the previous key is accepted.
-  Duration overlap = std::chrono::seconds(2);
+  Duration overlap = std::chrono::seconds(2);  ///< how long the previous key is accepted
 };
 
 /// The key of a direction and an epoch, with precomputed data. Suite 2 requires crypto::has_aes().
@@ -34,7 +32,6 @@ class SealingKey {
  public:
   SealingKey(Suite suite, const Key& key) noexcept;
 
-  /// See crypto::seal() and crypto::open().
   void seal(std::uint64_t number, std::span<const std::byte> associated, std::span<const std::byte> text,
             std::span<std::byte> sealed) const noexcept;
   bool open(std::uint64_t number, std::span<const std::byte> associated, std::span<const std::byte> sealed,
@@ -53,8 +50,7 @@ class Sealer {
   /// Returns the epoch of the next datagram after renewing the key if necessary.
   std::uint8_t next_epoch(LocalTime now) noexcept;
 
-  /// Encrypts the bytes after the header in place, and returns the new size, `size` + crypto::kTagSize. Must only be
-  /// called once for each packet number.
+  /// Encrypts the bytes after the header in place. Returns `size` + crypto::kTagSize. Call once for each packet number.
   std::size_t seal(const Header& header, std::span<std::byte> buffer, std::size_t size) noexcept;
 
  private:

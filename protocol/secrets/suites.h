@@ -27,15 +27,12 @@ using Suites = std::vector<Suite>;
 Suites all_suites();
 bool contains(const Suites& suites, Suite suite) noexcept;
 
-/// The suites supported by this processor; suite 2 requires crypto::has_aes(). Throws std::runtime_error if libsodium
-/// cannot be initialized.
+/// The suites of this processor; suite 2 requires crypto::has_aes(). Throws std::runtime_error if libsodium fails.
 Suites suites_of_this_machine();
 
-/// For messages: "aes-256-gcm, chacha20-poly1305".
-std::string names_of(const Suites& suites);
+std::string names_of(const Suites& suites);  ///< for messages: "aes-256-gcm, chacha20-poly1305"
 
-/// Throws std::invalid_argument if the list is empty or contains a suite that is not sealed or not supported by this
-/// processor.
+/// Throws std::invalid_argument if the list is empty, or if a suite is not sealed or not supported by this processor.
 void expect_speakable(const Suites& suites);
 
 }  // namespace tendon

@@ -193,7 +193,6 @@ bool AnyOrder::write_list(const FieldShape& field, std::size_t place, std::size_
   return true;
 }
 
-/// Writes all occurrences in [from, to).
 bool AnyOrder::write(const FieldShape& field, std::size_t place, std::size_t from, std::size_t to, int depth) {
   const std::size_t whole = out_.size();
   bool there = false;
@@ -249,7 +248,6 @@ void AnyOrder::put_varint(std::uint64_t value) {
   out_.push_back(static_cast<Byte>(value));
 }
 
-/// Inserts the size of everything after `begin`.
 void AnyOrder::put_length(std::size_t begin) {
   std::array<Byte, 3> length{};
   std::size_t bytes = 0;

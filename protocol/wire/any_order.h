@@ -8,8 +8,7 @@
 #include <vector>
 
 // Protobuf allows encodings that our Writer never uses: fields in any order, duplicate or unknown fields, split lists,
-// and varints that are too long. AnyOrder converts a message to the form of our Writer, which is the only form
-// supported by the Reader.
+// and varints that are too long. AnyOrder converts a message to the form of our Writer, which the Reader requires.
 
 namespace tendon::wire {
 

@@ -12,14 +12,12 @@
 
 namespace tendon {
 
-/// Returns false for NaN.
-inline bool bounded(double value) noexcept { return std::abs(value) <= limits::kMaxValue; }
+inline bool bounded(double value) noexcept { return std::abs(value) <= limits::kMaxValue; }  ///< false for NaN
 
 /// Checks the force, the model and the error of `command`, using the bounds of a receiver (WIRE.md).
 bool in_bounds(const ForceCommand& command) noexcept;
 
-/// Returns the first field that is out of bounds, or an empty string, in static storage. Does not check the device and
-/// the channel.
+/// Returns the first field out of bounds, or an empty string, in static storage. Ignores device and channel.
 std::string_view refused_field(SetOutput wanted) noexcept;
 std::string_view refused_field(SetScale wanted) noexcept;
 std::string_view refused_field(SetShare wanted) noexcept;

@@ -22,13 +22,12 @@ using wire::Byte;
 using wire::Reader;
 using wire::Writer;
 
-/// In bytes: the head, a frame sent at every step, and any frame.
+/// Bytes: the head, a frame that is sent at every step, and any other frame.
 constexpr std::size_t kMostHead = 48;
 constexpr std::size_t kMostOfAStep = 640;
 constexpr std::size_t kMostFrame = 2048;
 
-/// Writes a frame and returns its size. Fields are written first, after `kUsualFront` bytes, and moved if the tags and
-/// lengths have another size.
+/// Writes a frame and returns its size. Moves the fields if tags and lengths do not take `kUsualFront` bytes.
 template <unsigned kBody, std::size_t kUsualFront, class Value, class List>
 std::size_t write_frame(Byte* to, const Value& value, List list) noexcept {
   Writer body(to + kUsualFront);
@@ -83,7 +82,6 @@ template <class List, class Make>
   return in.done();
 }
 
-/// Returns true if this arm is present.
 template <unsigned kBody, class List, class Make>
 bool take(Reader& frame, DataContent& content, bool& good, List list, Make make) {
   Reader in(nullptr, nullptr);
@@ -108,7 +106,6 @@ bool take_columns(Reader& frame, DataContent& content, bool& good) {
   return true;
 }
 
-/// Returns false if the fields are not in order.
 bool read_frame(const Reader& bytes, DataContent& content) {
   Reader frame = bytes;
   bool good = true;
@@ -128,7 +125,6 @@ bool read_frame(const Reader& bytes, DataContent& content) {
   return good && frame.done();
 }
 
-/// Keeps the memory of the frames.
 void empty(DataContent& content) noexcept {
   content.sent = {};
   content.echo.reset();
@@ -136,8 +132,7 @@ void empty(DataContent& content) noexcept {
   content.invalid = content.forces_not_finite = content.forces_out_of_bounds = 0;
 }
 
-/// Returns false if the fields are not in order, there are too many frames, or tx_time is not usable. `content` must
-/// not be used then.
+/// Returns false and invalid `content` if the order is wrong, there are too many frames, or tx_time is not usable.
 bool read_in_order(std::span<const std::byte> body, DataContent& content) {
   empty(content);
   Reader in(body);
@@ -185,8 +180,7 @@ void round_to_columns(DeviceState& state) noexcept {
   state.permitted_force = in_single(state.permitted_force);
 }
 
-/// Writes directly into the datagram if there is room for the largest frame of this kind, and otherwise checks the size
-/// first, using a buffer.
+/// Writes into the datagram if the largest frame of this kind fits, and otherwise into a buffer to check its size.
 template <unsigned kBody, std::size_t kUsualFront, class Value, class List>
 bool DataWriter::add_frame(const Value& value, std::size_t most, List list) noexcept {
   if (frames_ == limits::kMaxFrames) return false;

@@ -16,8 +16,7 @@
 #include "protocol/wire/header.h"
 
 // Encodes and decodes Data datagrams (WIRE.md, limits.h). The encoder only truncates texts and lists and does not check
-// anything else. The decoder accepts any input, does not throw or print, and returns null or nullopt if the input is
-// invalid.
+// anything else. The decoder accepts any input, never throws or prints, and returns null or nullopt if it is invalid.
 
 namespace tendon {
 
@@ -31,8 +30,7 @@ inline bool fits_columns(const DeviceState& state) noexcept {
 void round_to_columns(DeviceState& state) noexcept;
 
 /// Writes unencrypted Data datagrams without allocating memory. Call `begin`, then `add` until it returns false or all
-/// data were added, then send `size()` bytes.
-/// Thread-safe: no.
+/// data were added, then send `size()` bytes. Thread-safe: no.
 class DataWriter {
  public:
   /// `buffer` must remain valid until the last `add`.
@@ -52,8 +50,7 @@ class DataWriter {
   bool add(const PortFrame& port);
 
   /// Appends as many of the first states as possible, using one frame in columns, and returns their number. The states
-  /// must have the same tick and time, be sorted by device, and satisfy fits_columns(). There must not be more than
-  /// kMaxDevices.
+  /// must have the same tick and time, be sorted by device, and satisfy fits_columns(). At most kMaxDevices.
   std::size_t add(std::span<const DeviceState* const> states);
 
   std::size_t size() const noexcept { return size_; }
@@ -67,15 +64,13 @@ class DataWriter {
   int frames_ = 0;
 };
 
-/// Encodes the message without a frame and a datagram.
 std::string message_of(const DeviceReport& report);
 std::string message_of(const PeerReport& report);
 
 struct DataContent {
   PeerTime sent{};
   std::optional<IncomingEcho> echo;
-  /// In their original order, with values within bounds. Columns are split into states.
-  std::vector<Frame> frames;
+  std::vector<Frame> frames;  ///< in order, within bounds; columns are split into states
   /// The number of frames and echoes with values out of bounds. They are dropped, except for requests (see
   /// Control::invalid) and answers (see Code::kInvalid) with a valid id.
   std::uint32_t invalid = 0;
@@ -87,8 +82,8 @@ struct DataContent {
 /// Keeps its memory between calls. Thread-safe: no.
 class DataReader {
  public:
-  /// Decodes the bytes after the header. Returns null if they are malformed: not protobuf, too many frames, or without
-  /// a usable tx_time. The content is valid until the next call.
+  /// Decodes the bytes after the header. Returns null if they are not protobuf, if there are too many frames, or if
+  /// tx_time is not usable. The content is valid until the next call.
   const DataContent* read(std::span<const std::byte> body);
   /// For tests: always uses AnyOrder.
   const DataContent* read_in_any_order(std::span<const std::byte> body);

@@ -10,9 +10,8 @@
 #include "protocol/wire/fields/reader.h"
 #include "protocol/wire/fields/writer.h"
 
-// Encodes and decodes DeviceStates: the states of several devices at the same step, in columns. Does not use a list of
-// fields, since a column contains values of several states and the number of states is limited by the size of the
-// datagram. For codec.cc only. Realtime-safe.
+// Encodes and decodes DeviceStates of several devices at the same step as columns. Does not use a list of fields, since
+// a column contains values of several states, whose number the datagram limits. For codec.cc only. Realtime-safe.
 
 namespace tendon::wire {
 
@@ -61,11 +60,10 @@ struct ColumnSizes {
       body += counts[column] > 0 ? size_of_field(counts[column]) : 0;
     });
   }
-  /// Returns the size of the frame.
-  std::size_t whole() const noexcept { return size_of_field(size_of_field(body)); }
+  std::size_t whole() const noexcept { return size_of_field(size_of_field(body)); }  ///< of the frame
 };
 
-/// Writes a frame with as many of the first states as fit into `room` bytes, and returns their number.
+/// Writes a frame with as many of the first states as possible in `room` bytes. Returns the number of states.
 inline std::size_t write_columns(Writer& to, std::size_t room, States states) noexcept {
   std::optional<ColumnSizes> sizes;
   for (; !states.empty(); states = states.first(states.size() - 1)) {

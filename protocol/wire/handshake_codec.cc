@@ -14,8 +14,7 @@
 namespace tendon {
 namespace {
 
-/// After truncating texts and lists.
-constexpr std::size_t kMostBody = 2048;
+constexpr std::size_t kMostBody = 2048;  ///< after truncating texts and lists
 
 template <class Value, class List>
 std::vector<std::byte> bytes_of(const Value& value, List list) {
@@ -26,7 +25,6 @@ std::vector<std::byte> bytes_of(const Value& value, List list) {
   return {written.begin(), written.end()};
 }
 
-/// Reads a message with its fields in any order.
 template <class Value, class List>
 std::optional<Value> read_message(std::span<const std::byte> body, const wire::Schema& schema, List list) {
   wire::AnyOrder any_order;
@@ -57,7 +55,6 @@ void put16(const std::array<std::byte, 16>& value, std::byte* to) noexcept {
   std::copy(value.begin(), value.end(), to);
 }
 
-/// Returns nullopt if this is not a handshake datagram of this type.
 std::optional<Header> handshake_header(std::span<const std::byte> datagram, DatagramType type) noexcept {
   const std::optional<Header> header = decode_header(datagram);
   if (!header || header->type != type || header->packet_number != 0) return {};

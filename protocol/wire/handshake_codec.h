@@ -17,13 +17,10 @@
 
 namespace tendon {
 
-/// Chosen by the client, to identify the attempt.
-using ClientRandom = std::array<std::byte, 16>;
-/// Chosen by the server. Zero in the first Hello.
-using Cookie = std::array<std::byte, 16>;
+using ClientRandom = std::array<std::byte, 16>;  ///< chosen by the client, to identify the attempt
+using Cookie = std::array<std::byte, 16>;        ///< chosen by the server; zero in the first Hello
 
-/// `body` points into the datagram. In suite 0 it is the result of write_body(). In suite 1 it is a Noise message,
-/// preceded by the key id in a Hello.
+/// `body` points into the datagram: write_body() in suite 0, and else a Noise message, after the key id in a Hello.
 struct HelloDatagram {
   Suite suite = Suite::kPlain;
   ClientRandom random{};
@@ -42,12 +39,10 @@ struct AnswerDatagram {
   std::span<const std::byte> body;
 };
 
-/// For the largest Hello without claims (882), the largest Welcome (874), and the overhead of suite 1 (56). A reply is
-/// never longer than its Hello.
+/// For the largest Hello without claims (882), the largest Welcome (874), and the overhead of suite 1 (56).
 inline constexpr std::size_t kMaxHandshakeBody = 1000;
 
-/// Returns the size of the datagram. A Hello is padded to kMaxDatagram bytes, so that replies are never larger. Bodies
-/// must not exceed kMaxHandshakeBody.
+/// Returns the size. Pads a Hello to kMaxDatagram, so that replies are never larger. Bodies: at most kMaxHandshakeBody.
 std::size_t encode(const HelloDatagram& hello, std::span<std::byte, kMaxDatagram> buffer);
 std::size_t encode(const RetryDatagram& retry, std::span<std::byte, kMaxDatagram> buffer);
 std::size_t encode(const AnswerDatagram& answer, std::span<std::byte, kMaxDatagram> buffer);

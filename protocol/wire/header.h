@@ -42,8 +42,7 @@ inline constexpr std::uint32_t kConnectionIdByte = 4;  ///< lowest byte of the c
 
 std::array<std::byte, kHeaderSize> encode_header(const Header& header) noexcept;
 
-/// Returns nullopt if the size, protocol, version, type or suite is invalid, or if a reserved byte is not 0. Suite 2 is
-/// invalid for handshake datagrams.
+/// Returns nullopt if size, protocol, version, type or suite (2 in a handshake) is invalid, or a reserved byte not 0.
 std::optional<Header> decode_header(std::span<const std::byte> datagram) noexcept;
 
 }  // namespace tendon

@@ -66,7 +66,7 @@ struct Counts {
 
 /// A duration sent as a 32-bit number of units, rounded up.
 struct Period {
-  /// Used by the Writer if the duration is out of bounds. A plain cast could make it look valid.
+  /// Used by the Writer if the duration is out of bounds, because a cast could produce a valid value.
   enum class Else { kZero, kMost, kNearest };
   Duration unit;
   Duration least;
@@ -122,7 +122,6 @@ struct Tag {
   static constexpr Byte kSecond = static_cast<Byte>(kValue >> 7U);
 };
 
-/// Returns null if another arm is set.
 template <class Value, class... Values>
 const Value* arm_of(const std::variant<Values...>& one) noexcept {
   return std::get_if<Value>(&one);

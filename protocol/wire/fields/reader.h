@@ -49,7 +49,6 @@ Value& made(std::optional<Value>& value) {
 }
 
 /// Decodes fields in the order of their numbers. If a field is not next, it is absent. There are two kinds of errors:
-///
 /// * If the encoding differs from the Writer's (unknown, duplicate or reordered fields, overlong varints, invalid
 ///   UTF-8, or a truncated message), `done` returns false and the value must not be used. AnyOrder can convert the
 ///   message, or determine that it is malformed.
@@ -294,7 +293,7 @@ class Reader {
     require(name, !begins || (box.min.array() <= box.max.array()).all());
     value = box;
   }
-  /// Returns true if this arm is present. The caller then skips the other arms, so a second one remains unread.
+  /// Returns true if this arm is present. The caller then skips the other arms, so a second one is not read.
   template <unsigned kField, class Value, class OneOf, class List>
   bool arm(Field<kField, kLength> /*unused*/, Name name, Kind<Value> /*unused*/, OneOf& one, List list) {
     if (!next_is<kField, kLength>()) return false;
@@ -447,7 +446,7 @@ class Reader {
     at_ += sizeof taken;
     value = taken;
   }
-  /// Returns the length. Refuses lists that are longer than `to`.
+  /// Returns the length. Lists that are longer than `to` are refused.
   template <unsigned kField>
   [[gnu::always_inline]] std::size_t entries_of(Field<kField> /*unused*/, Name name, std::span<double> to) noexcept {
     std::size_t size = 0;

@@ -30,8 +30,7 @@ inline std::size_t entries_of(const Mat3& k, std::array<double, 9>& entries) noe
 
 /// Encodes fields in the order of the calls. Omits zero numbers and empty texts, as proto3 requires, but writes all
 /// optional values that are present. Truncates texts and lists, and does not check anything else. There must be enough
-/// memory for the largest message.
-/// Realtime-safe.
+/// memory for the largest message. Realtime-safe.
 class Writer {
  public:
   explicit Writer(Byte* at) noexcept : at_(at) {}
