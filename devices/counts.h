@@ -10,8 +10,7 @@
 
 namespace tendon {
 
-/// Events counted by a driver since its construction, for all connections, if its device can show them. Same order as
-/// `kDeviceCounters`.
+/// Events counted by a driver since its construction, if its device can show them. In the order of `kDeviceCounters`.
 enum class DeviceCount : std::uint8_t {
   kAnswers,
   kUnreadable,
@@ -23,8 +22,7 @@ enum class DeviceCount : std::uint8_t {
   kUnanswered,
 };
 
-/// `tendond --json` uses the name, and the log uses the meaning. Observers and /metrics receive the reason for a
-/// degraded device.
+/// `tendond --json` uses the name, the log the meaning, and observers and /metrics the reason for a degraded device.
 struct DeviceCounter {
   DeviceCount count;
   std::string_view name;  ///< key in `tendond --json`
@@ -58,7 +56,6 @@ static_assert([] {
   return true;
 }());
 
-/// In the order of `kDeviceCounters`.
 struct DeviceCounts {
   std::array<std::uint64_t, kDeviceCounters.size()> values{};
 

@@ -36,10 +36,9 @@ struct DeviceInfo {
 
 struct PositionSample {
   LocalTime at{};
-  Vec3 position = Vec3::Zero();  ///< m, device base frame
-  /// N, force of the hand on the handle, as measured by a force sensor.
-  std::optional<Vec3> hand_force = std::nullopt;
-  std::uint32_t buttons = 0;  ///< bit i is set while button i is held
+  Vec3 position = Vec3::Zero();                   ///< m, device base frame
+  std::optional<Vec3> hand_force = std::nullopt;  ///< N, of the hand on the handle, from a force sensor
+  std::uint32_t buttons = 0;                      ///< bit i is set while button i is held
   /// Handle frame → base frame. In the handle frame, −z is the direction of the stylus or finger. In the middle
   /// position of the handle, y is up and x is to the right (OpenXR's aim pose).
   std::optional<Quat> orientation = std::nullopt;
@@ -47,8 +46,7 @@ struct PositionSample {
 };
 
 /// A device that measures the position of a handle and renders a force. Devices of admittance type also measure the
-/// force of the hand. SI units are used; encoder counts and USB transfers are only used by the implementations.
-///
+/// force of the hand. In SI units; counts and USB transfers are internal to drivers.
 /// Thread-safe: no; used by the haptic thread. Realtime-safe: `read` and `apply` must not allocate, lock or log, and
 /// must not block longer than a transfer of the device.
 class Device {
@@ -69,39 +67,28 @@ class Device {
   /// May be called from any thread. Always kHomed if the device does not need opening or homing.
   virtual State state() const noexcept { return State::kHomed; }
 
-  /// The operator requests forces, also after a fault. Only used by safety layers (SafeDevice), which grant the request
-  /// later. Other devices are ready when they are homed.
+  /// The operator requests forces, also after a fault. SafeDevice grants this later; others are ready when homed.
   virtual void arm() noexcept {}
-  /// No forces until the next `arm`. Only used by safety layers (SafeDevice). For other devices, the control law is
-  /// disarmed (HapticController::disarm).
+  /// No forces until `arm`. For safety layers (SafeDevice). Otherwise, the law disarms (HapticController::disarm).
   virtual void disarm() noexcept {}
-  /// False if a safety layer keeps the force at zero.
-  virtual bool armed() const noexcept;
-  /// How often `arm` was granted, which also clears faults.
-  virtual std::uint32_t times_armed() const noexcept { return 0; }
-  /// How often a safety layer has ended the force because of a fault.
-  virtual std::uint32_t faults() const noexcept { return 0; }
-  /// May be called from any thread.
-  virtual DeviceCounts counts() const noexcept { return {}; }
+  virtual bool armed() const noexcept;                              ///< false if a safety layer keeps the force at zero
+  virtual std::uint32_t times_armed() const noexcept { return 0; }  ///< grants of `arm`, which also clear faults
+  virtual std::uint32_t faults() const noexcept { return 0; }       ///< times a safety layer has ended the force
+  virtual DeviceCounts counts() const noexcept { return {}; }       ///< may be called from any thread
 
-  /// Returns nullopt if the device did not answer.
-  virtual std::optional<PositionSample> read(LocalTime now) noexcept = 0;
+  virtual std::optional<PositionSample> read(LocalTime now) noexcept = 0;  ///< nullopt if the device did not answer
 
-  /// Only called for devices with joints, using the position returned by `read`. Joint velocities are unbounded near
-  /// singular poses. Realtime-safe.
+  /// For devices with joints, at the position of `read`. Velocities are unbounded near singular poses. Realtime-safe.
   virtual Joints joints(const Motion& /*hand*/) const noexcept { return {}; }
 
-  /// Commands `force` (N, on the hand) and returns the force that was actually written after clamping and rounding.
-  /// This is the force counted by the energy ledger. The device keeps it until the next `apply` or until its watchdog
-  /// expires.
+  /// Commands `force` (N, on the hand) and returns the force that was actually written after clamping and rounding,
+  /// which is counted by the energy ledger. The device keeps it until the next `apply` or until its watchdog expires.
   virtual Vec3 apply(const Vec3& force) noexcept = 0;
 
-  /// Called instead of `apply` if `info` contains a torque or a gripper with a motor. Commands all motors and returns
-  /// what was actually written.
+  /// Called instead of `apply` if `info` has a torque or a gripper with a motor. Returns what was actually written.
   virtual Effort apply_all(const Effort& effort) noexcept { return {.force = apply(effort.force)}; }
 
-  /// Ignores unknown outputs and settings of a different kind. Not included in the energy ledger, because outputs do
-  /// not move the handle.
+  /// Ignores unknown outputs and settings of another kind. Outside the energy ledger: outputs do not move the handle.
   virtual void set_output(LocalTime now, std::uint32_t output, const OutputSetting& setting) noexcept;
 };
 

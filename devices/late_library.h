@@ -5,8 +5,7 @@
 
 namespace tendon {
 
-/// Loads a shared library and keeps it loaded until the process ends. Used for libraries that most scenes do not need,
-/// to save the memory used by them and their dependencies.
+/// Loads a shared library and never unloads it. This saves the memory of libraries that most scenes do not need.
 ///
 ///     struct Libusb {
 ///       LateLibrary file{"libusb-1.0.so.0"};

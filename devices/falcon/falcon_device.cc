@@ -22,18 +22,15 @@ using falcon::Reply;
 constexpr std::array kRunMode = {latency(1), divisor(2), k8N1, kNoFlowControl, flush_at(falcon::kPacketEnd),
                                  kPurgeOne,  kPurgeOther};
 
-/// Firmware answers within 2 ms. libnifalcon tries about a hundred times.
-constexpr Duration kProbing = 300ms;
-/// Then reopens the device, because it may have been switched on.
-constexpr Duration kGiveUpAfter = 2s;
+constexpr Duration kProbing = 300ms;   ///< firmware answers within 2 ms; libnifalcon tries about a hundred times
+constexpr Duration kGiveUpAfter = 2s;  ///< then reopens the device, because it may have been switched on
 /// 16 bytes in both directions take 0.2 ms at 1.5 Mbaud.
 constexpr usb::Dialogue::Patience kPatience{.most_under_way = 1, .answer = 5ms};
 
 /// Within 50 mm of the centre, 1 mm corresponds to at most 55 counts, so this is 3 m/s there and 5 m/s at the centre.
 /// Even a released handle does not reach 3 m/s within the workspace.
 constexpr double kMostCountsPerSecond = 165e3;
-/// For replies that arrive at irregular intervals.
-constexpr double kMoreCounts = 30;
+constexpr double kMoreCounts = 30;  ///< for replies that arrive at irregular intervals
 
 constexpr Counts kNoTorque{};
 

@@ -27,27 +27,22 @@ namespace tendon {
 ///                               └─no answer in 300 ms─▶ kFirmware ─loaded─┘   └──the device says: a leg is not──┘
 ///     any ──unplugged, a transfer failed, or silent for 100 ms──▶ kAbsent, and starts again
 ///
-/// Every packet contains torques. They are only different from zero in kHomed, while there are plausible replies (at
-/// least every 10 ms). A watchdog of the device is not documented.
-///
-/// Every reply contains encoder counts. It is not plausible if a hand cannot move the encoders as fast. After 100 ms
-/// without a plausible reply, the encoders have lost counts and the device must be reset, either by loading the
-/// firmware again or, if the driver does not have the file, by switching it off and on.
+/// Every packet contains torques. They are only nonzero in kHomed, while there are plausible replies (at least every 10
+/// ms). A reply is plausible if a hand can move the encoders as fast. After 100 ms without a plausible reply, the
+/// encoders have lost counts and the device must be reset, either by loading the firmware again or, if the driver does
+/// not have the file, by switching it off and on. A watchdog of the device is not documented.
 ///
 /// Positions are relative to `falcon::kCentre`: x to the right, y up, z towards the user. Samples use the time of
 /// `read`, but can be up to one period older. The buttons, starting at bit 0, are right, forward, centre and left.
 ///
-/// If the answer to the pending request is late, `read` returns nullopt and `apply` only sends a zero force
-/// (`usb::Dialogue`).
-///
+/// If an answer is late, `read` returns nullopt and `apply` only sends a zero force (`usb::Dialogue`).
 /// Thread-safe: `counts` and `state` only. Realtime-safe: `read`, `apply`, `counts`.
 class FalconDevice final : public Device {
  public:
   static constexpr usb::Id kId{0x0403, 0xCB48};
 
   struct Config {
-    /// From `read_firmware`. If empty, a device without firmware stays in kFirmware.
-    std::vector<std::uint8_t> firmware{};
+    std::vector<std::uint8_t> firmware{};  ///< if empty, a device without firmware stays in kFirmware
   };
 
   FalconDevice(Config config, std::unique_ptr<usb::Pipe> pipe);
@@ -58,9 +53,8 @@ class FalconDevice final : public Device {
   std::optional<PositionSample> read(LocalTime now) noexcept override;
   Joints joints(const Motion& hand) const noexcept override;
   Vec3 apply(const Vec3& force) noexcept override;
-  /// Output 0, "ring", consists of light-emitting diodes. Red, green and blue are switched on from half their
-  /// intensity. The color is used while the device may render forces. Pure red always means that the device is not
-  /// ready, so if the color is pure red or off, green is used instead.
+  /// Output 0, "ring", consists of light-emitting diodes. Red, green and blue are on from half their intensity. The
+  /// color is used while forces may be rendered. Pure red means not ready, so green replaces pure red and off.
   void set_output(LocalTime now, std::uint32_t output, const OutputSetting& setting) noexcept override;
 
  private:
@@ -98,14 +92,13 @@ class FalconDevice final : public Device {
 
 namespace falcon {
 
-/// A Falcon in a scene.
+/// A Falcon in a scene (driver.h). `make` can throw the exceptions of `read_firmware`.
 struct Config {
   std::string port{};                               ///< from `tendond devices`; optional
   std::optional<std::filesystem::path> firmware{};  ///< empty if already loaded
   bool accept_unknown_firmware = false;
 };
 
-// See driver.h. `make` can throw the exceptions of `read_firmware`.
 const Driver& driver(const Config& config);
 SimulatedDevice::Config stand_in(const Config& config);
 std::unique_ptr<Device> make(const Config& config, FromOutside outside);

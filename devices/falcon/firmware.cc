@@ -51,8 +51,7 @@ constexpr std::array<std::uint8_t, 1> kAutobaudLetter = {'A'};
 /// The echo of this many bytes fits into one IN packet with its status bytes.
 constexpr std::size_t kChunkBytes = usb::kPacketSize - kStatusBytes;
 
-/// Four bytes at 9600 baud, plus the latency timer, take 20 ms.
-constexpr Duration kPatience = std::chrono::milliseconds(100);
+constexpr Duration kPatience = std::chrono::milliseconds(100);  ///< 4 bytes at 9600 baud and the latency timer: 20 ms
 
 }  // namespace
 

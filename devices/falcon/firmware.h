@@ -27,15 +27,12 @@ enum class UnknownFirmware : std::uint8_t { kRefuse, kAccept };
 std::vector<std::uint8_t> check_firmware(std::vector<std::uint8_t> bytes, const std::string& name,
                                          UnknownFirmware unknown);
 
-/// Reads a file of limited size, and checks it.
 std::vector<std::uint8_t> read_firmware(std::istream& file, const std::string& name, UnknownFirmware unknown);
 
-/// Loads the firmware without blocking. After a reset, the boot loader of the processor echoes every byte, and the
-/// loader compares these echoes. 8 KiB take about 2 s. Source: libnifalcon, FalconCommLibUSB.cpp (setFirmwareMode) and
-/// FalconFirmware.cpp.
+/// Loads the firmware without blocking, and compares the echoes of the boot loader. 8 KiB take about 2 s.
 ///
 ///     reset ─▶ greet (9600 baud; again until answered, at most 100 times) ─▶ "A" (142 857 baud) ─▶ 62 bytes at a time
-///
+/// Source: libnifalcon, FalconCommLibUSB.cpp (setFirmwareMode) and FalconFirmware.cpp.
 /// Thread-safe: no. Realtime-safe: yes.
 class FirmwareLoader {
  public:
@@ -44,7 +41,7 @@ class FirmwareLoader {
   /// `image` must outlive the loader.
   explicit FirmwareLoader(std::span<const std::uint8_t> image) noexcept : image_(image) {}
 
-  /// Must be called before the first `step`. Starts with the reset.
+  /// Starts again with the reset. Must be called before the first `step`.
   void restart() noexcept;
 
   /// `bytes` must not include the status bytes of the serial chip.

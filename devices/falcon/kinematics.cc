@@ -25,8 +25,7 @@ constexpr double kDegree = std::numbers::pi / 180;
 constexpr double kAtZero = 35 * kDegree;
 constexpr double kPerCount = 2 * std::numbers::pi * (14.25 / 110.0) / 1280;
 
-/// N·m at the joint, with the sign used by the firmware.
-constexpr double kTorquePerCount = -1e-4;
+constexpr double kTorquePerCount = -1e-4;  ///< N·m at the joint, with the sign used by the firmware
 
 /// Rows: unit vectors along U, V, W in the device frame.
 Mat3 frame_of_leg(double azimuth) {

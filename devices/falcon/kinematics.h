@@ -10,8 +10,7 @@
 /// angles and gear ratios are from libnifalcon's FalconGeometry.h.
 ///
 /// The device frame has its origin in the middle of the fixed plate, x to the right, y up, z towards the user, in m.
-/// `kCentre` is the middle of the usable workspace. The thigh angles θ₁ (rad) are measured from the plate and increase
-/// with the encoder counts.
+/// `kCentre` is the middle of the workspace. The thigh angles θ₁ (rad), from the plate, increase with the counts.
 ///
 /// For each leg, in its own frame (U outwards, W along z): θ₃ = acos((V + f)/b), L = d + e + b sin θ₃, u = U + c, and
 ///
@@ -23,11 +22,9 @@
 /// All functions are thread-safe and realtime-safe.
 namespace tendon::falcon {
 
-/// m. All points within 50 mm can be reached, with some margin.
-inline const Vec3 kCentre(0, 0, 0.125);
+inline const Vec3 kCentre(0, 0, 0.125);  ///< m; all points within 50 mm can be reached, with some margin
 
-/// Returns θ₁ of each leg, which is 35° at count 0. A count is 1/1280 turn of the motor's drum of 14.25 mm, which
-/// drives the thigh's drum of 110 mm.
+/// θ₁ of each leg: 35° at count 0. A count is 1/1280 turn of the motor's drum of 14.25 mm; the thigh's has 110 mm.
 Vec3 angles_at(const Counts& encoders) noexcept;
 
 struct Pose {
@@ -36,24 +33,20 @@ struct Pose {
   Mat3 jacobian;  ///< rad/m: dangles = jacobian · dposition
 };
 
-/// Returns nullopt if a leg does not reach `position`, if a leg is stretched or folded (without a finite Jacobian), or
-/// for NaN. Closed form.
+/// Closed form. Returns nullopt for NaN, or if a leg is too short, stretched or folded (without a finite Jacobian).
 std::optional<Pose> pose_at(const Vec3& position) noexcept;
 
 /// Uses Newton's method with steps of at most 15 mm, which are halved until there is a pose. The error is at most 1e-9
-/// m. A start at a distance of 0.2 mm requires about 4 of 25 steps. Returns nullopt if there is no such pose, or if
-/// `start` is not a pose.
+/// m. A start at a distance of 0.2 mm requires about 4 of 25 steps. Nullopt if there is none, or none at `start`.
 std::optional<Pose> pose_with(const Vec3& angles, const Vec3& start) noexcept;
 
-/// The largest count known to be accepted by the firmware: ±0.41 N·m at the joint. libnifalcon allows 300 000, but
-/// sends 16 bits, so the sign can be wrong.
+/// The largest count known to work: ±0.41 N·m at the joint. libnifalcon's 300 000, sent in 16 bits, may reverse signs.
 inline constexpr double kMostCounts = 4096;
 
 /// Returns the motor counts for `force` (N, on the hand): τ = jacobian⁻ᵀ · force in counts, rounded towards zero. If a
 /// count exceeds ±`kMostCounts`, all of them are reduced by the same factor. Infinity and NaN are treated as zero.
 Counts counts_for(const Pose& pose, const Vec3& force) noexcept;
 
-/// Returns jacobianᵀ · τ (N, on the hand).
-Vec3 force_of(const Pose& pose, const Counts& counts) noexcept;
+Vec3 force_of(const Pose& pose, const Counts& counts) noexcept;  ///< jacobianᵀ · τ (N, on the hand)
 
 }  // namespace tendon::falcon

@@ -16,8 +16,7 @@ inline constexpr std::size_t kPacketBytes = 16;
 inline constexpr std::uint8_t kPacketBegin = '<';
 inline constexpr std::uint8_t kPacketEnd = '>';
 
-/// For each leg.
-using Counts = std::array<std::int16_t, 3>;
+using Counts = std::array<std::int16_t, 3>;  ///< for each leg
 
 struct Command {
   Counts torque{};  ///< −10⁴ · N·m at the joint; bytes 1-4, 5-8, 9-12; two's complement, lowest nibble first
@@ -30,11 +29,9 @@ inline constexpr std::uint8_t kGreen = 2;
 inline constexpr std::uint8_t kBlue = 4;
 inline constexpr std::uint8_t kRed = 8;
 
-/// Without torque, and red. Used by the guardian.
-inline constexpr Command kLastCommand{.torque = {}, .homing = true, .lamps = kRed};
+inline constexpr Command kLastCommand{.torque = {}, .homing = true, .lamps = kRed};  ///< used by the guardian
 
-/// Byte 14 is unknown and always 0.
-std::array<std::uint8_t, kPacketBytes> encode(const Command& command) noexcept;
+std::array<std::uint8_t, kPacketBytes> encode(const Command& command) noexcept;  ///< byte 14 is unknown and always 0
 
 struct Reply {
   Counts encoders{};         ///< bytes 1-12, encoded like the torques
@@ -47,18 +44,15 @@ struct Reply {
 std::optional<Reply> decode(std::span<const std::uint8_t, kPacketBytes> bytes) noexcept;
 
 /// Finds replies in a stream with lost, corrupted or additional bytes. Skips invalid bytes one at a time, so that
-/// complete replies are always found, and keeps incomplete replies.
-/// Thread-safe: no. Realtime-safe: yes.
+/// complete replies are always found, and keeps incomplete replies. Thread-safe: no. Realtime-safe: yes.
 class ReplyParser {
  public:
   /// Returns the number of bytes that were added. There is room for 64 if `next` has returned nullopt.
   std::size_t feed(std::span<const std::uint8_t> bytes) noexcept;
 
-  /// Removes and returns the oldest reply.
   std::optional<Reply> next() noexcept;
 
-  /// The number of bytes that were skipped.
-  std::uint64_t left_out() const noexcept { return left_out_; }
+  std::uint64_t left_out() const noexcept { return left_out_; }  ///< bytes that were skipped
 
   void clear() noexcept { size_ = 0; }
 

@@ -13,14 +13,13 @@
 
 namespace tendon {
 
-/// Plays a recorded motion with its original positions and time stamps. There is no force: `apply` always returns zero.
-/// This can be used to run engines, and the whole loop, with the same motion repeatedly.
+/// Plays a recorded motion with its original positions and time stamps, so that engines and the whole loop can be run
+/// repeatedly with the same motion. There is no force: `apply` always returns zero.
 ///
 /// The first `read` returns the first sample. Sample i is due tᵢ − t₀ later and uses this time. There is no
 /// interpolation: `read` returns a sample, or nullopt if a new sample is not due. A sample waits for a single `read`. A
 /// loop as fast as the recording therefore returns all samples, even with jitter, and a slower loop returns the newest
 /// sample that was due in the previous `read`. The times always increase.
-///
 /// Thread-safe: no. Realtime-safe: `read` and `apply`.
 class ReplayDevice final : public Device {
  public:
@@ -28,8 +27,7 @@ class ReplayDevice final : public Device {
     Duration at{};  ///< only differences matter
     Vec3 position = Vec3::Zero();
   };
-  /// kHold: continues with the last position. kRepeat: starts again, one mean interval after the last sample; the
-  /// position jumps if the ends differ.
+  /// kHold: keeps the last position. kRepeat: starts again one mean interval later, with a jump if the ends differ.
   using AtEnd = ScriptedMotion::Recorded::AtEnd;
 
   struct Config {
@@ -62,7 +60,6 @@ class ReplayDevice final : public Device {
   std::uint64_t due_before_ = 0;  ///< due at the last `read`
 };
 
-// See driver.h.
 const Driver& driver(const ReplayDevice::Config& config);
 SimulatedDevice::Config stand_in(const ReplayDevice::Config& config);
 std::unique_ptr<Device> make(const ReplayDevice::Config& config, FromOutside outside);

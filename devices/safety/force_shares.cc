@@ -11,8 +11,7 @@ namespace tendon {
 
 namespace {
 
-/// Same as × 0.999 each ms.
-constexpr double kBoundTime_s = 1.0;
+constexpr double kBoundTime_s = 1.0;  ///< same as × 0.999 each ms
 constexpr double kWarm = 0.7;
 constexpr double kCool = 0.5;
 

@@ -10,19 +10,16 @@ namespace tendon {
 // The parts of the safety layer that reduce a force. Each part returns a factor s, 0 ≤ s ≤ 1, for all components, so it
 // cannot increase, rotate or lengthen a force. The force also stays within the bounds of the energy limiter, both on
 // the norm and on each axis. Torques have a separate limit and growth limit in N·m, and a grip force is used as a
-// vector with one component.
-//
+// vector with one component. `field` is used in error messages.
 // Thread-safe: no. Realtime-safe: all except the constructors, which throw std::invalid_argument naming the field.
 
 /// Limits the norm of a force: s = max / ‖F‖. Clipping each component would rotate the force, and integer overflow
-/// would reverse it (Novint Falcon with libnifalcon: 30 N·m requested, 16 bits sent). Source: HD_EXCEEDED_MAX_FORCE of
-/// OpenHaptics.
+/// would reverse it (libnifalcon: 30 N·m requested, 16 bits sent). Source: OpenHaptics' HD_EXCEEDED_MAX_FORCE.
 class ForceLimit {
  public:
   struct Config {
     double max = 0;  ///< N, or N·m; > 0
   };
-  /// `field` is used in error messages.
   explicit ForceLimit(const Config& config, const char* field = "force_limit");
   double share(const Vec3& asked) const noexcept;
   double max() const noexcept { return config_.max; }
@@ -36,14 +33,12 @@ class ForceLimit {
 ///     ‖s F‖ ≤ (F_before · F/‖F‖)₊ + rate · T
 ///
 /// Forces may decrease at once, and reversed forces start at zero. Limiting every change would extend a force that is
-/// no longer requested, which must not be done by a safety layer. Source: HD_EXCEEDED_MAX_FORCE_IMPULSE (0x0202) of
-/// OpenHaptics.
+/// no longer requested. Source: HD_EXCEEDED_MAX_FORCE_IMPULSE (0x0202) of OpenHaptics.
 class GrowthLimit {
  public:
   struct Config {
     double rate = 0;  ///< N/s, or N·m/s; > 0
   };
-  /// `field` is used in error messages.
   explicit GrowthLimit(const Config& config, const char* field = "growth_limit");
   /// `before` was actually rendered during the last `elapsed`.
   double share(const Vec3& asked, const Vec3& before, Duration elapsed) const noexcept;
@@ -81,9 +76,7 @@ struct RampOut {
 /// 1 + (T/τ)(peak/continuous)².
 ///
 /// There is one temperature for all motors, computed from the force at the handle. It is correct if the motors share
-/// the force evenly, and too low for a motor that carries more. Only the device knows the torque of each joint and must
-/// limit it itself.
-///
+/// the force evenly, and too low for a motor that carries more. The device must limit the torque of each joint itself.
 /// Source: PreventWarmMotors of OpenHaptics (0.7, 0.5, × 0.999 each ms). Touch: peak 3.3 N, continuous 0.88 N.
 class HeatLimit {
  public:

@@ -68,8 +68,7 @@ struct Charge {
   std::uint64_t looks = 0;  ///< since `beat` has changed
 };
 
-/// Waits for the next order, unless `flags` contains MSG_DONTWAIT. Returns false if there are no more orders because
-/// the server has exited.
+/// Waits for the next order, unless `flags` has MSG_DONTWAIT. Returns false if the server has exited.
 bool take_order(int socket, std::array<Charge, Guardian::kDevices>& charges, int flags = 0) noexcept {
   alignas(Order) std::array<std::byte, sizeof(Order)> bytes{};
   iovec part{.iov_base = bytes.data(), .iov_len = bytes.size()};
@@ -102,8 +101,7 @@ void end_forces(const std::array<Charge, Guardian::kDevices>& charges) noexcept 
   }
 }
 
-/// Sends the zero packet to all devices whose heartbeat has stopped. `looks` is the number of timer ticks since the
-/// last call.
+/// Sends the zero packet to devices whose heartbeat has stopped. `looks` counts timer ticks since the last call.
 void watch_hearts(const Heartbeat* hearts, std::array<Charge, Guardian::kDevices>& charges,
                   std::uint64_t looks) noexcept {
   for (std::size_t i = 0; i < charges.size(); ++i) {
@@ -143,10 +141,8 @@ class NoSignals {
   sigset_t before_;
 };
 
-/// Sent by the kernel if the parent thread dies.
-constexpr int kParentDied = SIGUSR1;
-/// Sent when the guardian is sure to receive that signal.
-constexpr char kStandsGuard = 'g';
+constexpr int kParentDied = SIGUSR1;  ///< sent by the kernel if the parent thread dies
+constexpr char kStandsGuard = 'g';    ///< sent when the guardian is sure to receive that signal
 
 // All signals must be blocked.
 [[noreturn]] void stand_guard(int socket, const Heartbeat* hearts) noexcept {
@@ -174,8 +170,7 @@ constexpr char kStandsGuard = 'g';
     if (signalfd_siginfo info{}; told[1].revents != 0 && read(parent.fd, &info, sizeof info) > 0) {
       while (take_order(socket, charges, MSG_DONTWAIT)) {
       }
-      // Other threads may still be running and may send a last command. The packets are therefore sent again when all
-      // threads are dead.
+      // Other threads may still send a last command, so the packets are sent again when all are dead.
       end_forces(charges);
     } else if (told[0].revents != 0) {
       server_lives = take_order(socket, charges);

@@ -15,7 +15,6 @@
 
 namespace tendon {
 
-/// A packet for ending the force of a device.
 class ZeroPacket {
  public:
   static constexpr std::size_t kMost = 64;  ///< full-speed bulk transfer, or HID report
@@ -41,19 +40,17 @@ class ZeroPacket {
 
 /// A process that sets the forces to zero if this process is killed or its haptic thread does not run, for example
 /// because of SIGKILL, the kernel's out-of-memory killer, a crash, SIGSTOP, a debugger, a busy machine or a deadlock.
-/// This is needed because motors keep rendering the last command, and the watchdog of a device may be missing or
-/// undocumented (Novint Falcon).
+/// Motors keep rendering the last command, and the watchdog of a device may be missing or undocumented (Novint Falcon).
 ///
 /// The guardian shares the open files of the devices, and a socket pair, with this process. It is started by a thread
 /// that only waits. If that thread dies, the guardian receives a signal from the kernel (PR_SET_PDEATHSIG, prctl(2)),
 /// possibly more than once, and writes the zero packets. The socket is closed after the last thread has died and the
 /// memory was freed, which can take tens of milliseconds. The guardian then writes the packets again, since a dying
-/// thread may have sent another command, and exits. It also does this after a clean exit, so that this code is always
-/// tested.
+/// thread may have sent another command, and exits. It also does so after a clean exit, to test this.
 ///
 /// Every haptic step increments the Heartbeat of its device. If a force is applied and the heartbeat stops for
-/// Heartbeat::kStill, the guardian writes the zero packet twice, in case another thread has just sent a force. Since it
-/// checks every 2 ms, the first packet is written 20 to 24 ms after the last step.
+/// Heartbeat::kStill, the guardian writes the zero packet twice, in case another thread has just sent a force. It
+/// checks every 2 ms, so the first packet is written 20 to 24 ms after the last step.
 ///
 /// The guardian blocks all signals and uses its own session, so signals to the process group of the server do not
 /// affect it. It is also killed by SIGKILL (sent by systemd to all processes of a unit after TimeoutStopSec) or a power
@@ -61,9 +58,7 @@ class ZeroPacket {
 ///
 /// Measured with usbfs in an emulated machine (deploy/test-usb-kernel, commit 916cd72, n = 20): the device received the
 /// zero packet 2.9 ms (p50), 5.5 ms (p90) and at most 7.4 ms after the SIGKILL, while a packet and its reply took 0.6
-/// ms (p50). See devices/falcon/README.md for the complete server, and tests/e2e/guardian_test.cc for the time between
-/// processes.
-///
+/// ms (p50). See devices/falcon/README.md for the server, tests/e2e/guardian_test.cc for the time between processes.
 /// Thread-safe: yes. Realtime-safe: no.
 class Guardian {
  public:
@@ -73,24 +68,20 @@ class Guardian {
   /// fork. It should set the priority, which is inherited by the guardian and determines its delay on a busy machine.
   /// Throws std::system_error on failure.
   explicit Guardian(const std::function<void()>& on_start = {});
-  /// Waits until the packets are written.
-  ~Guardian();
+  ~Guardian();  ///< waits until the packets are written
   Guardian(const Guardian&) = delete;
   Guardian& operator=(const Guardian&) = delete;
 
-  /// Registers the packet for ending the force of `device` (below kDevices), using a copy of `fd`. Returns false if the
-  /// guardian is dead.
+  /// Registers the zero packet of `device` (below kDevices) and a copy of `fd`. Returns false if the guardian is dead.
   bool guard(std::size_t device, int fd, const ZeroPacket& zero) noexcept;
-  /// Must be called when `device` is closed.
-  bool forget(std::size_t device) noexcept;
+  bool forget(std::size_t device) noexcept;  ///< must be called when `device` is closed
 
   /// For the thread that steps `device` (below kDevices).
   Heartbeat& heartbeat(std::size_t device) noexcept { return hearts_[device]; }
 
   pid_t pid() const noexcept { return pid_; }
 
-  /// False if the guardian is dead or stopped, so that it cannot end the forces. Realtime-safe; can be used by any
-  /// thread.
+  /// False if the guardian is dead or stopped, so that it cannot end the forces. Realtime-safe; for any thread.
   const std::atomic<bool>& stands() const noexcept { return stands_; }
 
  private:

@@ -9,8 +9,7 @@
 
 namespace tendon {
 
-/// Indicates that the haptic thread is running, and whether the device renders a force. Used in shared memory
-/// (Guardian::heartbeat).
+/// Indicates that the haptic thread is running, and whether the device renders a force. In shared memory.
 /// Realtime-safe: yes. One thread calls `beat`; `last` may be called from any thread or process.
 class Heartbeat {
  public:

@@ -14,13 +14,10 @@ namespace tendon {
 
 namespace {
 
-/// A handle is at rest if it has not moved during this time. At the turning points of a tremor (8 to 12 Hz), the pause
-/// is shorter.
+/// A handle is at rest if it does not move for this time. The pauses of a tremor (8 to 12 Hz) are shorter.
 constexpr Duration kRest = std::chrono::milliseconds(50);
-/// Shorter gaps between samples are allowed, because USB replies jitter.
-constexpr Duration kBlind = std::chrono::milliseconds(10);
-/// Limits the growth of the force after a pause.
-constexpr Duration kLongestStep = std::chrono::milliseconds(10);
+constexpr Duration kBlind = std::chrono::milliseconds(10);  ///< shorter gaps are allowed, because USB replies jitter
+constexpr Duration kLongestStep = std::chrono::milliseconds(10);  ///< limits the growth of the force after a pause
 
 template <class Part, class Config, class... More>
 std::optional<Part> made(const std::optional<Config>& config, More... more) {

@@ -25,7 +25,6 @@ enum class SafetyState : std::uint8_t {
 };
 std::string_view to_string(SafetyState state) noexcept;
 
-/// Why a device was disarmed.
 enum class SafetyFault : std::uint8_t {
   kNone,
   kForceNotFinite,     ///< requested NaN or infinity
@@ -54,16 +53,14 @@ std::string_view to_string(SafetyFault fault) noexcept;
 ///
 ///     Absent → Opening → Firmware → Unhomed → Homed ⇄ Armed → Fault → Armed
 ///
-/// **Torque and grip** (`apply_all`) are limited in the same way. Force and torque are reduced by a common factor, the
-/// smallest one for either of them, to keep the direction of the wrench. Workspace and heat are computed from the force
-/// only. The grip has a separate limit and growth limit, but the same ramps and conditions. `apply` does not render
-/// torque or grip.
+/// **Torque and grip** (`apply_all`) are limited in the same way. Force and torque are reduced by the smaller of their
+/// factors, to keep the direction of the wrench. Workspace and heat are computed from the force only. The grip has a
+/// separate limit and growth limit, but the same ramps and conditions. `apply` does not render torque or grip.
 ///
-/// **Arming** must be requested (Arming::By). The request is granted in the first `apply` for which the device is
-/// homed, the handle has not moved faster than `rest_speed` for 50 ms, using positions at most 10 ms apart, the
-/// requested force and grip are at most `rest_force`, the requested torque is at most `rest_torque`, and the dead man's
-/// button, if listed, is held. Rotating the handle is allowed. Requests expire after `patience`, and are ignored before
-/// the first `read`.
+/// **Arming** must be requested (Arming::By). It is granted in the first `apply` for which the device is homed, the
+/// handle has not moved faster than `rest_speed` for 50 ms, using positions at most 10 ms apart, the requested force
+/// and grip are at most `rest_force`, the requested torque is at most `rest_torque`, and the dead man's button, if
+/// listed, is held. Rotation is allowed. Requests expire after `patience`, and are ignored before the first `read`.
 ///
 /// **Faults** are only latched while armed; otherwise, they just prevent arming. The force is zero in the next `apply`.
 /// For watchdogs with a ramp, the device stays armed until the force has decreased to zero. Releasing the dead man's
@@ -71,17 +68,13 @@ std::string_view to_string(SafetyFault fault) noexcept;
 ///
 /// **Disarming** by the operator is not a fault either: the device returns to Homed, without a force, and a pending
 /// request is cancelled. It cannot be armed by `kStart` or the dead man's button until `arm` is called; the button must
-/// be pressed again after that. A fault remains a fault. If a watchdog is ramping the force down, it becomes a fault
-/// immediately.
+/// be pressed again after that. A fault remains a fault, and a watchdog that is ramping the force down becomes one.
 ///
-/// If the process hangs or dies, the force is ended by the guardian (guardian.h) or by the watchdog of the device.
-/// Using a guardian adds two faults: kCommandSilent, if `apply` is not called for Heartbeat::kStill, and kGuardianLost,
-/// if the guardian is killed or stopped. Both are set by the next `read`. If its guardian is
-/// not running, the device cannot be armed.
+/// If the process hangs or dies, the guardian (guardian.h) or the device's watchdog ends the force. A guardian adds two
+/// faults, both set by the next `read`: kCommandSilent, if `apply` is not called for Heartbeat::kStill, and
+/// kGuardianLost, if the guardian is killed or stopped. If the guardian is not running, the device cannot be armed.
 ///
-/// `read` returns nullopt if the position or the opening is not finite, the orientation is not a rotation, or the
-/// position has jumped (StepBound).
-///
+/// `read` returns nullopt if position or opening are not finite, the orientation is no rotation, or a StepBound trips.
 /// Thread-safe: no, except `status`. Realtime-safe: all except the constructor.
 class SafeDevice final : public Device {
  public:
@@ -162,7 +155,6 @@ class SafeDevice final : public Device {
   void trip(SafetyFault fault, Duration ramp = Duration::zero()) noexcept;
   void forget_motion() noexcept;
   bool may_be_armed(const Effort& asked) const noexcept;
-  /// Arms the device if possible, and returns whether it is armed.
   bool armed_for(const Effort& asked) noexcept;
   bool stopped() const noexcept;
   Effort limited(const Effort& asked) const noexcept;

@@ -9,12 +9,11 @@
 
 namespace tendon {
 
-// Conditions for ending all forces, which are latched by SafeDevice.
+// Conditions for ending all forces, which are latched by SafeDevice. `field` is used in error messages.
 // Thread-safe: no. Realtime-safe: all except the constructors, which throw std::invalid_argument naming the field.
 
 /// Trips if the handle moves faster than a hand that is holding it, because it was released or thrown. Source: Force
-/// Dimension's SDK: above the velocity threshold "forces are automatically disabled and brakes engaged";
-/// HD_EXCEEDED_MAX_VELOCITY of OpenHaptics.
+/// Dimension's SDK ("forces are automatically disabled and brakes engaged"), OpenHaptics' HD_EXCEEDED_MAX_VELOCITY.
 class SpeedTrip {
  public:
   struct Config {
@@ -75,7 +74,6 @@ class Watchdog {
     Duration timeout{};                             ///< > 0
     Duration ramp = std::chrono::milliseconds(20);  ///< ≥ 0
   };
-  /// `field` is used in error messages.
   Watchdog(const Config& config, const char* field);
   bool tripped(Duration silent) const noexcept { return silent > config_.timeout; }
   Duration ramp() const noexcept { return config_.ramp; }
@@ -84,8 +82,7 @@ class Watchdog {
   Config config_;
 };
 
-/// A button that must be held, as on the teach pendant of a robot (ISO 10218-1: enabling device). Releasing the handle
-/// releases the button.
+/// A button that must be held, as on a teach pendant (ISO 10218-1: enabling device); released with the handle.
 class DeadManSwitch {
  public:
   struct Config {

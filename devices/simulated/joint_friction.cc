@@ -15,8 +15,7 @@
 namespace tendon {
 namespace {
 
-/// The sign of each joint's velocity.
-using Turns = std::array<int, 3>;
+using Turns = std::array<int, 3>;  ///< the sign of each joint's velocity
 
 struct Stiction {
   Turns turns;
@@ -48,8 +47,7 @@ Stiction sticking(const Turns& turns, const Mat3& coupling, const Vec3& free, co
 }
 
 /// Returns the unique impulse with |impulseᵢ| ≤ mostᵢ that equals mostᵢ, opposite to the velocity, at all moving
-/// joints. Nonzero entries of `known` are given. There are 27 cases; due to rounding, the best one is used if several
-/// are correct.
+/// joints. Nonzero entries of `known` are given. Uses the best of 27 cases, because of rounding.
 Stiction stiction_of(const Mat3& coupling, const Vec3& free, const Vec3& most, const Turns& known = {}) noexcept {
   Stiction best;
   const auto holds = [&](Turns turns) {

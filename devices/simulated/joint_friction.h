@@ -19,7 +19,6 @@ namespace tendon {
 ///
 ///     Σ τ_c,i |q̇ᵢ| ≥ f_c |v|,   f_c = minᵢ τ_c,i / ‖J⁻¹ eᵢ‖         exact: the easiest direction is that of one joint
 ///     Σ b_i q̇ᵢ²    ≥ b |v|²,    b = λ_min(Jᵀ diag(b_i) J) ≥ 1 / Σ ‖J⁻¹ eᵢ‖²/b_i
-///
 /// Thread-safe: yes, immutable. Realtime-safe: `step`.
 class JointFriction {
  public:
@@ -33,16 +32,13 @@ class JointFriction {
   /// Throws std::invalid_argument if a value is out of range, naming the field, or if no joint has friction.
   explicit JointFriction(const Config& config);
 
-  /// Lower bounds of f_c and b in the whole workspace.
-  Friction least() const noexcept;
-  /// Lower bounds of f_c and b at `position` (m, device base frame) only.
-  Friction least_at(const Vec3& position) const noexcept;
+  Friction least() const noexcept;                         ///< lower bounds of f_c and b in the whole workspace
+  Friction least_at(const Vec3& position) const noexcept;  ///< only at `position` (m, device base frame)
 
   Joints at(const Motion& hand) const noexcept;
   void name(std::vector<std::string>& joints) const;
 
-  /// Returns the torques (N·m) for which `coulomb` (N) is the smallest friction in the workspace. Used if only the
-  /// friction at the handle is known.
+  /// The torques (N·m) for which `coulomb` (N), if only this is known, is the smallest friction in the workspace.
   static Vec3 torques(const Mechanism::Kind& mechanism, double coulomb);
 
   /// For a substep of length h.
@@ -58,10 +54,9 @@ class JointFriction {
     Vec3 push;          ///< N, independent of the velocity
   };
 
-  /// A step of the implicit midpoint rule with set-valued friction in each joint, using J at `position`: the friction
-  /// law is satisfied exactly by the mean joint velocities J v̄. Joints stop if their velocity has reached or crossed
-  /// zero and friction can hold them. v₁ is then the closest velocity, in terms of kinetic energy, without motion of
-  /// these joints.
+  /// A step of the implicit midpoint rule with set-valued friction in each joint, using J at `position`. The mean joint
+  /// velocities J v̄ satisfy the friction law exactly. Joints stop if their velocity has reached or crossed zero and
+  /// friction can hold them. v₁ is then the closest velocity, in kinetic energy, without motion of these joints.
   Slide step(const Vec3& position, const Vec3& v0, const Impetus& impetus, double h) const noexcept;
 
  private:

@@ -70,8 +70,7 @@ Mechanism::Mechanism(const Kind& kind) : kind_(kind), reach_(kFalconReach), leve
   expect(sound(arm->upper_arm), "upper_arm", arm->upper_arm, "0.01 to 10 m");
   expect(sound(arm->forearm), "forearm", arm->forearm, "0.01 to 10 m");
   reach_ = reach_of(*arm);
-  // q₁ moves the handle by r per radian, which is l_u in the middle of the workspace; q₂ and q₃ by the lengths of their
-  // arms.
+  // q₁ moves the handle by r per radian, which is l_u in the middle; q₂ and q₃ by the lengths of their arms.
   levers_ = Vec3(arm->upper_arm + reach_, arm->upper_arm, arm->forearm);
 }
 

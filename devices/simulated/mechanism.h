@@ -40,13 +40,11 @@ class Mechanism {
 
   Mat3 jacobian(const Vec3& position) const noexcept;
 
-  /// In rad.
-  Vec3 angles(const Vec3& position) const noexcept;
+  Vec3 angles(const Vec3& position) const noexcept;  ///< rad
 
   std::array<std::string_view, 3> joints() const noexcept;
 
-  /// Radius of the workspace, in m.
-  double reach() const noexcept { return reach_; }
+  double reach() const noexcept { return reach_; }  ///< radius of the workspace, m
 
   /// Upper bounds of ‖J⁻¹ eᵢ‖ in the workspace, in m/rad: the motion of the handle if only joint i moves.
   const Vec3& levers() const noexcept { return levers_; }

@@ -10,9 +10,8 @@ namespace tendon {
 ///
 ///     F_hand = k (s − x) + c (ṡ − v) − m_hand dv/dt        (N, on the handle)
 ///
-/// Source: Hajian and Howe (J. Biomech. Eng. 119:109, 1997); Kuchenbecker, Park and Niemeyer (IMECE 2003). See
-/// OperatorProfile for the parameters of a fingertip, a hand with a stylus, and an arm.
-///
+/// OperatorProfile has the parameters of a fingertip, a hand with a stylus, and an arm. Source: Hajian and Howe (J.
+/// Biomech. Eng. 119:109, 1997); Kuchenbecker, Park and Niemeyer (IMECE 2003).
 /// Thread-safe: yes, immutable. Realtime-safe: all except the constructor.
 class OperatorHand {
  public:
@@ -26,8 +25,7 @@ class OperatorHand {
   /// Throws std::invalid_argument if a value is out of range, naming the field.
   explicit OperatorHand(Config config);
 
-  /// Returns k (s(t) − x) + c ṡ(t). The remaining force depends on the motion of the handle, and is integrated
-  /// implicitly by the caller.
+  /// Returns k (s(t) − x) + c ṡ(t). The caller integrates the rest, which depends on the handle's motion, implicitly.
   Vec3 drive(double t, const Vec3& x) const noexcept;
 
   /// `t` in s, since the start.

@@ -27,8 +27,7 @@ struct KnownNumber {
   std::string_view note;
 };
 
-/// Initial values for simulating a device, which may differ for each unit. The friction of the actual unit must be
-/// identified before using a limiter.
+/// Initial values for simulation. Units differ, so a limiter requires the identified friction of the actual unit.
 struct DeviceProfile {
   std::string_view name;
   KnownNumber mass;                     ///< kg
@@ -41,17 +40,14 @@ struct DeviceProfile {
   KnownNumber viscous_bound;            ///< N·s/m, for the limiter
   KnownNumber coulomb_bound;            ///< N, for the limiter
 
-  /// Without a hand.
-  SimulatedDevice::Config device() const;
+  SimulatedDevice::Config device() const;  ///< without a hand
   /// Lower bounds, for the limiter.
   Friction friction_bounds() const noexcept { return {.coulomb = coulomb_bound.value, .viscous = viscous_bound.value}; }
 };
 
-/// phantom-premium, touch, falcon
-std::span<const DeviceProfile> device_profiles() noexcept;
+std::span<const DeviceProfile> device_profiles() noexcept;  ///< phantom-premium, touch, falcon
 
-/// Returns null if there is no such profile.
-const DeviceProfile* find_device_profile(std::string_view name) noexcept;
+const DeviceProfile* find_device_profile(std::string_view name) noexcept;  ///< null if there is no such profile
 
 struct KnownRange {
   double least;
@@ -59,31 +55,25 @@ struct KnownRange {
   Provenance provenance;
   std::string_view note;
 
-  /// To be used by default.
-  double middle() const noexcept { return least + (most - least) / 2; }
+  double middle() const noexcept { return least + (most - least) / 2; }  ///< the default
 };
 
 /// Parameters of a finger, hand or arm. They vary between people and increase with the grip force. A spring, a damper
-/// and a mass are the simplest model that differs from a wall. It is not accurate above about 50 Hz, or with a very
-/// light grip.
+/// and a mass are the simplest model that differs from a wall. It is inaccurate above about 50 Hz and for a light grip.
 struct OperatorProfile {
   std::string_view name;
   KnownRange stiffness;  ///< N/m
   KnownRange damping;    ///< N·s/m
   KnownRange mass;       ///< kg
 
-  /// Uses the middle of each range.
-  OperatorHand::Config hand(ScriptedMotion motion) const;
+  OperatorHand::Config hand(ScriptedMotion motion) const;  ///< in the middle of each range
 };
 
-/// fingertip, stylus, arm
-std::span<const OperatorProfile> operator_profiles() noexcept;
+std::span<const OperatorProfile> operator_profiles() noexcept;  ///< fingertip, stylus, arm
 
-/// Returns null if there is no such profile.
-const OperatorProfile* find_operator_profile(std::string_view name) noexcept;
+const OperatorProfile* find_operator_profile(std::string_view name) noexcept;  ///< null if there is no such profile
 
-/// A heavy device of admittance type without a hand: 2 kg, 20 N·s/m, 1 N, and a force sensor. Not a real device;
-/// see core/PROOFS.md, "Admittance loop".
+/// Not a real device: admittance type, 2 kg, 20 N·s/m, 1 N, force sensor, no hand (core/PROOFS.md, "Admittance loop").
 SimulatedDevice::Config admittance_device();
 
 /// One line per number, with its unit, provenance and source.

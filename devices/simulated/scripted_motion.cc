@@ -105,8 +105,7 @@ Point point_at(const ScriptedMotion::MinimumJerk& s, double t) {
           way * (sign * 30 * u * u * (1 - u) * (1 - u) / duration)};
 }
 
-/// Fritsch and Butland's slope at sample i: the weighted harmonic mean of both secants, or zero if their signs differ
-/// (which preserves extrema) and at the ends.
+/// Fritsch and Butland's slope: the weighted harmonic mean of both secants, or 0 at ends and extrema (opposite signs).
 double slope(const std::vector<Recorded::Sample>& s, std::size_t i) {
   if (i == 0 || i + 1 == s.size()) return 0;
   const double h0 = s[i].t - s[i - 1].t;

@@ -47,8 +47,7 @@ class ScriptedMotion {
 
   /// A recording: position = origin + direction · x(t), using cubic Hermite interpolation with Fritsch and Butland's
   /// slopes (SIAM J. Sci. Stat. Comput. 5(2):300, 1984). The velocity is continuous, also when repeating, because the
-  /// slope at both ends is zero. Between two samples, x stays in their range, so that quantized recordings do not
-  /// overshoot.
+  /// slope at both ends is zero. Between two samples, x stays in their range, so quantized recordings do not overshoot.
   struct Recorded {
     struct Sample {
       double t;  ///< s, strictly increasing
@@ -68,8 +67,7 @@ class ScriptedMotion {
 
   explicit ScriptedMotion(Script script);
 
-  /// `t` in s, since the start, ≥ 0.
-  Point at(double t) const noexcept;
+  Point at(double t) const noexcept;  ///< `t` in s, since the start, ≥ 0
 
  private:
   Script script_;

@@ -32,7 +32,6 @@ Vec3 saturated(const Vec3& force, double limit) {
   return shape * (limit / length);
 }
 
-/// Returns a factor for limiting the norm.
 double share_within(const Vec3& vector, double limit) {
   const double largest = vector.lpNorm<Eigen::Infinity>();
   if (!(largest > 0)) return 1;
@@ -58,7 +57,6 @@ void check(const SimulatedDevice::Config::StructuralMode& mode, double mass) {
   expect_not_negative(mode.damping, "structural_mode.damping");
 }
 
-/// Returns the centre of a count.
 Vec3 counted(const Vec3& x, double step) { return (x.array() / step + 0.5).floor().matrix() * step; }
 
 }  // namespace
@@ -197,7 +195,6 @@ Effort SimulatedDevice::apply_all(const Effort& effort) noexcept {
   return held;
 }
 
-/// Limits the effort to what the motors can render.
 Effort SimulatedDevice::written(const Effort& effort) const noexcept {
   Effort most;
   if (!is_finite(effort)) return most;

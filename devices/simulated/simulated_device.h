@@ -27,8 +27,8 @@ namespace tendon {
 ///     m dv/dt = F_device + F_hand − b v − f_c sgn(v),      sgn(v) = v/|v|;  any |sgn| ≤ 1 at v = 0
 ///
 /// Forces are in N on the handle: F_device is applied to the hand, and F_hand is applied by the hand to the device.
-/// Friction is either isotropic or in the joints of a mechanism (JointFriction). All effects are optional. Unused
-/// effects do not cost any time in a substep, because each combination of effects has a separate loop.
+/// Friction is either isotropic or in the joints of a mechanism (JointFriction). All effects are optional, and unused
+/// effects cost no time in a substep, because each combination of effects has a separate loop.
 ///
 /// **Structural mode.** Motors, friction and encoder are connected to the handle and the hand by a spring K and a
 /// damper C. With the motor side at y = x + e and of mass m − m_h,
@@ -42,8 +42,8 @@ namespace tendon {
 /// stiffness of a stable sampled spring does not change, because the encoder and the motors are on the same side.
 ///
 /// **Time.** The first `read` defines time 0. Each later `read` integrates up to `now`, using the force of the last
-/// `apply`. Encoder and force change at the same time, that of the last `read`. `now` must not decrease; otherwise, it
-/// is ignored. In longer gaps, only kMaxGap is integrated.
+/// `apply`. Encoder and force change at the same time, that of the last `read`. If `now` decreases, it is ignored. In
+/// longer gaps, only kMaxGap is integrated.
 ///
 /// **Transport delay.** With `sample_delay` d_s, `read(now)` returns the sample at now − d_s, and integrates (and
 /// updates `truth()`) up to this time only. With `force_delay` d_f, forces reach the motors later, and the initial
@@ -74,9 +74,8 @@ namespace tendon {
 /// structural mode, the mean deflection is used for the spring, and both velocities are computed from a linear
 /// equation; its frequency is (2/h) atan(ω h/2), 0.03 % low at 200 Hz.
 ///
-/// Energy balance: if the applied force is the one returned (without transport delay, amplifier lag, or an expired
-/// watchdog), and E is computed by an EnergyLedger from the true position at the encoder and `least_friction`, then up
-/// to rounding
+/// Energy balance, up to rounding: if the applied force is the one returned (without transport delay, amplifier lag, or
+/// an expired watchdog), and an EnergyLedger computes E from the true encoder position and `least_friction`,
 ///
 ///     work of hand and environment + stored energy at the start ≥ E + stored energy now
 ///
@@ -91,21 +90,18 @@ class SimulatedDevice final : public Device {
     Vec3 start_velocity = Vec3::Zero();  ///< m/s
 
     /// Optional effects. The energy balance remains valid unless noted otherwise.
-    std::optional<double> viscous_friction;  ///< b, N·s/m, > 0
-    std::optional<double> coulomb_friction;  ///< f_c, N, > 0
-    /// Instead of `coulomb_friction`.
-    std::optional<JointFriction::Config> joint_friction;
+    std::optional<double> viscous_friction;               ///< b, N·s/m, > 0
+    std::optional<double> coulomb_friction;               ///< f_c, N, > 0
+    std::optional<JointFriction::Config> joint_friction;  ///< instead of `coulomb_friction`
     struct StructuralMode {
       double handle_mass = 0;  ///< m_h, kg; > 0, below `mass`
       double stiffness = 0;    ///< K, N/m, > 0
       double damping = 0;      ///< C, N·s/m, ≥ 0
     };
     std::optional<StructuralMode> structural_mode;
-    /// m per count and axis. Samples are rounded to multiples of this.
-    std::optional<double> encoder_step;
-    std::optional<double> max_force;  ///< N, maximum norm
-    /// Hz, −3 dB: first-order lag of the motors. No energy balance.
-    std::optional<double> amplifier_bandwidth;
+    std::optional<double> encoder_step;         ///< m per count and axis; samples are rounded to multiples
+    std::optional<double> max_force;            ///< N, maximum norm
+    std::optional<double> amplifier_bandwidth;  ///< Hz, −3 dB: first-order lag of the motors; no energy balance
     /// Between handle and hand, as in devices of admittance type or at the wrist of a robot. Measures the mean force of
     /// hand and environment over the last substep, without noise.
     struct ForceSensor {
@@ -117,8 +113,7 @@ class SimulatedDevice final : public Device {
     std::optional<Duration> sample_delay;
     std::optional<Duration> force_delay;
 
-    /// Cannot be used with a structural mode.
-    std::optional<SimulatedEnvironment::Config> environment{};
+    std::optional<SimulatedEnvironment::Config> environment{};  ///< cannot be used with a structural mode
 
     std::optional<OperatorHand::Config> hand;
     /// When the hand permanently releases the handle, relative to the first `read`. Its mass is also removed.
@@ -131,10 +126,8 @@ class SimulatedDevice final : public Device {
     };
     std::vector<Press> presses{};
 
-    /// The energy balance then includes −τ·ω.
-    std::optional<SimulatedRotation::Config> rotation{};
-    /// With its own energy balance.
-    std::optional<SimulatedGripper::Config> gripper{};
+    std::optional<SimulatedRotation::Config> rotation{};  ///< the energy balance then includes −τ·ω
+    std::optional<SimulatedGripper::Config> gripper{};    ///< with its own energy balance
     std::vector<OutputDescription> outputs{};
 
     /// > 0. 50 µs are 20 substeps per haptic period of 1 kHz. The stiffness limit of a sampled spring (75 g, 1 kHz) is
@@ -176,8 +169,7 @@ class SimulatedDevice final : public Device {
   /// Returns the force after saturation, or zero for infinity and NaN. Also ends torque and grip.
   Vec3 apply(const Vec3& force) noexcept override;
 
-  /// Returns the effort after saturation, or zero for infinity and NaN. Force and torque are reduced by a common
-  /// factor. Torque and grip are zero if there is no such motor.
+  /// As `apply`. Force and torque are reduced by a common factor. Torque and grip are zero if there is no such motor.
   Effort apply_all(const Effort& effort) noexcept override;
 
   void set_output(LocalTime now, std::uint32_t output, const OutputSetting& setting) noexcept override;
@@ -194,8 +186,7 @@ class SimulatedDevice final : public Device {
     double h_over_tau = 0;  ///< h/τ
   };
   enum class Rub : std::uint8_t { kNone, kHandle, kJoints };
-  /// In addition to the hand.
-  enum class Far : std::uint8_t { kNone, kMode, kEnvironment };
+  enum class Far : std::uint8_t { kNone, kMode, kEnvironment };  ///< in addition to the hand
   struct Effects {
     Rub rub = Rub::kNone;
     bool hand = false;
@@ -273,7 +264,6 @@ Friction least_friction(const SimulatedDevice::Config& config);
 /// Lower bounds at `position` (m) in all directions.
 Friction least_friction_at(const SimulatedDevice::Config& config, const Vec3& position);
 
-// See driver.h.
 const Driver& driver(const SimulatedDevice::Config& config);
 SimulatedDevice::Config stand_in(const SimulatedDevice::Config& config);
 std::unique_ptr<Device> make(const SimulatedDevice::Config& config, FromOutside outside);

@@ -11,7 +11,6 @@
 namespace tendon {
 namespace {
 
-/// Returns the component perpendicular to `normal`.
 Vec3 along_surface(const Vec3& v, const Vec3& normal) { return v - normal.dot(v) * normal; }
 
 /// Reduces the part `moving` of `momentum` by up to `most`. Returns true if this part has stopped.

@@ -10,8 +10,7 @@
 
 namespace tendon {
 
-/// The environment of a simulated handle or a follower's tool: walls, which can move, appear and disappear, and a
-/// medium.
+/// The environment of a simulated handle or a follower's tool: a medium, and walls that can move, appear and disappear.
 ///
 ///     F = Σ over walls in contact (F_n n − μ F_n sgn(v_t))  −  b v − f sgn(v)          N, on the handle
 ///     F_n = (k d − c v_n)₊ ,    d = n·(p − x) + s (t − t_from) > 0                      m, depth
@@ -22,7 +21,6 @@ namespace tendon {
 /// **Integration.** In each substep of length h, SimulatedDevice calls `push` in the middle, at x₀ + (h/2) v₀. For the
 /// walls' springs, this is a position Verlet step, which does not gain or lose energy in the long run. `rub` then
 /// subtracts friction from the half-step momentum, before the friction of the device, and `stop` is used for sticking.
-///
 /// Thread-safe: no. Realtime-safe: all except the constructor.
 class SimulatedEnvironment {
  public:
@@ -53,12 +51,10 @@ class SimulatedEnvironment {
   /// Returns Σ F_n n. `t` in s, since the first `read`.
   Vec3 push(double t, const Vec3& x, const Vec3& v) noexcept;
 
-  /// Subtracts friction from the half-step momentum p (N·s), for the same substep as `push`. Returns its mean force in
-  /// N.
+  /// Subtracts friction from the half-step momentum p (N·s) in the substep of `push`. Returns its mean force in N.
   Vec3 rub(Vec3& momentum, double h) noexcept;
 
-  /// Stops motion that is held by friction.
-  void stop(Vec3& velocity) const noexcept;
+  void stop(Vec3& velocity) const noexcept;  ///< stops motion that is held by friction
 
  private:
   Config config_;

@@ -19,15 +19,13 @@ namespace tendon {
 /// **Integration** as in SimulatedDevice, using the implicit midpoint rule with set-valued friction. Substeps end at
 /// the stops. This does not generate energy, because all other forces decrease with v: with d = x₁ − x₀ and the mean
 /// velocity v̄ without the stop, |v̄| ≥ |d|/h, the stop absorbs m v₀²/2 + F·d ≥ m (v₀ − 2 d/h)²/2.
-///
 /// Thread-safe: no. Realtime-safe: all except the constructor.
 class SimulatedGripper {
  public:
   struct Hand {
-    double stiffness = 0;  ///< k, N/m, > 0
-    double damping = 0;    ///< c, N·s/m, ≥ 0
-    /// x is the target opening in rad; y and z are ignored.
-    ScriptedMotion motion{ScriptedMotion::Sine{}};
+    double stiffness = 0;                           ///< k, N/m, > 0
+    double damping = 0;                             ///< c, N·s/m, ≥ 0
+    ScriptedMotion motion{ScriptedMotion::Sine{}};  ///< x is the target opening in rad; y and z are ignored
   };
 
   struct Config {
@@ -42,7 +40,6 @@ class SimulatedGripper {
     std::optional<Hand> hand{};
   };
 
-  /// The true state. Only for tests.
   struct Truth {
     double position = 0;        ///< m, x
     double velocity = 0;        ///< m/s
@@ -63,14 +60,12 @@ class SimulatedGripper {
   /// Integrates `substeps` of `h` seconds, starting at `begin`.
   void integrate(double begin, Duration::rep substeps, double h) noexcept;
 
-  /// In rad, as measured by the encoder.
-  double sample() const noexcept;
+  double sample() const noexcept;  ///< rad, as measured by the encoder
 
   const Truth& truth() const noexcept { return truth_; }
 
  private:
-  /// Returns k (s − x) + c ṡ.
-  double drive(double t) const noexcept;
+  double drive(double t) const noexcept;  ///< k (s − x) + c ṡ
 
   Config config_;
   double most_;  ///< m, fully open

@@ -22,7 +22,7 @@ namespace tendon {
 ///     τ_hand = K θ + c (ω_s − ω),      s = rotation_by(θ) · q,      |θ| ≤ π
 ///
 /// The spring is linear in θ, with the energy K θ²/2, so its stiffness is the same for all angles. It is discontinuous
-/// at 180°, which a hand does not reach. The script is a rotation vector φ(t), with s = rotation_by(φ) and its angular
+/// at 180°, which no hand reaches. The script is a rotation vector φ(t), with s = rotation_by(φ) and its angular
 /// velocity ω_s.
 ///
 /// **Integration** as in SimulatedDevice. With the mean velocity ω̄ of a substep h, the following is satisfied exactly:
@@ -36,16 +36,13 @@ namespace tendon {
 ///
 /// up to rounding, if it did not stop; otherwise, at most this much is stored. Here h ω̄ is turn_between(q₀, q₁). Over
 /// several substeps, turn_between is only their sum if the axis is constant; otherwise the difference is ½ ∫∫ ω × ω,
-/// which is of third order in time.
-///
-/// Thread-safe: no. Realtime-safe: all except the constructor.
+/// which is of third order in time. Thread-safe: no. Realtime-safe: all except the constructor.
 class SimulatedRotation {
  public:
   struct Hand {
-    double stiffness = 0;  ///< K, N·m/rad, > 0
-    double damping = 0;    ///< c, N·m·s/rad, ≥ 0
-    /// Positions are rotation vectors (rad, base frame).
-    ScriptedMotion motion{ScriptedMotion::Sine{}};
+    double stiffness = 0;                           ///< K, N·m/rad, > 0
+    double damping = 0;                             ///< c, N·m·s/rad, ≥ 0
+    ScriptedMotion motion{ScriptedMotion::Sine{}};  ///< positions are rotation vectors (rad, base frame)
   };
 
   struct Config {
@@ -54,15 +51,13 @@ class SimulatedRotation {
     Vec3 start_angular_velocity = Vec3::Zero();  ///< rad/s
     std::optional<double> viscous_friction{};    ///< b, N·m·s/rad, > 0
     std::optional<double> coulomb_friction{};    ///< τ_c, N·m, > 0
-    /// N·m, maximum norm, > 0. Empty if there are no motors, as in the Touch.
-    std::optional<double> max_torque{};
+    std::optional<double> max_torque{};          ///< N·m, maximum norm, > 0; empty without motors, as in the Touch
     /// rad, > 0. Samples are the start orientation, rotated by whole counts of a rotation vector. The error is at most
     /// half a count per axis, √3/2 in total; the start is exact.
     std::optional<double> encoder_step{};
     std::optional<Hand> hand{};
   };
 
-  /// The true state. Only for tests.
   struct Truth {
     Quat orientation;
     Vec3 angular_velocity = Vec3::Zero();  ///< rad/s
@@ -81,14 +76,12 @@ class SimulatedRotation {
   /// Integrates `substeps` of `h` seconds, starting at `begin`.
   void integrate(double begin, Duration::rep substeps, double h) noexcept;
 
-  /// As measured by the encoders.
-  Quat sample() const noexcept;
+  Quat sample() const noexcept;  ///< as measured by the encoders
 
   const Truth& truth() const noexcept { return truth_; }
 
  private:
-  /// J plus h/2 times all damping.
-  double resistance(double h) const noexcept;
+  double resistance(double h) const noexcept;  ///< J plus h/2 times all damping
   /// K θ + c ω_s in the middle of a substep, for the orientation at its start.
   Vec3 drive(double t) const noexcept;
 

@@ -16,11 +16,9 @@
 ///     id 23   battery of a wireless device
 namespace tendon::spacemouse {
 
-/// Raw: X to the right, Y towards the user, Z down.
-using Axes = std::array<std::int16_t, 3>;
+using Axes = std::array<std::int16_t, 3>;  ///< raw: X to the right, Y towards the user, Z down
 
-/// At the stops; some devices exceed this slightly.
-inline constexpr double kFullDeflection = 350;
+inline constexpr double kFullDeflection = 350;  ///< at the stops; some devices exceed this slightly
 
 struct Motion {
   std::optional<Axes> translation{};

@@ -15,8 +15,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-/// While the cap is pushed, there are reports every 16 ms or faster.
-constexpr Duration kHeld = 100ms;
+constexpr Duration kHeld = 100ms;  ///< while the cap is pushed, there are reports every 16 ms or faster
 
 /// 0 in the dead band, length 1 at the stop.
 Vec3 rate_of(const spacemouse::Axes& cap, double dead_band) noexcept {

@@ -16,8 +16,7 @@
 
 namespace tendon {
 
-/// A 3Dconnexion SpaceMouse over a `usb::Pipe`, used as a leader without force. Its cap can only move by some
-/// millimetres, so it controls the velocity (rate control):
+/// A 3Dconnexion SpaceMouse as a leader without force. Its cap only moves by millimetres, so it controls the velocity:
 ///
 ///     d = (X, −Z, Y) / 350, no longer than 1;     v = speed · (|d| − dead_band) / (1 − dead_band) · d/|d|, or 0
 ///     within; p ← p + v (now − before), each component within ±reach
@@ -28,9 +27,7 @@ namespace tendon {
 ///
 /// Position and orientation start at zero, and do not change while the device is unplugged. Velocities are reset to
 /// zero if they are not confirmed for 100 ms, which also limits the motion in one `read`. `apply` always returns zero.
-///
 /// The state is kAbsent or kHomed. Buttons start at bit 0; the two names are correct for models with two buttons.
-///
 /// Thread-safe: `counts` and `state` only. Realtime-safe: `read`, `apply`, `counts`.
 class SpaceMouseDevice final : public Device {
  public:
@@ -57,8 +54,7 @@ class SpaceMouseDevice final : public Device {
   std::optional<PositionSample> read(LocalTime now) noexcept override;
   Vec3 apply(const Vec3& force) noexcept override;
 
-  /// v, in m/s. Realtime-safe.
-  static Vec3 velocity_for(const Config& config, const spacemouse::Axes& cap) noexcept;
+  static Vec3 velocity_for(const Config& config, const spacemouse::Axes& cap) noexcept;  ///< v, in m/s; realtime-safe
   /// ω, in rad/s. Realtime-safe.
   static Vec3 angular_velocity_for(const Config& config, const spacemouse::Axes& twist) noexcept;
 
@@ -83,7 +79,6 @@ class SpaceMouseDevice final : public Device {
 
 namespace spacemouse {
 
-/// A SpaceMouse in a scene.
 struct Config {
   std::string port{};  ///< from `tendond devices`; optional
   SpaceMouseDevice::Config motion{};

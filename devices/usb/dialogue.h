@@ -23,11 +23,9 @@ namespace tendon::usb {
 ///     may_send(…), send(…)             the next request
 ///
 /// **Requests.** Up to `Patience::most_under_way` requests can be pending, and an answer completes all of them. After
-/// `Patience::answer`, they are considered lost and another request can be sent. Requests that end a force are always
-/// sent immediately.
+/// `Patience::answer`, they are considered lost and another one can be sent. Requests that end a force never wait.
 ///
 /// **Force.** The device is assumed to render the last command until its own watchdog expires.
-///
 /// Thread-safe: `counts` only. Realtime-safe: all except the constructor.
 class Dialogue {
  public:
@@ -41,19 +39,16 @@ class Dialogue {
   /// After this time without an answer, the device is considered unplugged; without a plausible answer, its encoders
   /// have lost counts. If the loop itself was suspended, it first receives the pending answers.
   static constexpr Duration kLost = std::chrono::milliseconds(100);
-  /// Consecutive answers for detecting whether a device is homed, because a single byte may be corrupted.
-  static constexpr int kSure = 10;
+  static constexpr int kSure = 10;  ///< consecutive answers that it is homed; a single byte may be corrupted
 
   /// `watchdog` is the timeout of the device's own watchdog, or zero.
   explicit Dialogue(std::unique_ptr<Pipe> pipe, Duration watchdog = Duration::zero());
 
-  /// Begins a turn. Returns true if the connection has changed (see `connected`).
-  bool begin(LocalTime now) noexcept;
+  bool begin(LocalTime now) noexcept;  ///< of a turn; true if the connection has changed (see `connected`)
   bool connected() const noexcept { return connection_ != 0; }
   LocalTime now() const noexcept { return now_; }
 
-  /// Must be called after opening the device or setting it up. Clears all pending requests, and assumes that there is
-  /// no force.
+  /// Must be called after opening or setting up the device. Clears all pending requests, and assumes no force.
   void restart(const Patience& patience) noexcept;
   void set_patience(const Patience& patience) noexcept { patience_ = patience; }
 
@@ -63,10 +58,8 @@ class Dialogue {
     std::array<std::uint8_t, kPacketSize> packet;
     while (const std::size_t size = pipe_->read(packet)) take(std::span<const std::uint8_t>(packet).first(size));
   }
-  /// For each well-formed answer.
-  void hear() noexcept;
-  /// For each plausible answer, after `hear`.
-  void believe() noexcept;
+  void hear() noexcept;     ///< for each well-formed answer
+  void believe() noexcept;  ///< for each plausible answer, after `hear`
 
   Duration since_heard() const noexcept { return now_ - heard_; }
   bool silent() const noexcept { return since_heard() >= kLost; }
@@ -75,10 +68,8 @@ class Dialogue {
 
   bool awaits_answer() const noexcept { return under_way_ > 0; }
   bool holds_force() const noexcept;
-  /// `exerts` is true if the request commands a force other than zero.
-  bool may_send(bool exerts) const noexcept;
-  /// Returns false if the pipe does not have enough room.
-  bool send(std::span<const std::uint8_t> request, bool exerts) noexcept;
+  bool may_send(bool exerts) const noexcept;  ///< `exerts`: the request commands a nonzero force
+  bool send(std::span<const std::uint8_t> request, bool exerts) noexcept;  ///< false if the pipe has no room
 
   void reopen() noexcept { pipe_->reopen(); }
 

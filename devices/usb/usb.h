@@ -45,12 +45,10 @@ struct PipeConfig {
 
 /// Opens the device when it is plugged in, even repeatedly. Throws std::runtime_error if USB is not available.
 ///
-/// libusb is only called by a separate thread, which wakes up for each transfer. It queues 4 IN transfers and uses up
-/// to 4 OUT transfers, with a timeout of 100 ms. The threads share two rings and an eventfd, without locks or memory
-/// allocation.
+/// A separate thread calls libusb, and wakes up for each transfer. It queues 4 IN transfers and up to 4 OUT transfers,
+/// with a timeout of 100 ms. The threads share two rings and an eventfd, without locks or memory allocation.
 ///
-/// The destructor sends all packets that were accepted, waits until these transfers are completed or have failed,
-/// cancels all others, and closes the device.
+/// The destructor sends all accepted packets, waits for these transfers, cancels all others, and closes the device.
 std::unique_ptr<Pipe> open_pipe(const PipeConfig& config);
 
 }  // namespace tendon::usb

@@ -29,7 +29,6 @@ constexpr int kLookAgain_ms = 200;
 constexpr std::size_t kInPackets = 256;
 constexpr std::size_t kOutPackets = 16;
 
-/// Loaded when it is first used.
 struct Libusb {
   LateLibrary file{"libusb-1.0.so.0"};
   decltype(&::libusb_alloc_transfer) alloc_transfer = file["libusb_alloc_transfer"];
@@ -301,8 +300,7 @@ void LibusbPipe::tell(const std::string& why) {
 
 int LibusbPipe::open_node() {
   if (config_.node) return config_.node();
-  // A new context for each attempt. Existing contexts use udevd for finding new devices, which is missing in some
-  // containers and small systems.
+  // A new context for each attempt. Existing ones find new devices by udevd, which containers may lack.
   libusb_context* looking = nullptr;
   if (libusb().init(&looking) != LIBUSB_SUCCESS) return -1;
   const Context look(looking);

@@ -28,11 +28,9 @@
 /// All functions are thread-safe and realtime-safe.
 namespace tendon::woodenhaptics {
 
-/// Encoder counts without the overflow of 16 bits.
-using Counts = std::array<std::int32_t, 3>;
+using Counts = std::array<std::int32_t, 3>;  ///< of the encoders, without the overflow of 16 bits
 
-/// mA, for each motor.
-using Currents = std::array<std::int16_t, 3>;
+using Currents = std::array<std::int16_t, 3>;  ///< mA, for each motor
 
 Vec3 angles_at(const Model& model, const Counts& counts) noexcept;
 

@@ -13,13 +13,12 @@ namespace tendon::woodenhaptics {
 
 /// A body, and the motor driving it using a cable and a capstan.
 struct Joint {
-  double capstan;          ///< m, diameter
-  double body;             ///< m, diameter of its drum
-  double length;           ///< m
-  double torque_constant;  ///< N·m/A
-  int counts_per_turn;     ///< including quadrature
-  /// 1, or -1 where the source says "motor and body aligned".
-  int direction;
+  double capstan;            ///< m, diameter
+  double body;               ///< m, diameter of its drum
+  double length;             ///< m
+  double torque_constant;    ///< N·m/A
+  int counts_per_turn;       ///< including quadrature
+  int direction;             ///< 1, or -1 where the source says "motor and body aligned"
   std::int16_t calibration;  ///< count in the calibration pose
 };
 
@@ -27,20 +26,17 @@ struct Joint {
 struct Model {
   std::string_view name;
   std::array<Joint, 3> joints;
-  /// m, middle of the workspace, relative to the axis of A at the base
-  std::array<double, 3> origin;
-  double workspace_radius;  ///< m
-  double full_scale;        ///< A, at 90 % pulse width
-  double max_force;         ///< N
+  std::array<double, 3> origin;  ///< m, middle of the workspace, relative to the axis of A at the base
+  double workspace_radius;       ///< m
+  double full_scale;             ///< A, at 90 % pulse width
+  double max_force;              ///< N
 };
 
 std::span<const Model> models() noexcept;
 
-/// Returns null if there is no such model.
-const Model* find_model(std::string_view name) noexcept;
+const Model* find_model(std::string_view name) noexcept;  ///< null if there is no such model
 
-/// True for Polhem v2 and v3. The kinematics of their closed linkage ("polhem.h") were not published, so they are not
-/// supported: a force in a wrong direction would be dangerous.
+/// Polhem v2 and v3. The kinematics ("polhem.h") were not published, and forces in a wrong direction are dangerous.
 bool has_unpublished_kinematics(std::string_view name) noexcept;
 
 }  // namespace tendon::woodenhaptics

@@ -25,8 +25,7 @@ using woodenhaptics::Report;
 
 constexpr Currents kNoCurrent{};
 
-/// After power-on, the lamps of the board flash for a second. In the meantime it accepts a single report, and a second
-/// one would time out.
+/// After power-on, the lamps flash for a second. The board then accepts one report, and a second one would time out.
 constexpr usb::Dialogue::Patience kWhileItStarts{.most_under_way = 1, .answer = 1500ms};
 /// An answer takes 2 ms, a frame in each direction.
 constexpr usb::Dialogue::Patience kPatience{.most_under_way = 2, .answer = 5ms};
@@ -34,15 +33,11 @@ constexpr usb::Dialogue::Patience kPatience{.most_under_way = 2, .answer = 5ms};
 /// If the board still requests calibration, command 1 was replaced by a newer report.
 constexpr Duration kCalibrateAgain = 20ms;
 
-/// rad/s: 5 m/s at 0.1 m from the axis of the column, and more at the end of each link. Even a released handle does not
-/// move this fast within the workspace.
+/// rad/s: 5 m/s at 0.1 m from the axis of the column, more at the end of each link; no released handle is as fast.
 constexpr double kMostSpeed = 50;
-/// rad/s, while the arm is held in its calibration pose.
-constexpr double kStillSpeed = 2;
-/// For reports that arrive at irregular intervals.
-constexpr double kMoreCounts = 30;
-/// A quarter turn of a 16-bit counter, beyond which the direction is ambiguous.
-constexpr double kMostStep = 16'384;
+constexpr double kStillSpeed = 2;     ///< rad/s, while the arm is held in its calibration pose
+constexpr double kMoreCounts = 30;    ///< for reports that arrive at irregular intervals
+constexpr double kMostStep = 16'384;  ///< a quarter turn of a 16-bit counter, beyond which the direction is ambiguous
 
 const Model& checked(const Model* model) {
   if (model == nullptr) throw std::invalid_argument("woodenhaptics.model = none: expected one of models()");

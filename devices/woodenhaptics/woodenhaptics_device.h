@@ -26,33 +26,28 @@ namespace tendon {
 ///
 /// **Calibration.** The operator holds the arm in its calibration pose (see the README) and presses the button on the
 /// board. After ten consecutive reports of this, the driver sends command 1, which sets the counters. After ten
-/// consecutive reports with these counters, the device is homed. Calibration is always required, because a board does
-/// not indicate whether it was reset.
+/// consecutive reports with these counters, the device is homed. Always required: boards do not report resets.
 ///
 /// **Requests.** The firmware uses the newest request and answers all of them. Up to two can be pending, which is
 /// required for 1 kHz on a full-speed bus; a zero force is always sent immediately (`usb::Dialogue`). Currents are only
-/// different from zero in kHomed, while there are plausible reports (at least every 10 ms). A report is not plausible
-/// if a hand cannot move the encoders as fast.
+/// nonzero in kHomed, while there are plausible reports (at least every 10 ms), which a hand could cause.
 ///
 /// **Watchdog.** The firmware disables the amplifiers 0.5 s after the last valid report, starting with the first one.
 /// `apply` assumes that older currents have ended.
 ///
 /// Positions are relative to the middle of the workspace, in the frame of kinematics.h. Samples use the time of `read`,
 /// but are about 1 ms older. Button 0 is the switch at the tip.
-///
 /// Thread-safe: `counts` and `state` only. Realtime-safe: `read`, `apply`, `counts`.
 class WoodenHapticsDevice final : public Device {
  public:
-  /// Used in mbed's examples, and possibly by other devices.
-  static constexpr usb::Id kId{0x1234, 0x0006};
-  static constexpr std::uint8_t kIn = 0x81;  ///< EP1 of the LPC1768: 64 bytes per ms
+  static constexpr usb::Id kId{0x1234, 0x0006};  ///< used in mbed's examples, and possibly by other devices
+  static constexpr std::uint8_t kIn = 0x81;      ///< EP1 of the LPC1768: 64 bytes per ms
   static constexpr std::uint8_t kOut = 0x01;
   static constexpr Duration kWatchdog = std::chrono::milliseconds(500);
 
   struct Config {
     const woodenhaptics::Model* model = nullptr;  ///< one of `models()`
-    /// A, for each motor; > 0, at most the model's full scale. As in the published host, the default is the maximum
-    /// continuous current of the smaller amplifier (ESCON 24/4).
+    /// A, per motor; > 0, at most full scale. Default as in the published host: the continuous current of ESCON 24/4.
     double max_current = 2.0;
   };
 
@@ -101,13 +96,12 @@ class WoodenHapticsDevice final : public Device {
 
 namespace woodenhaptics {
 
-/// A WoodenHaptics or similar device in a scene.
+/// A WoodenHaptics or similar device in a scene (driver.h). `stand_in` and `make` require a model.
 struct Config {
   std::string port{};  ///< from `tendond devices`; optional
   WoodenHapticsDevice::Config drive{};
 };
 
-// See driver.h. `stand_in` and `make` require a model.
 const Driver& driver(const Config& config);
 SimulatedDevice::Config stand_in(const Config& config);
 std::unique_ptr<Device> make(const Config& config, FromOutside outside);
