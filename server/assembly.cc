@@ -16,8 +16,7 @@ namespace tendon {
 
 namespace {
 
-/// The time budget for one step of a device. The most expensive scene that is shipped uses half of it (`tendond explain
-/// deploy/scenes/mechanism.toml`: 9.8 µs).
+/// For one step of a device. The most expensive scene uses half (tendond explain deploy/scenes/mechanism.toml: 9.8 µs).
 constexpr auto kStepBudget = std::chrono::microseconds(20);
 
 /// Returns the number of devices per thread. These are whole banks, so that all states of a session are sent together.
@@ -113,7 +112,7 @@ Assembly::DeviceLoop::DeviceLoop(const Part& part, const Mailboxes::Capacities& 
       haptic(scene.loop, safe != nullptr ? *safe : device, mail, part.heart) {}
 
 LocalTime Assembly::HapticGroup::turn(LocalTime now) noexcept {
-  // All devices get the same `now` and have the same period, so they stay due at the same time.
+  // All devices have the same period and get the same `now`, so they stay due at the same time.
   LocalTime due = now;
   for (DeviceLoop* const device : devices) due = device->haptic.step(now);
   return due;
@@ -206,8 +205,8 @@ std::size_t Assembly::first_device(std::size_t network) const noexcept {
   return shard.first_device(devices_.size());
 }
 
-/// Only the first network loop receives Hellos (UdpLink::several). The others process theirs in the next turn, after
-/// the next haptic step at the latest. If the queue is full, the client must repeat the Hello.
+/// Only the first network loop receives Hellos (UdpLink::several), and hands them to the others, which process them in
+/// the next turn, after the next haptic step at the latest. If the queue is full, the client must repeat the Hello.
 LocalTime Assembly::turn_network(std::size_t number, LocalTime now) {
   Network& network = networks_.at(number);
   while (const HandedHello* const hello = network.hellos.front()) {

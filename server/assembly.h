@@ -26,12 +26,11 @@ std::uint32_t loop_hz(const Scene& scene);
 
 /// Creates and connects the loops of a server. It uses no threads, sockets or clocks: `Server` calls the loops from its
 /// threads, and simulated worlds and tests call them in virtual time.
-///
 /// Thread-safe: each haptic group, each network loop and the log loop can be used in a separate thread (THREADS.md).
 /// Realtime-safe: only HapticGroup.
 class Assembly {
  public:
-  /// The configuration of one device. The pointers and references must outlive the assembly.
+  /// The pointers and references must outlive the assembly.
   struct Part {
     Scene scene;
     Device& device;
@@ -43,13 +42,13 @@ class Assembly {
   };
 
   struct Config {
-    /// The values that are not in a scene. The constructor sets the devices, the shard, and the values that are in the
-    /// first scene. It removes the suites that this scene does not allow.
+    /// The values that are not in a scene. The constructor sets the devices, the shard and the values of the first
+    /// scene, and removes the suites that it does not allow.
     NetworkLoop::Config network{};
     LocalTime now{};
     std::uint64_t epoch = 1;  ///< must be higher than in all previous runs (EnergyTank)
-    /// If this is set, the mailboxes have this size, and the caller must empty them instead of the LogLoop. There are
-    /// datagrams in them if there is space for more than one. Nothing is recorded.
+    /// If this is set, the mailboxes have this size, the caller must empty them instead of the LogLoop, and nothing is
+    /// recorded. They store datagrams if there is space for more than one.
     std::optional<Mailboxes::Capacities> watched{};
   };
 
@@ -68,16 +67,15 @@ class Assembly {
     std::vector<std::size_t> networks{};
     std::atomic<bool> not_realtime{false};  ///< true if the thread did not get its priority
 
-    /// Steps each device. Returns the time of the next call.
-    LocalTime turn(LocalTime now) noexcept;
+    LocalTime turn(LocalTime now) noexcept;  ///< steps each device; returns the time of the next call
     void stop() noexcept;
-    /// Sets all forces to zero. Devices that have a safety layer must be armed again.
+    /// Sets all forces to zero. Devices with a safety layer must be armed again.
     void stand_still() noexcept;
   };
 
   /// Creates a network loop for each link. The number of links must be a power of two, and they must outlive the
-  /// assembly. Throws std::invalid_argument if the processor does not support any suite of the scene, and the errors of
-  /// the loops. The recording is only opened if everything else succeeds.
+  /// assembly. The recording is opened last. Throws std::invalid_argument if the processor does not support any suite
+  /// of the scene, and the errors of the loops.
   Assembly(std::vector<Part> parts, const Config& config, const std::vector<Link*>& links);
   Assembly(const Assembly&) = delete;  // its loops refer to each other
   Assembly& operator=(const Assembly&) = delete;

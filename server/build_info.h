@@ -6,8 +6,7 @@
 
 namespace tendon {
 
-/// Version and commit of this build, stored in recordings and tables. They are defined in a separate file so that a new
-/// commit recompiles only that file.
+/// Stored in recordings and tables. Defined in a separate file, the only one that a new commit recompiles.
 extern const std::string_view kVersion;  ///< project() version in CMakeLists.txt, e.g. 0.1.0
 extern const std::string_view kCommit;   ///< 12 hex digits, or "unknown" if built without git
 

@@ -19,8 +19,7 @@
 namespace tendon {
 namespace {
 
-/// This must be higher than the priority of the haptic thread, which waits for the USB thread.
-constexpr int kUsbPriority = kHapticPriority + 5;
+constexpr int kUsbPriority = kHapticPriority + 5;  ///< must be higher, because the haptic thread waits for USB
 
 std::function<void(int)> notify_guardian(Guardian& guardian, const Scene& scene, const Driver& driver) {
   static_assert(limits::kMaxDevices <= Guardian::kDevices);

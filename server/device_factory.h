@@ -10,13 +10,12 @@
 
 namespace tendon {
 
-/// Creates the guardian process, which sets the forces of real devices to zero if this process dies. Returns null if no
-/// scene has a device with motors.
+/// Creates the guardian process (devices/safety/guardian.h). Returns null if no scene has a device with motors.
 std::unique_ptr<Guardian> make_guardian(const std::vector<Scene>& scenes);
 
-/// Creates the device of `scene`. A USB device is opened by its own thread as soon as it is plugged in, and is
-/// registered with `guardian` if it has motors. Throws std::runtime_error with a message for the operator if a file
-/// that the scene names cannot be read or if this machine has no USB.
+/// Creates the device of `scene`. A USB device is opened by its own thread as soon as it is plugged in, and registered
+/// with `guardian` if it has motors. Throws std::runtime_error with a message for the operator if a file that the scene
+/// names cannot be read or if this machine has no USB.
 std::unique_ptr<Device> make_device(const Scene& scene, Guardian* guardian);
 
 }  // namespace tendon

@@ -15,10 +15,8 @@
 
 namespace tendon {
 
-/// Reads the device, runs the control law, and applies the force.
-///
-/// The function `step` must be called by a single thread, which should only sleep and read the clock between calls.
-///
+/// Reads the device, runs the control law, and applies the force. `step` must be called by a single thread, which
+/// should only sleep and read the clock between calls.
 /// Thread-safe: `stats` and `health` can be called from any thread, everything else only from the haptic thread.
 /// Realtime-safe: yes. No heap allocation, lock, log output or socket (see tests/realtime).
 class HapticLoop {
@@ -40,13 +38,11 @@ class HapticLoop {
     double force = 0;  ///< N, norm of the force that the device applies
   };
 
-  /// All references must outlive the loop. `heart` is null if there is no guardian. Throws std::invalid_argument if the
-  /// configuration is invalid.
+  /// The references must outlive the loop. `heart` can be null. Throws std::invalid_argument if `config` is invalid.
   HapticLoop(const Config& config, Device& device, Mailboxes& mail, Heartbeat* heart = nullptr);
 
-  /// Performs one haptic step and returns the time of the next one: the scheduled time of this step plus one period. If
-  /// this step was late by a period or more, the next one is due at `now` + period. This function does not catch up on
-  /// missed steps.
+  /// Performs one step and returns the time of the next one: the scheduled time of this step plus one period, or `now`
+  /// + period if this step was late by a period or more. Does not catch up on missed steps.
   LocalTime step(LocalTime now) noexcept;
 
   /// Sets the force to zero. Must be called before the haptic thread ends or is suspended.

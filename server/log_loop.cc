@@ -140,8 +140,7 @@ void LogLoop::say(Level level, const DeviceLog& device, const std::string& text)
   say(level, devices_.size() == 1 ? text : device.of.scene.name + ": " + text);
 }
 
-/// Returns the number of steps lost since the last call. This includes steps with missing ports because they cannot be
-/// replayed.
+/// Returns the number of steps lost since the last call, including steps with missing ports, which cannot be replayed.
 std::uint64_t LogLoop::record_steps(std::size_t number) {
   DeviceLog& device = devices_[number];
   Mailboxes& mail = device.of.mail;
@@ -227,8 +226,7 @@ void LogLoop::report_health(LocalTime now, std::uint64_t unsent, DeviceLog& devi
   device.of.mail.health.put(health);
 }
 
-/// Devices on the same thread are late together, so they share a line. It contains the largest number of overruns of
-/// a single device.
+/// Devices on the same thread are late together, so they share a line, with the largest number of overruns of a device.
 void LogLoop::report_overruns(LocalTime now, ThreadLog& thread) {
   std::uint64_t most = 0;
   Duration longest{};
@@ -252,8 +250,7 @@ void LogLoop::report_trouble(DeviceLog& device) {
   report_counts(device);
   const HapticLoop::Stats now = device.of.haptic.stats();
   if (now.device != device.reported.haptic.device) say(Level::kInfo, device, describe(now.device, device.of.scene));
-  // Each fault of the controller or of the safety layer freezes the flight recorder once, and saving thaws it.
-  // report_safety names the faults of the safety layer.
+  // Each fault freezes the recorder once, and saving thaws it. report_safety names the faults of the safety layer.
   if (takes_records_ && device.of.mail.flight.frozen()) {
     if (now.fault != HapticController::Fault::kNone) {
       say(Level::kError, device,

@@ -21,18 +21,14 @@
 namespace tendon {
 
 /// Records the steps, ports and datagrams from the mailboxes, passes the health of each device to the network loops
-/// (Mailboxes::health), and collects messages for the log.
-///
-/// One thread calls `turn` every kPeriod while the other loops run, and `close` after they have ended.
-///
-/// Thread-safe: no. Realtime-safe: no.
+/// (Mailboxes::health), and collects messages for the log. One thread calls `turn` every kPeriod while the other loops
+/// run, and `close` after they have ended. Thread-safe: no. Realtime-safe: no.
 class LogLoop {
  public:
   static constexpr Duration kPeriod = std::chrono::milliseconds(20);
-  /// The minimum time between reports of the same problem.
-  static constexpr Duration kTroublePeriod = std::chrono::seconds(1);
+  static constexpr Duration kTroublePeriod = std::chrono::seconds(1);  ///< between reports of the same problem
 
-  /// A device and its loop, which runs in another thread. The references must outlive the LogLoop.
+  /// The references must outlive the LogLoop.
   struct Watched {
     const Scene& scene;
     const Device& device;
@@ -49,25 +45,22 @@ class LogLoop {
     std::string text;
   };
 
-  /// If this is kTaken, the steps, ports, datagrams and flights are removed from the mailboxes and recorded. If this is
-  /// kLeft, they are not removed.
+  /// kTaken removes the steps, ports, datagrams and flights from the mailboxes and records them. kLeft leaves them.
   enum class Records : std::uint8_t { kTaken, kLeft };
 
-  /// The recording is configured by the first scene. `recorded` lists the mailboxes with the datagrams of each network
-  /// loop. Throws the errors of PartRecorder.
+  /// The first scene configures the recording. `recorded` lists the mailboxes with the datagrams of each network loop.
+  /// Throws the errors of PartRecorder.
   LogLoop(const std::vector<Watched>& devices, const std::vector<Mailboxes*>& recorded, LocalTime started,
           Records records = Records::kTaken);
 
-  /// `unsent` is the number of datagrams that the system has refused to send. Returns the time of the next call.
+  /// `unsent` counts the datagrams that the system has refused to send. Returns the time of the next call.
   LocalTime turn(LocalTime now, std::uint64_t unsent);
 
   void close(LocalTime now, std::uint64_t unsent);
 
-  /// Returns the messages since the last call, in order.
-  std::vector<Notice> take_notices();
+  std::vector<Notice> take_notices();  ///< since the last call, in order
 
-  /// Empty if nothing is recorded.
-  std::optional<PartRecorder::Status> recording() const;
+  std::optional<PartRecorder::Status> recording() const;  ///< empty if nothing is recorded
 
  private:
   struct Reported {

@@ -60,11 +60,9 @@ struct HandedHello {
 /// The data that the haptic thread of one device exchanges with the other threads of the server. There is no other
 /// shared state, and no locks are used. server/THREADS.md, "Queues", lists who writes and who reads each of them, and
 /// what happens if it is full. The name of a solver path in `ways` is written before the first force with its number.
-///
-/// All memory is allocated by the constructor, before the loops run.
+/// The constructor allocates all memory, before the loops run.
 struct Mailboxes {
-  /// Numbers of elements, which must be powers of two. The default values are used if the server records, and require
-  /// about 19 MB.
+  /// Numbers of elements, which must be powers of two. The defaults are for a server that records: about 19 MB.
   struct Capacities {
     std::size_t steps = 16384;  ///< 16 s at 1 kHz, for slow disks
     std::size_t ports = 1;      ///< for each coupling
@@ -72,9 +70,8 @@ struct Mailboxes {
     std::size_t datagrams = 4096;
     bool flight_handles = true;  ///< if false, only positions are stored
 
-    /// The capacities for each device of a server that records. If there are more than 16 devices, the total size of
-    /// the step queues is the same as for 16 devices. For example, 512 devices have queues of 512 steps, which is half
-    /// a second at 1 kHz.
+    /// For each device of a server that records. For more than 16 devices, the total size of the step queues is the
+    /// same as for 16. For example, 512 devices have queues of 512 steps, which is half a second at 1 kHz.
     static Capacities recorded(std::size_t devices) {
       constexpr Capacities kOfFew;
       const std::size_t share =
@@ -82,17 +79,15 @@ struct Mailboxes {
       return {.steps = std::bit_floor(share), .ports = std::bit_floor(share)};
     }
 
-    /// The capacities for each device of a server that does not record. The steps are not used. The size of the port
-    /// queue is at least 125 ms because the log thread only reads it every 20 ms. The total size is 0.8 MB if the
-    /// device only measures its position.
+    /// For each device of a server that does not record. The steps are not used. The port queue lasts at least 125 ms,
+    /// because the log thread only reads it every 20 ms. In total 0.8 MB, if the device only measures its position.
     static Capacities unrecorded(Duration period) {
       const auto ports = static_cast<std::size_t>(std::max<Duration::rep>(std::chrono::milliseconds(125) / period, 1));
       return {.steps = 1, .ports = std::bit_ceil(ports), .datagrams = 1};
     }
   };
 
-  /// More orders than clients can cause within one haptic step.
-  static constexpr std::size_t kOrders = 16;
+  static constexpr std::size_t kOrders = 16;  ///< more than clients can cause within one haptic step
 
   explicit Mailboxes(const Capacities& capacities)
       : steps(capacities.steps),

@@ -76,8 +76,8 @@ class Lines {
   std::vector<Json> early_;
 };
 
-/// Returns the globally unique name of a session, with 32 hexadecimal digits like a trace id. `run` is a random id of
-/// this run. The last eight digits are the connection id, as found in recorded datagrams.
+/// Returns the globally unique name of a session: 32 hexadecimal digits like a trace id. `run` is a random id of this
+/// run. The last eight digits are the connection id, as found in recorded datagrams.
 std::string session_name(std::span<const std::byte> run, std::uint32_t connection) {
   std::string name;
   const auto add = [&name](unsigned byte) {
@@ -132,8 +132,7 @@ void stop_this_process(Server& server, UnblockedOutput& output) {
   log::info("continued after SIGCONT");
 }
 
-// Waits for a signal or, if `duration_s` is not zero, for this time, and notifies the watchdog of the service manager.
-// Returns the reason for the shutdown.
+// Waits for a signal or for `duration_s` if not zero, and notifies the service manager. Returns the reason to stop.
 std::string wait_for_the_end(const sigset_t& signals, double duration_s, Server& server, UnblockedOutput& output) {
   constexpr Duration kLongestWait = std::chrono::hours(1);
   const std::optional<Duration> watched = service::watch_period();
@@ -281,8 +280,7 @@ int run(const std::vector<Scene>& scenes, double duration_s, bool json) {
   sigset_t blocked = signals;
   sigaddset(&blocked, SIGCONT);
   pthread_sigmask(SIG_BLOCK, &blocked, nullptr);
-  // If these signals were not ignored, a background process would be stopped when it writes to a terminal with `stty
-  // tostop`.
+  // Otherwise, a background process would be stopped when it writes to a terminal with `stty tostop`.
   std::signal(SIGTTOU, SIG_IGN);
   std::signal(SIGTTIN, SIG_IGN);
   // A full recording or a closed log must not end the process.
@@ -291,8 +289,7 @@ int run(const std::vector<Scene>& scenes, double duration_s, bool json) {
 
   use_small_stacks();
   UnblockedOutput output;
-  // This must outlive the server.
-  Lines lines;
+  Lines lines;  // must outlive the server
   std::array<std::byte, 12> name_of_run;
   fill_random(name_of_run);
   Server server(scenes);
@@ -383,8 +380,8 @@ void dial_instead(std::vector<Scene>& scenes, const Address& server) {
   found->teleoperation->dial = server;
 }
 
-/// Returns the changes as settings of the scene, so that they are recorded. Couplings also run without their energy
-/// accounts and delay adaptation, because these need a limiter.
+/// Returns settings for the scene, so that they are recorded. Couplings also run without their energy accounts and
+/// delay adaptation, which need a limiter.
 std::vector<std::string> without_limiter_settings(const Scene& scene) {
   if (scene.driver().moves_a_hand) {
     throw std::invalid_argument("--without-limiter: expected simulated devices only, found " + scene.name + ", a " +

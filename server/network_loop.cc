@@ -31,7 +31,6 @@ void note_unknown_key(std::vector<NetworkLoop::Notice>& notices, const Address& 
   }
 }
 
-/// Returns null if the current datagram contains no echo of ours.
 const ClockExchange* exchange_of(LocalTime now, const ServedClient& client) {
   const auto& exchange = client.session.newest_exchange();
   return exchange && exchange->answered_at == now ? &*exchange : nullptr;
@@ -63,7 +62,7 @@ NetworkLoop::NetworkLoop(const Config& config, Link& link, LocalTime now)
 }
 
 LocalTime NetworkLoop::turn(LocalTime now) {
-  // Send the newest states before making any system call to receive.
+  // Send the newest states before any system call to receive.
   publish(now);
   const bool more = drain(now);
   report(now);
@@ -165,8 +164,7 @@ DatagramFilter::Sender NetworkLoop::sender_of(const ServerHandshake::Client& cli
   return client.key != nullptr || let_in ? kClient : kUnauthenticated;
 }
 
-/// Repeats the answer if the first one was lost. In suite 1 the request may come from any address, because only the
-/// holder of the ephemeral key can use the answer.
+/// Repeats a lost answer, in suites 1 and 2 to any address, because only the ephemeral key's holder can use it.
 bool NetworkLoop::answer_again(LocalTime now, const Address& from, const ServerHandshake::Client& client) {
   for (const auto* list : {&clients_, &half_open_}) {
     for (const ServedClient& present : *list) {
@@ -330,7 +328,7 @@ void NetworkLoop::adapt(LocalTime now, ServedClient& client) {
   }
 }
 
-/// Passes the timing of the datagram on before the forces in it are judged.
+/// Passes on the timing of the datagram before the forces in it are judged.
 void NetworkLoop::hear(LocalTime now, ServedClient& client) {
   const ClockExchange* const exchange = exchange_of(now, client);
   const auto sent = exchange != nullptr ? std::optional(exchange->answered) : std::nullopt;
@@ -358,7 +356,7 @@ void NetworkLoop::report(LocalTime now) {
   for (std::string& warning : sums.warnings) notice(true, std::move(warning));
 }
 
-/// The states are sent before the next client is processed to reduce the latency.
+/// Sends the states before the next client is processed, to reduce the latency.
 void NetworkLoop::publish(LocalTime now) {
   ports_.publish(now);
   for (std::size_t index = 0; index < states_.size(); ++index) {
@@ -472,8 +470,7 @@ void NetworkLoop::take_force(LocalTime now, ServedClient& client, const ForceCom
   ++stats_.forces;
 }
 
-/// Counts the forces that the session has refused. The channel is not known, so the force is counted for all channels
-/// of the client.
+/// Counts the forces that the session has refused for all channels of the client, because their channel is not known.
 void NetworkLoop::take_refused(ServedClient& client) {
   const RefusedForces& all = client.session.stats().refused_forces;
   const auto take = [&](std::uint64_t RefusedForces::*count, Lateness::Cause cause) {

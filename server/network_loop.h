@@ -29,46 +29,37 @@ namespace tendon {
 
 /// Admits clients, passes their forces to the haptic loops, and sends them the states of the devices.
 ///
-/// The function `turn` should be called by a single thread if a datagram has arrived, if a haptic loop has made a step,
-/// or if the time returned by the previous call has been reached.
+/// `turn` should be called by a single thread if a datagram has arrived, if a haptic loop has made a step, or at the
+/// time returned by the previous call. Each turn drains the link to avoid queueing delays. If there are several forces
+/// for a channel, only the newest one is used. All requests are answered (SESSION.md).
 ///
-/// Each turn drains the link to avoid queueing delays. If there are several forces for a channel, only the newest one
-/// is used. All requests are answered. SESSION.md describes sessions, leases and reports.
+/// A large server can split its devices between loops (Shard), each with its own thread and link and no other shared
+/// state. One loop receives all Hellos; the owner must forward those for others (take_foreign, receive_foreign).
 ///
-/// The devices of a large server can be split between several loops (Shard). Each loop has its own thread and its own
-/// link, and there is no other shared state. All Hellos are received by one of the loops. If a Hello is intended for
-/// another loop, it must be forwarded by the owner of the loops (take_foreign, receive_foreign).
-///
-/// The logic is implemented in separate files in clients/. See admission.h for new sessions, leases.h for the holders
-/// of channels, requests.h for the requests of clients, lateness.h for the causes of late forces, and reports.h for
-/// periodic reports. This class is only responsible for the datagrams.
-///
+/// This class is only responsible for the datagrams. The logic is in clients/: admission.h for new sessions, leases.h
+/// for the holders of channels, requests.h for requests, lateness.h for late forces, reports.h for periodic reports.
 /// Thread-safe: no. Realtime-safe: no.
 class NetworkLoop {
  public:
   struct Config {
     Bytes32 secret{};  ///< for cookies and ephemeral keys; random at each start, equal for all shards
-    /// If this is empty, all clients on this machine are admitted, and sessions are not encrypted.
+    /// If empty, all clients on this machine are admitted, and sessions are not encrypted.
     std::vector<ClientKey> keys{};
     Suites suites = suites_of_this_machine();  ///< allowed for these sessions
-    /// Returns true if the operating system has checked the permissions of the sender (UnixSocket::is_peer), so that
-    /// the client needs no key. Can be null.
+    /// True if the system has checked the sender (UnixSocket::is_peer), so that it needs no key. Can be null.
     bool (*needs_no_key)(const Address& from) noexcept = nullptr;
     Shard shard{};                          ///< `devices` contains the devices of all shards
     std::uint32_t first_connection_id = 1;  ///< should be random at each start
     std::string server_name = "tendond";
     std::vector<ServedDevice::Config> devices{};  ///< at most kMostDevices
-    /// The clients that can take a channel before its lease has expired. If keys are configured, these are the names of
-    /// keys. Otherwise, they are the names of clients.
+    /// Names of the keys, or of the clients if there are no keys, that can take a channel before its lease has expired.
     std::vector<std::string> takeover{};
-    /// Each observer costs this thread one state datagram of about 250 bytes per haptic step. If there are several
-    /// keys, one key can have at most half of the places, rounded up.
+    /// Each costs this thread about 250 bytes per haptic step. One of several keys can have at most half, rounded up.
     std::size_t max_observers = 8;
     Duration controller_timeout = std::chrono::seconds(2);
     Duration observer_timeout = std::chrono::seconds(10);
-    /// The maximum number of half-open sessions. If it is exceeded, the oldest one is removed. The limit is required
-    /// because an attacker can replay a Hello. It is larger than the number of clients that are expected to connect
-    /// within one round trip.
+    /// If there are more half-open sessions, the oldest one is removed. The limit is required because an attacker can
+    /// replay a Hello. It is larger than the number of clients that are expected to connect within one round trip.
     std::size_t max_half_open = 16;
     Duration half_open_timeout = std::chrono::seconds(5);
     Rekey rekey{};  ///< when sealed sessions change their keys
@@ -76,9 +67,8 @@ class NetworkLoop {
     /// Reduces the state rate of a client whose link is congested (RateAdaptation). If a tenth of the datagrams is lost
     /// even at the lowest rate, the client's forces are not used, and the device makes a safe stop.
     bool adapt_state_rate = false;
-    /// Limits the datagrams in one turn, so that a flood does not delay the states.
-    std::size_t max_datagrams = 256;
-    bool record = true;  ///< if false, datagrams are not passed to the log thread
+    std::size_t max_datagrams = 256;  ///< in one turn, so that a flood does not delay the states
+    bool record = true;               ///< if false, datagrams are not passed to the log thread
     DatagramFilter::Config recorded{};
   };
 
@@ -107,17 +97,14 @@ class NetworkLoop {
     std::vector<std::byte> hello{};
   };
 
-  /// Datagrams are recorded through the mailboxes of the first device of the shard. `link` must outlive the loop.
-  /// Throws the errors of served_devices().
+  /// The shard's first mailboxes record datagrams. `link` must outlive the loop. Throws the errors of served_devices().
   NetworkLoop(const Config& config, Link& link, LocalTime now);
   NetworkLoop(const NetworkLoop&) = delete;  // leases_ refers to devices_
   NetworkLoop& operator=(const NetworkLoop&) = delete;
 
-  /// Processes everything that is due. Returns the latest time of the next call.
-  LocalTime turn(LocalTime now);
+  LocalTime turn(LocalTime now);  ///< processes what is due; returns the latest time of the next call
 
-  /// Closes all sessions with a Bye. No other call may follow.
-  void close(LocalTime now);
+  void close(LocalTime now);  ///< all sessions with a Bye; no other call may follow
 
   /// Returns the Hellos for other shards since the last call, at most 64. Clients repeat lost Hellos.
   std::vector<Foreign> take_foreign();
@@ -161,7 +148,7 @@ class NetworkLoop {
   SessionChange change_of(const ServedClient& client, bool came, const std::string& why) const;
   void notice(bool warning, std::string text, std::optional<SessionChange> session = std::nullopt);
 
-  /// This is stored in a separate array because it is used in every turn (cache locality).
+  /// In a separate array because it is used in every turn (cache locality).
   struct NewestState {
     Latest<DeviceState>* box;
     const DeviceState* fresh = nullptr;  ///< null if not updated

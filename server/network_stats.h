@@ -14,7 +14,7 @@
 
 namespace tendon {
 
-/// The counters of a network loop since the start of the server.
+/// All counters start at 0 when the server starts.
 struct NetworkStats {
   struct Dropped {
     std::uint64_t duplicated = 0;
@@ -46,8 +46,7 @@ struct NetworkStats {
   std::uint64_t unknown_connection = 0;  ///< Data with an unknown connection id or the wrong address
   ServerHandshake::Stats hellos;         ///< Hellos that were not answered with a Welcome or a Refused
   std::uint64_t forces = 0;
-  /// Forces and requests that need a channel, from clients that do not hold it. Includes torques and grip forces from
-  /// clients without the feature `handle`.
+  /// Forces and requests without the required channel, and torques and grip forces without the feature `handle`.
   std::uint64_t denied = 0;
   std::uint64_t unanswerable = 0;  ///< forces that answer an unknown or very old tick
   // Forces that arrived after the previous one had expired, by cause (Lateness):

@@ -332,8 +332,7 @@ void Server::run_network(NetworkThread& network) {
   publish_notices(network);
 }
 
-/// Polls without sleeping until a datagram is available, the doorbell has rung, or `due` has been reached. Returns the
-/// current time.
+/// Polls until a datagram is available, the doorbell has rung, or `due` has been reached. Returns the current time.
 LocalTime Server::watch_until(NetworkThread& network, LocalTime due) {
   LocalTime now = clock::now();
   while (now < due && !network.bell.rung() && !network.busy_link.look(now)) {

@@ -53,29 +53,25 @@ class Server {
   Server& operator=(const Server&) = delete;
 
   /// Starts the threads. If the system refuses one, stops the others and throws std::runtime_error with a message for
-  /// the operator. If `run_for` is set, each haptic thread ends after this time and sets the force to zero. The number
-  /// of steps is run_for / period, or less if there were delays.
+  /// the operator. With `run_for`, each haptic thread ends after this time and sets the force to zero, after run_for /
+  /// period steps, or fewer if there were delays.
   void start(std::optional<Duration> run_for = std::nullopt);
 
-  /// Sets the function that is called if a session is opened or closed, even if it is closed by stop(). It is called
-  /// from the network threads, but never concurrently. It should not block. This must be called before `start`.
+  /// Sets the function that is called if a session is opened or closed, even by stop(). The network threads call it,
+  /// but never concurrently. It should not block. Must be called before `start`.
   void on_sessions(std::function<void(const NetworkLoop::SessionChange&)> tell) { on_session_ = std::move(tell); }
 
-  /// Sets all forces to zero and blocks the haptic threads until `resume` is called. Waits at most 100 ms for the
-  /// threads. Devices with a safety layer must be armed again.
+  /// Sets all forces to zero and blocks the haptic threads until `resume`, within 100 ms. Safety layers are disarmed.
   void suspend();
   void resume();
 
-  /// Sets the forces to zero, then closes the sessions, then closes the recording.
-  Summary stop();
+  Summary stop();  ///< sets the forces to zero, then closes the sessions, then the recording
 
-  /// Returns true if every haptic loop has made a step since the last call.
-  bool turning();
+  bool turning();  ///< true if every haptic loop has made a step since the last call
 
   Address address() const { return networks_.front()->link->local_address(); }
 
-  /// Returns the path of the recording, which differs from the path in the scene if that file already exists. Empty if
-  /// nothing is recorded. Must be called before `start`.
+  /// The path of the recording, if any. It differs from the scene's if that file exists. To be called before `start`.
   std::optional<std::filesystem::path> recording() const;
 
  private:

@@ -10,8 +10,7 @@
 
 namespace tendon {
 
-/// Limits how often a recurring problem is logged: the first occurrence immediately, then the number of occurrences
-/// once per minute.
+/// Logs the first occurrence of a problem immediately, then the number of occurrences once per minute.
 class TroubleSum {
  public:
   static constexpr Duration kPeriod = std::chrono::minutes(1);

@@ -28,7 +28,7 @@ bool may(const ClientKey* key, Role role) {
 const std::string& name_of(const ServedDevice::Config& device) { return device.about.name; }
 const std::string& name_of(const ChannelDescription& channel) { return channel.name; }
 
-/// If the name is empty, this is the first entry.
+/// An empty name finds the first entry.
 template <class Named>
 std::optional<std::uint32_t> find_by_name(const std::vector<Named>& all, const std::string& name) {
   if (name.empty()) return 0;
@@ -133,7 +133,7 @@ std::optional<Refusal> Admission::reason_to_refuse(const Address& from, const Cl
   }
   std::size_t channels = 0;
   for (const ServedDevice& device : devices) channels += device.channels.size();
-  // A controller that is waiting for a lease requires as many states as an observer.
+  // A controller that waits for a lease receives as many states as an observer.
   const std::size_t all = count([](const ServedClient&) { return true; });
   if (all >= config_.max_observers + channels) {
     return Refusal{Code::kBusy, "there are " + std::to_string(all) + " clients already"};

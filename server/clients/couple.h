@@ -8,12 +8,10 @@
 
 namespace tendon {
 
-/// Device and channel are not set.
-Couple couple_of(const Coupling::Config& config);
+Couple couple_of(const Coupling::Config& config);  ///< device and channel are not set
 
-/// Returns the first difference between the configurations of both ends, for example "method: position-force in
-/// your scene, position-position in the scene of the other server", or an empty string. The relative tolerance for
-/// numbers is 1e-9.
+/// Returns the first difference between the configurations of both ends, for example "method: position-force in your
+/// scene, position-position in the scene of the other server", or an empty string. Tolerance: 1e-9, relative.
 std::string first_difference(const Couple& theirs, const Couple& mine);
 
 }  // namespace tendon

@@ -15,13 +15,12 @@ namespace tendon {
 
 class Features {
  public:
-  /// The optional features that are supported by this server. The order determines the bits.
+  /// The optional features of this server. The order determines the bits.
   static constexpr std::array kSupported = {kFeatureLocalModel, kFeatureChannels,     kFeatureDiagnostics,
                                             kFeatureHandle,     kFeatureJoints,       kFeatureTeleoperation,
                                             kFeatureOutputs,    kFeatureStateColumns, kFeatureWays};
 
   Features() = default;
-  /// Unknown features are ignored.
   explicit Features(const std::vector<std::string>& names) {
     for (std::size_t i = 0; i < kSupported.size(); ++i) {
       if (std::ranges::find(names, kSupported[i]) != names.end()) bits_ |= 1U << i;

@@ -14,15 +14,14 @@
 
 namespace tendon {
 
-/// All counters start at 0 when the server starts, so no events are missed if an update is lost.
+/// All counters start at 0 when the server starts, so lost updates do not lose events.
 struct Health {
   LocalTime at{};
   std::uint64_t steps = 0;
   std::uint64_t missed = 0;  ///< periods without a step because a step was late
   std::uint64_t overruns = 0;
   std::uint64_t unseen = 0;
-  /// The number of intervals in which bounded_acceleration of AOL+ was exceeded, so the value in the scene is not
-  /// correct (core/PROOFS.md, "Bounded acceleration").
+  /// Intervals above AOL+'s bounded_acceleration, whose value is then wrong (core/PROOFS.md, "Bounded acceleration").
   std::uint64_t broken_assumptions = 0;
   DeviceCounts device{};
   LatenessHistogram lateness{};
@@ -39,7 +38,6 @@ struct Health {
 ///
 ///     late   = hand.at − scheduled
 ///     missed = ⌊(scheduled − previous scheduled) / period⌋ − 1
-///
 /// Thread-safe: `counted` can be called from any thread, `observe` must be called from a single thread.
 /// Realtime-safe: yes, except for the constructor.
 class HealthMeter {
@@ -48,7 +46,7 @@ class HealthMeter {
   explicit HealthMeter(Duration period);
 
   void observe(const StepRecord& step) noexcept;
-  /// Returns the current counters. The time and the counters that do not depend on steps are not set.
+  /// Returns the counters. The time and the counters that do not depend on steps are not set.
   Health counted() const noexcept;
 
  private:
@@ -61,7 +59,7 @@ class HealthMeter {
   std::array<Counter, limits::kLatenessBuckets> lateness_;
 };
 
-/// Returns the changes between two states. The number of the report and the device are not set.
+/// Returns the changes. The number of the report and the device are not set.
 DeviceReport report(const Health& before, const Health& now);
 
 }  // namespace tendon

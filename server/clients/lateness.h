@@ -9,7 +9,7 @@
 
 namespace tendon {
 
-/// Determines why forces are late. The cause can be our own threads, the network, or the physics engine. All times are
+/// Determines why forces are late: because of our own threads, the network, or the physics engine. All times are
 /// measured with our clock. The clock of the engine is only used for the differences between its time stamps.
 ///
 /// The delay between a sample and the arrival of the force that answers it has three parts:
@@ -19,34 +19,27 @@ namespace tendon {
 ///
 /// The round trip is measured with the datagram that contains the force. A force is late if the previous force is no
 /// longer valid. The cause is determined by the first of these rules that applies:
-///
-/// 1. If no state of the device was received for kPause and for half of the missing time, the cause is the server.
-///    Either the loop of the device or the network thread was blocked. This rule is the first because the datagrams
-///    that wait in the socket in the meantime would look like a slow network or an engine that does not respond.
+/// 1. If no state of the device was received for kPause and for half of the missing time, the cause is the server: the
+///    loop of the device or the network thread was blocked. This rule is the first because the datagrams that wait in
+///    the socket in the meantime would look like a slow network or an engine that does not respond.
 /// 2. If forces were refused since the last valid force, the cause is the engine.
 /// 3. If the time stamps of two consecutive datagrams differ by more than kStandsStill, the program of the engine was
 ///    blocked, because a peer sends a datagram every 50 ms (SESSION.md). The cause is the engine if this explains half
-///    of the missing time. In this case, the round trip is not reliable because datagrams were waiting in the socket of
-///    the program.
+///    of the missing time. The round trip is then not reliable, because datagrams waited in the socket of the program.
 /// 4. The part with the largest increase over its usual duration is the cause if the increase is at least half of the
 ///    missing time. The usual duration is the median over the forces that were not late.
 /// 5. Otherwise, the delay of this force is not unusual, so a previous force is missing. The cause is the network if
 ///    datagrams were lost in the meantime. Otherwise, the engine has not sent a force.
 ///
-/// If the force is still missing when a report is created, the cause is the server if rule 1 applies. Otherwise, the
-/// cause is the engine as long as other datagrams from it arrive. After 250 ms without any datagram, it is not possible
-/// to distinguish between a remote engine that is blocked and a broken network, so the cause is unknown. If the engine
-/// is on this machine, the cause is the engine.
-///
+/// If the force is still missing when a report is created, the cause is the server if rule 1 applies, and otherwise the
+/// engine as long as other datagrams from it arrive. After 250 ms without any datagram, a remote engine that is blocked
+/// cannot be distinguished from a broken network, so the cause is unknown. An engine on this machine is the cause.
 /// Thread-safe: no. Realtime-safe: yes, except report().
 class Lateness {
  public:
-  /// Ten steps at 1 kHz.
-  static constexpr Duration kPause = std::chrono::milliseconds(10);
-  /// Two keep-alive periods.
-  static constexpr Duration kStandsStill = std::chrono::milliseconds(100);
-  /// Five keep-alive periods.
-  static constexpr Duration kSilent = std::chrono::milliseconds(250);
+  static constexpr Duration kPause = std::chrono::milliseconds(10);         ///< ten steps at 1 kHz
+  static constexpr Duration kStandsStill = std::chrono::milliseconds(100);  ///< two keep-alive periods
+  static constexpr Duration kSilent = std::chrono::milliseconds(250);       ///< five keep-alive periods
 
   enum class Part : std::uint8_t { kNone, kOurs, kNetwork, kEngine, kUnknown };
   enum class Cause : std::uint8_t {
@@ -95,19 +88,16 @@ class Lateness {
     Duration usual_network{};
     Duration usual_engine{};
     std::uint64_t late() const noexcept { return late_ours + late_network + late_engine + late_unknown; }
-    /// Adds the counters. The other values are taken from the report with the longer `worst`.
+    /// Adds the counters, and takes the other values from the report with the longer `worst`.
     void add(const Report& other);
-    /// A message for the operator, for example "forces were late 3 times, by up to 85 ms: the network (round trip 131
-    /// ms, usually 41 ms)". It is empty if there are no problems. The length is at most 128 bytes.
+    /// For the operator, for example "forces were late 3 times, by up to 85 ms: the network (round trip 131 ms, usually
+    /// 41 ms)". Empty if there are no problems. At most 128 bytes.
     std::string text;
-    /// A message for the developer of the engine. In addition to `text`, it contains the number of limited forces.
-    std::string advice;
+    std::string advice;  ///< for the developer of the engine: `text` and the number of limited forces
   };
 
-  /// Must be called if an engine becomes the holder of the channel. The first force cannot be late. `same_machine` must
-  /// be true if it has a loopback address.
+  /// An engine becomes the holder of the channel. Its first force cannot be late. `same_machine`: loopback address.
   void begin(LocalTime now, bool same_machine) noexcept;
-  /// Must be called if the engine no longer holds the channel.
   void end() noexcept { attending_ = false; }
 
   /// Must be called for each authentic datagram that is newer than all previous ones. `sent` is the time stamp of the
@@ -116,8 +106,7 @@ class Lateness {
   void took_state(LocalTime now) noexcept;
   void observe(const RoundTrip& trip) noexcept;
   void cut() noexcept { ++report_.cut; }
-  /// Must be called if forces were refused. `cause` must be one of the last four causes.
-  void refused(Cause cause, std::uint64_t count) noexcept;
+  void refused(Cause cause, std::uint64_t count) noexcept;  ///< `cause`: one of the last four
 
   Report report(LocalTime now);
 

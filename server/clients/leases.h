@@ -10,9 +10,8 @@
 
 namespace tendon {
 
-/// Manages the holders of channels. A channel is held by one client at a time, and can be taken by another client if
-/// the lease has expired (SESSION.md, "Channels and leases"). The caller must notify a client that loses a channel.
-///
+/// Manages the holders of channels. One client at a time holds a channel, and another one can take it if the lease has
+/// expired (SESSION.md, "Channels and leases"). The caller must notify a client that loses a channel.
 /// Thread-safe: no. Realtime-safe: no.
 class Leases {
  public:
@@ -28,7 +27,7 @@ class Leases {
     devices_[device].channels[channel].renewed = now;
   }
 
-  /// Releases the channel if it is held by the client, and turns off the outputs that were set by the client.
+  /// Releases the channel if the client holds it, and turns off the outputs that were set by the client.
   void give(std::uint32_t device, std::uint32_t channel, std::uint32_t client);
   void give_all(std::uint32_t client);
 
@@ -38,8 +37,8 @@ class Leases {
     std::uint32_t holder = 0;  ///< the current holder if not granted
     Duration wait{};           ///< time until the lease can expire; 0 if unknown
   };
-  /// The channel is granted if it is free, if it is already held by the client, or if the lease has expired. With
-  /// `may_take_over`, the lease does not need to have expired, but the channel must have one.
+  /// Grants the channel if it is free, already held by the client, or if the lease has expired. With `may_take_over`,
+  /// the lease does not need to have expired, but the channel must have one.
   Taken take(LocalTime now, std::uint32_t device, std::uint32_t channel, const ServedClient& client,
              bool may_take_over);
 

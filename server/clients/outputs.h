@@ -18,16 +18,12 @@ struct OutputSettings {
 };
 
 /// Stores which client has set each output of a device. An output is turned off if this client releases or loses a
-/// channel of the device, or if the device is disarmed.
-///
-/// Thread-safe: no. Realtime-safe: yes.
+/// channel of the device, or if the device is disarmed. Thread-safe: no. Realtime-safe: yes.
 class Outputs {
  public:
   void set(std::uint32_t client, std::size_t output, const OutputSetting& setting) noexcept;
-  /// Returns false if there are none.
-  bool turn_off_those_of(std::uint32_t client) noexcept;
-  /// Returns false if all outputs are already off.
-  bool turn_off_all() noexcept;
+  bool turn_off_those_of(std::uint32_t client) noexcept;  ///< false if there are none
+  bool turn_off_all() noexcept;                           ///< false if all are already off
 
   const OutputSettings& settings() const noexcept { return settings_; }
 

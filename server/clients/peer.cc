@@ -11,10 +11,8 @@
 namespace tendon {
 namespace {
 
-/// The delay before a busy channel or device is requested again.
-constexpr Duration kAskAgain = std::chrono::milliseconds(500);
-/// The delay before incompatible configurations are compared again, because one of the servers may have been restarted.
-constexpr Duration kCompareAgain = std::chrono::seconds(5);
+constexpr Duration kAskAgain = std::chrono::milliseconds(500);  ///< before a busy channel or device is requested again
+constexpr Duration kCompareAgain = std::chrono::seconds(5);     ///< after a mismatch; a server may have been restarted
 
 }  // namespace
 

@@ -18,11 +18,8 @@ namespace tendon {
 
 /// A connection to another server for a coupled device. This server acts as an ordinary client: it claims a channel,
 /// takes the lease, and sends a Couple request. Then, PortStates are exchanged in both directions. If the connection
-/// fails, it is established again. Each problem is only reported once.
-///
-/// The datagrams are sent and received by the owner of this object because each server only has one socket.
-///
-/// Thread-safe: no. Realtime-safe: no.
+/// fails, it is established again. Each problem is only reported once. The owner of this object sends and receives the
+/// datagrams, because a server has one socket. Thread-safe: no. Realtime-safe: no.
 class Peer {
  public:
   struct Config {
@@ -44,16 +41,13 @@ class Peer {
   Peer(const Peer&) = delete;  // connection_ refers to line_
   Peer& operator=(const Peer&) = delete;
 
-  /// Returns true if the datagram may be from this server. In this case, it must be passed to receive().
+  /// Returns true if the datagram may be from this server and must be passed to receive().
   bool is_from_server(const Address& from, std::span<const std::byte> datagram) const;
   void receive(LocalTime now, const Address& from, std::span<const std::byte> datagram);
-  /// Processes everything that is due. Returns the latest time of the next call.
-  LocalTime turn(LocalTime now);
+  LocalTime turn(LocalTime now);  ///< processes what is due; returns the latest time of the next call
 
-  /// This has no effect if the devices are not coupled.
-  void send(LocalTime now, const PortState& port);
-  /// Returns each state of the peer only once.
-  std::optional<PortState> take();
+  void send(LocalTime now, const PortState& port);  ///< no effect unless coupled
+  std::optional<PortState> take();                  ///< each state of the peer only once
 
   void close(LocalTime now);
 
@@ -79,8 +73,7 @@ class Peer {
   void take(LocalTime now, const Connection::Event& event);
   void take(LocalTime now, const Session::Event& event);
   void open(const Welcome& welcome);
-  /// Returns when to request the lease or, if it is held, the coupling.
-  LocalTime next_request() const noexcept;
+  LocalTime next_request() const noexcept;  ///< when to request the lease or, if it is held, the coupling
   void ask(LocalTime now);
   void answered(LocalTime now, const Session::RequestAnswered& answer);
   void say(bool warning, std::string text);

@@ -58,8 +58,7 @@ void PortExchange::publish(LocalTime now, std::uint32_t device, std::uint32_t co
   show(now, device, coupling, frame);
 }
 
-/// Sends both ports of a coupling to the observers of the device at the rate of their states. `mine` is our port, with
-/// the channel of the peer.
+/// Sends both ports of a coupling to the observers, at the rate of their states. `mine` has the channel of the peer.
 void PortExchange::show(LocalTime now, std::uint32_t index, std::uint32_t coupling, PortFrame mine) {
   ServedDevice& device = devices_[index];
   PortFrame& theirs = device.peer_ports[coupling];

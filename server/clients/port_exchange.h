@@ -15,10 +15,8 @@
 
 namespace tendon {
 
-/// Exchanges the ports of coupled devices with their peers. The peer can be a client that holds a channel of the
-/// device, or a server that this server is connected to. Both ports are also sent to observers.
-///
-/// Thread-safe: no. Realtime-safe: no.
+/// Exchanges the ports of coupled devices with their peers. A peer is a client that holds a channel of the device, or a
+/// server that this server is connected to. Both ports are also sent to observers. Thread-safe: no. Realtime-safe: no.
 class PortExchange {
  public:
   PortExchange(std::vector<ServedDevice>& devices, std::vector<ServedClient>& clients, Leases& leases);
@@ -34,7 +32,6 @@ class PortExchange {
   /// Returns false if the datagram is not from a dialled server.
   bool receive(LocalTime now, const Address& from, std::span<const std::byte> datagram);
 
-  /// Returns the time of the next call.
   LocalTime turn(LocalTime now);
   std::vector<Peer::Notice> take_notices();
 

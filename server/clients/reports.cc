@@ -23,7 +23,7 @@ void publish_to_observers(std::uint32_t device, const Report& report, std::vecto
   }
 }
 
-/// A device is skipped if there is no update from the log thread.
+/// Skips devices without an update from the log thread.
 void publish_devices(std::vector<ServedDevice>& devices, std::vector<ServedClient>& clients) {
   for (std::uint32_t index = 0; index < devices.size(); ++index) {
     ServedDevice& device = devices[index];

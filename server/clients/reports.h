@@ -12,13 +12,10 @@ namespace tendon {
 
 /// Creates the reports that are sent once per second (SESSION.md, "Report"): to controllers about their forces, to the
 /// operator about late or refused forces, and to observers with kFeatureDiagnostics about each device loop and each
-/// engine.
-///
-/// Thread-safe: no. Realtime-safe: no.
+/// engine. Thread-safe: no. Realtime-safe: no.
 class Reports {
  public:
-  /// The cost is negligible compared to 1000 states.
-  static constexpr Duration kPeriod = std::chrono::seconds(1);
+  static constexpr Duration kPeriod = std::chrono::seconds(1);  ///< costs little compared to 1000 states
 
   struct Sums {
     std::uint64_t late_ours = 0;  ///< late or missing forces by cause
@@ -28,7 +25,7 @@ class Reports {
     std::vector<std::string> warnings;
   };
 
-  /// Adds reports to the sessions of the clients if the last reports are at least one period old.
+  /// Adds reports to the sessions if the last ones are at least one period old.
   Sums turn(LocalTime now, std::vector<ServedDevice>& devices, std::vector<ServedClient>& clients);
 
  private:

@@ -91,7 +91,7 @@ Outcome lease_lost(LocalTime /*now*/, const Asker& /*asker*/, const LeaseLost& /
   return {.code = Code::kUnsupported, .detail = "only the server can send this request"};
 }
 
-/// A coupling can only have one peer. This is the first client that requests it, as long as it holds the channel.
+/// A coupling has one peer: the first client that requests it, as long as it holds the channel.
 Outcome couple(LocalTime /*now*/, const Asker& asker, const Couple& theirs) {
   if (!asker.client.may_couple()) {
     return {.code = Code::kUnsupported, .detail = "the Hello did not list the feature teleoperation"};
@@ -127,8 +127,7 @@ Outcome engage(LocalTime /*now*/, const Asker& asker, const Engage& wanted) {
   return order(asker, wanted.device, {.kind = HapticOrder::Kind::kEngage}, "engage requested");
 }
 
-/// If the client is the peer of a coupling, only this coupling is disengaged. Otherwise, all couplings of the device
-/// are disengaged.
+/// Disengages the coupling whose peer is this client or, if there is none, all couplings of the device.
 Outcome disengage(LocalTime /*now*/, const Asker& asker, const Disengage& wanted) {
   const ServedDevice& device = asker.devices[wanted.device];
   if (!device.coupling) return {.code = Code::kUnsupported, .detail = "this device has no [teleoperation]"};

@@ -31,9 +31,7 @@ struct Outcome {
   std::uint32_t loser = 0;  ///< connection id of the previous holder, which must be notified
 };
 
-/// Processes a request and returns the reply. See the table kRequests in requests.cc.
-///
-/// Thread-safe: no. Realtime-safe: no.
+/// Processes a request and returns the reply (kRequests in requests.cc). Thread-safe: no. Realtime-safe: no.
 Outcome answer(LocalTime now, const Asker& asker, const Request& request);
 
 }  // namespace tendon

@@ -8,7 +8,7 @@ namespace tendon {
 void SampledSteps::observe(std::uint64_t tick, LocalTime at, LocalTime sent) {
   const std::uint64_t before = std::exchange(newest_, tick);
   const std::uint64_t since = tick - before;
-  // The previous step is only read if necessary because it may not be in the cache if there are many devices.
+  // The previous step is only read if necessary, because it may not be in the cache if there are many devices.
   if (before > 0 && since > 1 && since < kRemembered) {
     const Numbered last = steps_[before % kRemembered];
     const Duration apart = (at - last.step.at) / static_cast<Duration::rep>(since);

@@ -10,9 +10,8 @@
 
 namespace tendon {
 
-/// Stores the times of the newest haptic steps of a device, to find the step that a force answers.
-///
-/// Thread-safe: no. Realtime-safe: yes, except for the constructor.
+/// Stores the times of the newest haptic steps of a device, to find the step that a force answers. Thread-safe: no.
+/// Realtime-safe: yes, except for the constructor.
 class SampledSteps {
  public:
   static constexpr std::size_t kRemembered = 4096;  ///< 4 s at 1 kHz
@@ -24,12 +23,10 @@ class SampledSteps {
 
   SampledSteps() : steps_(kRemembered) {}
 
-  /// If some ticks were skipped, their times are interpolated, because a client can also answer a predicted tick that
-  /// was never seen by the network thread.
+  /// Interpolates skipped ticks, because a client can answer a predicted tick that the network thread has not seen.
   void observe(std::uint64_t tick, LocalTime at, LocalTime sent);
 
-  /// Returns nothing if there was no such step, or if it is older than kRemembered steps.
-  std::optional<Step> find(std::uint64_t tick) const;
+  std::optional<Step> find(std::uint64_t tick) const;  ///< nothing if unknown, or older than kRemembered steps
 
   std::uint64_t newest() const noexcept { return newest_; }
 

@@ -24,8 +24,8 @@
 
 namespace tendon {
 
-/// The maximum number of devices of a server, which is 64 banks. The number of a device in a session is its index in
-/// the bank because all devices of a session must be in the same bank (WIRE.md, "Devices and channels").
+/// The maximum number of devices of a server, which is 64 banks. All devices of a session must be in the same bank. The
+/// number of a device in a session is its index in the bank (WIRE.md, "Devices and channels").
 inline constexpr std::size_t kMostDevices = 1024;
 constexpr std::uint32_t bank_of(std::uint32_t device) { return device / limits::kMaxDevices; }
 constexpr std::uint32_t number_of(std::uint32_t device) { return device % limits::kMaxDevices; }
@@ -105,7 +105,7 @@ struct ServedClient {
   }
   bool may_couple() const noexcept { return has<kFeatureTeleoperation>() && role == Role::kController; }
   bool sees_ports() const noexcept { return has<kFeatureTeleoperation>() && role == Role::kObserver; }
-  /// Converts the number of a device in a session to an index. If the last bank is not full, the device may not exist.
+  /// Converts the number of a device in a session to an index. In the last bank, the device may not exist.
   std::uint32_t device_of(std::uint32_t number) const noexcept {
     return bank_of(subscriptions.front().device) * limits::kMaxDevices + number;
   }
@@ -151,10 +151,9 @@ struct ServedDevice {
     DeviceDescription about;  ///< device number and holders are ignored
     HandleDescription handle{};
     std::optional<Couple> coupling{};
-    /// The channels of the leaders if a follower has more than one. If this is empty, the leader can use any channel.
-    std::vector<std::uint32_t> leaders{};
-    std::optional<Peer::Config> dial{};  ///< the server to connect to, if any
-    Mailboxes* mail = nullptr;           ///< must outlive the loop
+    std::vector<std::uint32_t> leaders{};  ///< channels of a follower's leaders; empty: the leader can use any
+    std::optional<Peer::Config> dial{};    ///< the server to connect to, if any
+    Mailboxes* mail = nullptr;             ///< must outlive the loop
   };
 
   DeviceDescription about;  ///< `device` is the number in a session
@@ -162,10 +161,9 @@ struct ServedDevice {
   Mailboxes* mail;
   SampledSteps sampled{};
   std::vector<ServedChannel> channels{};
-  std::optional<Couple> coupling{};     ///< our configuration; empty if the device cannot be coupled
-  PortPhase phase = PortPhase::kAlone;  ///< the newest phase of any coupling
-  /// By coupling: the channel of the leader. If this is empty, there is one coupling, and any channel can be used.
-  std::vector<std::uint32_t> leaders{};
+  std::optional<Couple> coupling{};      ///< our configuration; empty if the device cannot be coupled
+  PortPhase phase = PortPhase::kAlone;   ///< the newest phase of any coupling
+  std::vector<std::uint32_t> leaders{};  ///< by coupling: the leader's channel; empty: one coupling, any channel
   std::array<std::uint32_t, Shares::kMost> peers{};   ///< by coupling: the number of peers so far
   std::array<PortFrame, Shares::kMost> peer_ports{};  ///< by coupling: the last port of the peer
   Outputs outputs{};
@@ -175,7 +173,7 @@ struct ServedDevice {
 
 std::optional<std::uint32_t> coupling_by(const ServedDevice& device, std::uint32_t channel);
 
-/// Notifies the haptic loop that the peer of the coupling has been replaced. Returns false if the queue is full.
+/// Notifies the haptic loop of a new peer of the coupling. Returns false if the queue is full.
 bool renew_peer(ServedDevice& device, std::uint32_t coupling);
 
 /// Returns the devices of one shard. Throws std::invalid_argument if the number of devices or channels is out of range,

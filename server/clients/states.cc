@@ -12,8 +12,7 @@
 namespace tendon {
 namespace {
 
-/// Removes values that do not fit into a frame. The forces of individual engines are limited, but their sum and the
-/// values of a force sensor are not.
+/// Removes values that do not fit into a frame: the forces of engines are limited, but not their sum or the sensor.
 void leave_out_what_no_frame_carries(DeviceState& state) {
   for (auto* const vector : {&state.force_wanted, &state.hand_force}) {
     if (*vector && !((*vector)->array().abs() <= limits::kMaxValue).all()) vector->reset();
@@ -28,7 +27,6 @@ void leave_out_what_no_frame_carries(DeviceState& state) {
     state.joints.reset();
 }
 
-/// Keeps the buttons.
 void leave_out_handle(DeviceState& state) {
   state.turning.reset();
   state.torque_applied.reset();

@@ -6,9 +6,9 @@
 
 namespace tendon {
 
-/// Sends a state to the client unless the previous state is too recent for its rate, or the client is the peer of a
-/// coupling. Fields that were not requested or do not fit into a frame are removed. Returns true if the client can
-/// predict the state, in which case it is not sent (StateDeadband).
+/// Sends a state unless the previous one is too recent for the client's rate, or the client is the peer of a coupling.
+/// Removes fields that were not requested or do not fit into a frame. Returns true if the client can predict the state,
+/// in which case it is not sent (StateDeadband).
 bool publish_state(ServedClient& client, Subscription& subscription, const DeviceState& state);
 
 }  // namespace tendon

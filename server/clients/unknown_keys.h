@@ -12,8 +12,7 @@
 
 namespace tendon {
 
-/// Logs the number of Hellos with an unknown key, and the newest address. The server does not reply to these Hellos, so
-/// they can only be seen in the log. After the first message, there is at most one message per minute.
+/// Logs the number of Hellos with an unknown key, and the newest address, at most once per minute. They get no reply.
 class UnknownKeys {
  public:
   static constexpr Duration kPeriod = std::chrono::minutes(1);
@@ -29,7 +28,7 @@ class UnknownKeys {
 
   bool due(LocalTime now) const noexcept { return !newest_.empty() && now >= next_; }
 
-  /// `total` is the number of such Hellos since the start of the server.
+  /// `total` is the number since the start of the server.
   std::string line(LocalTime now, std::uint64_t total) {
     const std::uint64_t count = total - std::exchange(told_, total);
     next_ = now + kPeriod;

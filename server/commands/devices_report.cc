@@ -21,7 +21,6 @@ std::string id_of(const usb::PluggedIn& plugged) {
   return text.str();
 }
 
-/// Returns null if this USB device is not supported.
 const Driver* driver_for(const usb::Id& id) {
   const auto found = std::ranges::find_if(
       drivers(), [&id](const Driver* driver) { return std::ranges::find(driver->ids, id) != driver->ids.end(); });

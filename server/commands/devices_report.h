@@ -22,8 +22,7 @@ struct PluggedDevice {
   std::vector<Lack> lacks;
 };
 
-/// `firmware_problem` describes the firmware file for a Falcon. It is empty if the file is valid, and not set if there
-/// is no file.
+/// `firmware_problem` describes the firmware file for a Falcon: empty if it is valid, not set if there is no file.
 std::vector<PluggedDevice> report_devices(std::span<const usb::PluggedIn> plugged,
                                           const std::optional<std::string>& firmware_problem);
 

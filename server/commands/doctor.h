@@ -11,11 +11,9 @@
 
 namespace tendon {
 
-/// The result of `tendond doctor`, which checks whether this machine is suitable for a haptic loop. It does not change
-/// any settings.
+/// The result of `tendond doctor`: whether this machine is suitable for a haptic loop. It changes no settings.
 struct Diagnosis {
-  /// The wake-up latency of a thread that sleeps for a period of 1 ms, measured like in cyclictest. This is a lower
-  /// bound for the jitter of a haptic loop.
+  /// The wake-up latency of a thread with a period of 1 ms, as in cyclictest. A lower bound for the jitter of a loop.
   struct WakeUps {
     std::size_t count = 0;
     Duration median{};

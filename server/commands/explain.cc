@@ -127,8 +127,7 @@ std::unique_ptr<Device> playback_of(const Scene& scene) {
   return std::make_unique<Playback>(SimulatedDevice(scene.simulated()).info(), std::move(samples));
 }
 
-/// The uncertainty is the difference between the minimum of the odd measurements and the minimum of the even
-/// measurements.
+/// The uncertainty is the difference between the minima of the odd and the even measurements.
 class Minimum {
  public:
   void add(double value) {
@@ -149,8 +148,7 @@ Explanation explain(const Scene& listed, const std::function<Duration()>& proces
   Explanation out;
   Scene scene = listed;
   scene.device = listed.simulated();
-  // These are the original scene, a copy of it, the scene with a playback device, and the scene without each of its
-  // parts.
+  // The original scene, a copy, the scene with a playback device, and the scene without each of its parts.
   std::vector<std::unique_ptr<Trial>> trials;
   trials.push_back(std::make_unique<Trial>(scene));
   trials.push_back(std::make_unique<Trial>(scene));

@@ -45,8 +45,7 @@ constexpr int kRunning = 2;
 
 /// µs. The delay before connecting to the D-Bus system bus again. No polling is required for avahi-daemon.
 constexpr std::uint64_t kTryAgain = 5'000'000;
-/// More collisions are probably an attack.
-constexpr int kMostNames = 100;
+constexpr int kMostNames = 100;  ///< more collisions are probably an attack
 
 /// The functions of libsystemd, which is loaded when the first announcer is created.
 struct Systemd {

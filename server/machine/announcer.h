@@ -11,22 +11,20 @@
 
 namespace tendon {
 
-/// Announces devices on the local network by DNS-SD (protocol/discovery.h). It sends requests to avahi-daemon over
-/// D-Bus. If D-Bus or avahi-daemon is not available, this is reported once, and the requests are sent again when it
-/// becomes available. If a name is already used by another host, "#2" is appended. If the server listens on 0.0.0.0 or
-/// [::], the devices are announced on all interfaces. Otherwise, only the interface with the listen address is used.
+/// Announces devices on the local network by DNS-SD (protocol/discovery.h), through avahi-daemon over D-Bus. If D-Bus
+/// or avahi-daemon is not available, this is reported once, and the requests are sent again when it becomes available.
+/// If a name is already used by another host, "#2" is appended. If the server listens on 0.0.0.0 or [::], the devices
+/// are announced on all interfaces, and otherwise on the interface with the listen address.
 ///
-/// The function run() should be called in a separate thread. The announcements are removed when run() returns. They are
-/// also removed if the process is killed because Avahi monitors the connection.
-///
-/// Realtime-safe: no.
+/// run() should be called in a separate thread. The announcements are removed when it returns, and also if the process
+/// is killed, because Avahi monitors the connection. Realtime-safe: no.
 class Announcer {
  public:
   struct Device {
     std::string name;  ///< see dns_sd::is_instance_name()
     dns_sd::About about;
   };
-  /// Receives a message for the operator. It is called from the thread of run().
+  /// Receives messages for the operator from the thread of run().
   using Say = std::function<void(bool warning, const std::string& sentence)>;
 
   /// `listen` is the address of the server with the actual port. Throws std::runtime_error ("[discovery] announce: …")

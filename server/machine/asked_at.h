@@ -12,13 +12,10 @@
 namespace tendon {
 
 /// Stores the local address to which each peer has sent its newest datagram. A socket that is bound to all addresses
-/// has to reply from this address. Otherwise, the kernel chooses the source address, and the peer drops the reply
-/// because the address is unknown.
+/// has to reply from this address. Otherwise, the kernel chooses another one, and the peer drops the reply.
 ///
 /// The size of the table is fixed. A collision overwrites the older entry until the next datagram arrives. The hash is
-/// salted, so collisions cannot be predicted by a peer.
-///
-/// Thread-safe: yes.
+/// salted, so a peer cannot predict collisions. Thread-safe: yes.
 class AskedAt {
  public:
   using Ip = decltype(Address::ip);

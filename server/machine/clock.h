@@ -6,20 +6,16 @@
 namespace tendon {
 
 /// The real clock, CLOCK_MONOTONIC. The server must not read the time anywhere else. Each thread calls now() once per
-/// turn and passes the result on. UdpLink also reads the clock for each datagram.
-///
-/// Thread-safe: yes. Realtime-safe: yes.
+/// turn and passes the result on. UdpLink also reads the clock for each datagram. Thread-safe: yes. Realtime-safe: yes.
 namespace clock {
 
 LocalTime now() noexcept;
 
-/// Sleeps until an absolute time to avoid the accumulation of errors.
-void sleep_until(LocalTime deadline) noexcept;
+void sleep_until(LocalTime deadline) noexcept;  ///< absolute, so that errors do not accumulate
 
 Duration processor_time() noexcept;
 
-/// Returns Unix time − local time.
-Duration unix_offset() noexcept;
+Duration unix_offset() noexcept;  ///< Unix time − local time
 
 }  // namespace clock
 }  // namespace tendon

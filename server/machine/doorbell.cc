@@ -20,7 +20,7 @@ void Doorbell::ring() noexcept {
   const int saved = errno;
   rung_.store(true, std::memory_order_release);
   const std::uint64_t one = 1;
-  // This can only fail if the counter has reached 2⁶⁴ − 2. The descriptor is readable in this case.
+  // This can only fail if the counter has reached 2⁶⁴ − 2. The descriptor is then readable.
   [[maybe_unused]] const auto written = ::write(fd_, &one, sizeof one);
   errno = saved;
 }

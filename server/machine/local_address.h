@@ -13,15 +13,13 @@
 #include "protocol/link.h"
 
 /// Passes the local address of a datagram in the control messages of recvmsg(2) and sendmsg(2), see ip(7) and ipv6(7).
-/// The format of `ip` is the same as in Address.
 namespace tendon::local_address {
 
 using Ip = decltype(Address::ip);
 
 inline constexpr std::size_t kControlBytes = CMSG_SPACE(sizeof(in6_pktinfo));
 
-/// Enables the control message. `family` is AF_INET or AF_INET6, which also covers IPv4. Returns false and sets errno
-/// if this is refused.
+/// Enables the control message. `family` is AF_INET, or AF_INET6 for both. Returns false and sets errno on failure.
 [[nodiscard]] inline bool ask(int fd, int family) noexcept {
   const bool v4 = family == AF_INET;
   const int on = 1;

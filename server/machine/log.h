@@ -12,20 +12,18 @@ namespace tendon::log {
 /// Writes a line with the time to std::cerr. Control characters are escaped (`visible` in protocol/wire/text.h). The
 /// rate is limited separately for each kind of message (Rate). Two messages are of the same kind if they only differ in
 /// digits and in the text after the first quote. Do not call this for each packet or from the haptic thread.
-///
 /// Thread-safe: yes. Realtime-safe: no.
 void info(std::string_view text);
 void warn(std::string_view text);
 void error(std::string_view text);
 
-/// Limits the number of similar messages to kBurst, plus kLinesPerSecond.
+/// Allows kBurst similar messages, plus kLinesPerSecond.
 class Rate {
  public:
   static constexpr double kBurst = 100;
   static constexpr double kLinesPerSecond = 1;
 
-  /// Returns nothing if the message must be dropped. Otherwise, returns the number of messages that have been dropped
-  /// since the last one was written.
+  /// Returns nothing if the message must be dropped, or else the number dropped since the last one was written.
   std::optional<std::uint64_t> admit(LocalTime now);
 
  private:

@@ -29,10 +29,8 @@
 namespace tendon {
 namespace {
 
-/// PIPE_BUF on Linux. poll(2) guarantees that this number of bytes can be written without blocking.
-constexpr std::size_t kWrite = 4096;
-/// The polling period if none of the streams is writable.
-constexpr int kLook_ms = 20;
+constexpr std::size_t kWrite = 4096;  ///< PIPE_BUF on Linux: poll(2) guarantees a write without blocking
+constexpr int kLook_ms = 20;          ///< the polling period if no stream is writable
 
 class Queue {
  public:
@@ -133,7 +131,7 @@ class Queue {
     streams_[stream].bytes += text.size();
   }
 
-  /// If the output cannot be written, for example because the disk is full, the chunk is dropped.
+  /// If the output cannot be written, for example on a full disk, the chunk is dropped.
   void remove(std::size_t stream, std::optional<std::size_t> written) {
     const auto first = std::ranges::find_if(waiting_, [&](const Chunk& chunk) { return chunk.stream == stream; });
     const std::size_t bytes = written.value_or(first->text.size());
@@ -205,8 +203,7 @@ std::atomic<bool> exists{false};
 class UnblockedOutput::Redirection {
  public:
   Redirection() {
-    // Signals are handled by the other threads of the program. SIGPIPE must not be blocked because it is sent to the
-    // thread that writes.
+    // The other threads handle signals. SIGPIPE must not be blocked, because it is sent to the thread that writes.
     sigset_t all;
     sigset_t before;
     sigfillset(&all);

@@ -6,8 +6,7 @@
 
 namespace tendon {
 
-/// Fills up to 256 bytes with cryptographically secure random numbers. Throws std::system_error if this is not
-/// possible.
+/// Fills up to 256 bytes with cryptographically secure random numbers. Throws std::system_error on failure.
 void fill_random(std::span<std::byte> bytes);
 
 }  // namespace tendon

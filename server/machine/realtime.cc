@@ -54,7 +54,7 @@ std::vector<Mapping> mappings() {
   return found;
 }
 
-/// Excludes the libraries that are only used by the network and log threads.
+/// Excludes the libraries that only the network and log threads use.
 bool is_of_a_step(const Mapping& mapping, const std::string& program) {
   if (mapping.of == program || mapping.of == "[heap]") return true;
   constexpr std::array<std::string_view, 2> kLibraries = {"libc.so", "libm.so"};
@@ -62,7 +62,7 @@ bool is_of_a_step(const Mapping& mapping, const std::string& program) {
   return std::ranges::any_of(kLibraries, [file](std::string_view library) { return file.starts_with(library); });
 }
 
-/// Locks all pages when they are first used, and loads those that may be used by a haptic step. Returns 0 or errno.
+/// Locks pages when they are first used, and loads those that a haptic step may use. Returns 0 or errno.
 int lock_memory() {
   if (mlockall(MCL_CURRENT | MCL_FUTURE | MCL_ONFAULT) != 0) return errno;
   const std::vector<Mapping> all = mappings();
@@ -83,7 +83,7 @@ int lock_memory() {
 }  // namespace
 
 void use_small_stacks() {
-  // A haptic thread touches 136 kB. Network and log threads have used 16 kB in a measurement.
+  // A haptic thread touches 136 kB. Network and log threads used 16 kB in a measurement.
   constexpr std::size_t kBytes = 256 * 1024;
   pthread_attr_t usual;
   if (pthread_getattr_default_np(&usual) != 0) return;

@@ -9,30 +9,26 @@
 
 namespace tendon {
 
-/// Below the watchdog and migration threads of the kernel (99), above ordinary IRQ threads (50).
-inline constexpr int kHapticPriority = 70;
+inline constexpr int kHapticPriority = 70;  ///< below watchdog and migration threads (99), above IRQ threads (50)
 
-/// Sets the default stack size to 256 kB, because 8 MB would count against RLIMIT_MEMLOCK. It is not changed if
-/// thread-local data would not fit, for example with the thread sanitizer. This must be called before the first thread
-/// is started.
+/// Sets the default stack size to 256 kB, because 8 MB would count against RLIMIT_MEMLOCK, unless thread-local data
+/// would not fit, for example with the thread sanitizer. Must be called before the first thread is started.
 void use_small_stacks();
 
-/// Configures the calling thread as a haptic thread. It uses SCHED_FIFO with a `priority` from 1 to 99, disables timer
-/// slack, and touches the stack. Pages are locked when they are first used. The pages that a haptic step may need are
-/// loaded immediately. If a request is refused, the thread still runs, but it may wake up late. Returns a message for
-/// each of these requests, with instructions for the operator.
+/// Configures the calling thread as a haptic thread: SCHED_FIFO with a `priority` from 1 to 99, no timer slack, and a
+/// touched stack. Pages are locked when they are first used, and those that a haptic step may need are loaded
+/// immediately. If a request is refused, the thread still runs, but may wake up late. Returns a message for each
+/// refusal, with instructions for the operator.
 std::vector<std::string> enter_realtime(int priority);
 
-/// Pins the calling thread to a processor. Returns an error message if this is refused by the kernel.
+/// Pins the calling thread to a processor. Returns an error message if the kernel refuses.
 std::optional<std::string> stay_on(std::uint32_t cpu);
 
 int processors_allowed();
 
 /// Disables sleep states with a long exit latency while this object exists, which increases the power consumption. It
 /// writes a 32-bit value of 0 µs to /dev/cpu_dma_latency and keeps it open (Documentation/power/pm_qos_interface.rst).
-/// If the file does not exist, this is not an error because the kernel does not support this setting.
-///
-/// Thread-safe: no.
+/// A missing file is not an error, because the kernel does not support this setting. Thread-safe: no.
 class WakefulProcessors {
  public:
   explicit WakefulProcessors(const std::filesystem::path& file = "/dev/cpu_dma_latency");
@@ -49,10 +45,9 @@ class WakefulProcessors {
   std::optional<std::string> refused_;
 };
 
-/// Names the calling thread for top -H, perf and gdb. The name is truncated to 15 characters. See server/THREADS.md.
+/// Names the calling thread for top -H, perf and gdb, in at most 15 characters. See server/THREADS.md.
 void name_thread(const std::string& name);
 
-/// Disables timer slack. This is used for network and log threads.
-void enter_punctual();
+void enter_punctual();  ///< disables timer slack, for network and log threads
 
 }  // namespace tendon

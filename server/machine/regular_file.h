@@ -22,9 +22,7 @@ class UnreadableFile : public std::runtime_error {
 /// because opening a named pipe would block, and a device may be infinite.
 ///
 /// Throws UnreadableFile. `kind` is prepended to the name of the file, for example "cannot read recording run.mcap: it
-/// is a named pipe, expected a regular file".
-///
-/// Thread-safe: yes. Realtime-safe: no.
+/// is a named pipe, expected a regular file". Thread-safe: yes. Realtime-safe: no.
 std::ifstream open_regular_file(const std::filesystem::path& file, std::string_view kind = {});
 
 std::optional<std::string> why_not_regular(mode_t mode);

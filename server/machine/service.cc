@@ -54,7 +54,7 @@ void stopping() { tell("STOPPING=1"); }
 std::optional<Duration> watch_period() {
   const auto microseconds = number("WATCHDOG_USEC");
   if (!microseconds) return {};
-  // This variable may have been inherited. In this case, it contains the id of another process.
+  // This variable may have been inherited, and then contains the id of another process.
   if (!variable("WATCHDOG_PID").empty() && number("WATCHDOG_PID") != ::getpid()) return {};
   return std::chrono::microseconds(*microseconds / 2);
 }

@@ -5,15 +5,13 @@
 
 #include "core/base/time.h"
 
-/// Sends status messages to the service manager that has started this process (systemd, see sd_notify(3)). If there is
-/// no service manager, these functions have no effect.
+/// Sends status messages to systemd, see sd_notify(3). Without a service manager, these functions have no effect.
 namespace tendon::service {
 
 void ready();
 void stopping();
 
-/// Returns half of WatchdogSec=, or nothing if the watchdog is not enabled for this process. `alive` must be called at
-/// this period.
+/// Returns half of WatchdogSec=, the period for calling `alive`, or nothing if this process has no watchdog.
 std::optional<Duration> watch_period();
 void alive();
 

@@ -25,12 +25,11 @@ namespace {
 
 using asio::ip::udp;
 
-/// Bytes. The virtual machines that were tested pause for up to 36 ms. In this time, 10 clients at 1 kHz send 360
-/// datagrams, which require up to 2.3 kB each in the kernel. The size is silently limited to net.core.rmem_max.
+/// Bytes. Virtual machines pause for up to 36 ms in our tests. In this time, 10 clients at 1 kHz send 360 datagrams,
+/// which require up to 2.3 kB each in the kernel. The size is silently limited to net.core.rmem_max.
 constexpr int kReceiveBufferBytes = 1 << 20;
 
-/// Limits the time in receive() during a flood.
-constexpr int kMaxEmptyDatagrams = 64;
+constexpr int kMaxEmptyDatagrams = 64;  ///< limits the time in receive() during a flood
 
 udp::endpoint to_endpoint(const Address& address) {
   const asio::ip::address_v6 v6(address.ip);
@@ -95,8 +94,7 @@ struct Message {
 
 void share_address(int fd) { set(fd, SO_REUSEPORT, int{1}); }
 
-/// Attaches the filter that is described at UdpLink::several. If a datagram is too short, the filter returns 0, which
-/// is the first socket.
+/// The filter is described at UdpLink::several. For short datagrams, it returns 0, which is the first socket.
 void steer_by_connection(int fd, std::uint32_t count) {
   constexpr auto kTypeBits = 0x0FU;
   std::array<sock_filter, 7> program = {{
@@ -111,8 +109,7 @@ void steer_by_connection(int fd, std::uint32_t count) {
   set(fd, SO_ATTACH_REUSEPORT_CBPF, sock_fprog{static_cast<unsigned short>(program.size()), program.data()});
 }
 
-/// Otherwise, Asio would watch the socket with an epoll instance, which would be notified for each datagram. Throws
-/// std::system_error.
+/// Avoids Asio's epoll instance, which would be notified for each datagram. Throws std::system_error.
 int socket_on(const udp::endpoint& endpoint, bool shares_address) {
   asio::io_context context;
   udp::socket socket(context, endpoint.protocol());
@@ -190,7 +187,7 @@ bool UdpLink::send_to_network(const Address& to, std::span<const std::byte> data
   Message message(datagram, endpoint, endpoint.size());
   message.leave_from(*local);
   if (::sendmsg(fd_, &message.header, MSG_NOSIGNAL) >= 0) return true;
-  // This local address may have been removed, or it may be a multicast address.
+  // The local address may have been removed, or may be a multicast address.
   if (errno != EINVAL && errno != EADDRNOTAVAIL && errno != ENETUNREACH) return false;
   message.leave_from_any();
   return ::sendmsg(fd_, &message.header, MSG_NOSIGNAL) >= 0;

@@ -22,24 +22,20 @@ enum class Reach : std::uint8_t {
 };
 
 /// A UDP socket on one or all of the IPv4 or IPv6 addresses of this machine. If it is bound to 0.0.0.0 (IPv4) or [::]
-/// (both families), the reply to a peer is sent from the address that was used by the peer. Optionally, there is also a
-/// Unix socket for engines on the same machine.
-///
-/// The functions send() and receive() do not block.
-///
+/// (both families), it replies to a peer from the address that the peer has used. Optionally, there is also a Unix
+/// socket for engines on the same machine. send() and receive() do not block.
 /// Thread-safe: no. Realtime-safe: no (system calls).
 class UdpLink : public Link {
  public:
-  /// If the port is 0, it is chosen by the system. Throws std::invalid_argument if `listen` is not a loopback address
-  /// and `reach` does not allow this. Throws std::runtime_error if the system refuses, for example "cannot listen on
-  /// 127.0.0.1:47100: Address already in use". If `file` is set, a Unix socket is created as well. Throws the errors of
-  /// UnixSocket.
+  /// The system chooses a port if it is 0. Throws std::invalid_argument if `listen` is not a loopback address and
+  /// `reach` does not allow this. Throws std::runtime_error if the system refuses, for example "cannot listen on
+  /// 127.0.0.1:47100: Address already in use". With `file`, also creates a UnixSocket, and throws its errors.
   explicit UdpLink(const Address& listen, Reach reach = Reach::kThisMachine,
                    const std::optional<std::filesystem::path>& file = std::nullopt);
 
-  /// Creates links that share an address. Each link should be used in a separate thread, and `count` must be a power of
-  /// two. The kernel distributes Data datagrams based on the connection id modulo `count`, and all others to the first
-  /// link (SO_REUSEPORT with a filter, socket(7)). Throws the same errors as the constructor.
+  /// Creates links that share an address, each for a separate thread. `count` must be a power of two. The kernel
+  /// distributes Data datagrams based on the connection id modulo `count`, and sends all others to the first link
+  /// (SO_REUSEPORT with a filter, socket(7)). Throws the same errors as the constructor.
   static std::vector<std::unique_ptr<UdpLink>> several(const Address& listen, Reach reach, std::uint32_t count);
 
   ~UdpLink() override;
@@ -49,21 +45,18 @@ class UdpLink : public Link {
   /// If the datagram cannot be sent immediately, it is dropped and counted in send_failures().
   void send(const Address& to, std::span<const std::byte> datagram) override;
 
-  /// See Link. If there is a Unix socket, both sockets are read alternately. Empty datagrams are skipped because a size
-  /// of 0 means that there is no datagram.
+  /// Alternates with the Unix socket, if any. Skips empty datagrams, because a size of 0 means that there is none.
   std::size_t receive(Address& from, std::span<std::byte> buffer) override;
 
   LocalTime present(LocalTime now) const override;
 
-  /// Waits until a datagram can be received, the doorbell rings, or `timeout` has elapsed. It may return early if a
-  /// signal handler is called. The doorbell is answered. The resolution depends on the timer slack of the thread, which
-  /// is 50 µs by default.
+  /// Waits until a datagram can be received, the doorbell rings, or `timeout` has elapsed. Signal handlers can end it
+  /// early. The doorbell is answered. The resolution is the timer slack of the thread, which is 50 µs by default.
   void wait(Duration timeout, Doorbell* doorbell = nullptr);
 
-  /// Returns the address of the socket with the actual port.
-  Address local_address() const;
+  Address local_address() const;  ///< with the actual port
 
-  /// Returns the number of datagrams that have been dropped by send(). Thread-safe: yes.
+  /// The number of datagrams dropped by send(). Thread-safe: yes.
   std::uint64_t send_failures() const noexcept { return send_failures_.value(); }
 
   int fd() const noexcept { return fd_; }

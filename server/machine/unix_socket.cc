@@ -20,12 +20,10 @@
 namespace tendon {
 namespace {
 
-/// Limits the time in receive() during a flood.
-constexpr int kMaxSkips = 64;
+constexpr int kMaxSkips = 64;  ///< limits the time in receive() during a flood
 
 constexpr std::size_t kNameStart = offsetof(sockaddr_un, sun_path);
-/// A null byte and 5 hexadecimal digits, see unix_autobind() in net/unix/af_unix.c.
-constexpr std::size_t kDigits = 5;
+constexpr std::size_t kDigits = 5;  ///< hexadecimal, after a null byte; see unix_autobind() in net/unix/af_unix.c
 constexpr std::size_t kNameBytes = kNameStart + 1 + kDigits;
 
 /// The prefix of all addresses that represent peers. Only the first 12 bits of the IPv4 address are used.
@@ -103,7 +101,7 @@ void UnixSocket::bind_to_file() {
   if (::lstat(path_.c_str(), &found) == 0) {
     if (!S_ISSOCK(found.st_mode)) refuse(path_, "the file exists and is not a socket; it was not changed");
     if (::connect(fd_, as_address(name), sizeof name) == 0) refuse(path_, "another server is already listening there");
-    // No process is listening, so the file was left behind by a server that was killed.
+    // No process is listening, so a server that was killed has left the file behind.
     if (errno != ECONNREFUSED || ::unlink(path_.c_str()) != 0) refuse(path_, reason());
   }
   // Other users must not be able to write to the file, not even for a short time.

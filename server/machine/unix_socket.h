@@ -14,31 +14,28 @@ namespace tendon {
 /// A datagram socket for engines on the same machine. Access is controlled by the permissions of its file.
 ///
 /// The file is owned by the user and group of this process, and its mode is 0660. A peer is identified by the 20-bit
-/// name that was assigned to its socket by the kernel (autobind, see unix(7)). The name is mapped to an address from
+/// name that the kernel has assigned to its socket (autobind, see unix(7)). The name is mapped to an address from
 /// 127.240.0.0 to 127.255.255.255 with port 0, which cannot be the source of a datagram from the network. Peers in
 /// other network namespaces, for example in a container, cannot receive replies.
-///
 /// Thread-safe: no. Realtime-safe: no (system calls).
 class UnixSocket {
  public:
   static constexpr std::size_t kMostPath = 107;  ///< bytes, limited by sockaddr_un
 
-  /// Creates the file, or replaces a file that was left behind by a server. Throws std::runtime_error if another server
+  /// Creates the file, or replaces the file of a server that has exited. Throws std::runtime_error if another server
   /// uses the file, if it is not a socket, if the path is too long, or if the system refuses, for example "cannot
   /// listen on unix:/run/x: Permission denied".
   explicit UnixSocket(std::filesystem::path path);
-  /// Removes the file unless it was replaced by another process.
-  ~UnixSocket();
+  ~UnixSocket();  ///< removes the file unless it was replaced by another process
   UnixSocket(const UnixSocket&) = delete;
   UnixSocket& operator=(const UnixSocket&) = delete;
 
   static bool is_peer(const Address& address) noexcept;
 
-  /// Returns false if the datagram was dropped because the peer is gone or its queue is full. The default length of the
-  /// queue is 10 (net.unix.max_dgram_qlen).
+  /// Returns false if it was dropped: the peer is gone, or its queue is full (10 by default, net.unix.max_dgram_qlen).
   bool send(const Address& to, std::span<const std::byte> datagram) noexcept;
 
-  /// See Link. Empty datagrams and datagrams from unnamed sockets are skipped.
+  /// Skips empty datagrams and datagrams from unnamed sockets.
   std::size_t receive(Address& from, std::span<std::byte> buffer) noexcept;
 
   int fd() const noexcept { return fd_; }

@@ -25,13 +25,12 @@ bool MemorySink::append(std::span<const std::byte> bytes) {
   return true;
 }
 
-/// Opens an empty file. The descriptor is negative if the file is not empty or is used by another sink.
+/// The descriptor is negative if the file is not empty or is used by another sink.
 FileSink::Opened FileSink::open(const std::filesystem::path& path) {
   const auto fail = [&path](const std::string& why) {
     throw std::runtime_error("cannot write recording " + path.string() + ": " + why);
   };
-  // O_APPEND is required because an incomplete piece may be removed. O_NONBLOCK prevents us from waiting for the reader
-  // of a pipe, and has no effect on regular files.
+  // O_APPEND because incomplete pieces may be removed. O_NONBLOCK so that opening a pipe does not wait for its reader.
   constexpr int kFlags = O_WRONLY | O_APPEND | O_CLOEXEC | O_NONBLOCK | O_NOCTTY;
   int descriptor = ::open(path.c_str(), kFlags | O_CREAT | O_EXCL, 0644);
   if (descriptor < 0 && errno == EEXIST) descriptor = ::open(path.c_str(), kFlags);
@@ -48,7 +47,7 @@ FileSink::Opened FileSink::open(const std::filesystem::path& path) {
   if (descriptor < 0) fail(reason(error));
   if (!known) give_up(reason(errno));
   if (S_ISCHR(status.st_mode)) return {descriptor, false};
-  // This is checked again after locking because another sink may have written to it.
+  // Checked again after locking, because another sink may have written to it.
   const bool busy = ::flock(descriptor, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK;
   if (!busy && ::fstat(descriptor, &status) == 0 && status.st_size == 0) return {descriptor, true};
   ::close(descriptor);

@@ -11,7 +11,6 @@
 
 namespace tendon {
 
-///
 /// Thread-safe: no. Realtime-safe: no.
 class ByteSink {
  public:
@@ -24,8 +23,7 @@ class ByteSink {
   virtual std::string error() const = 0;
 };
 
-/// Used for simulated worlds.
-class MemorySink final : public ByteSink {
+class MemorySink final : public ByteSink {  ///< for simulated worlds
  public:
   bool append(std::span<const std::byte> bytes) override;
   std::string error() const override { return {}; }
@@ -35,15 +33,12 @@ class MemorySink final : public ByteSink {
   std::vector<std::byte> bytes_;
 };
 
-/// Writes to a new file. Existing data is never modified. Each piece is written immediately, so no data is lost if the
-/// process is killed, but it can be lost in a power failure. If the disk is full, an incomplete piece is removed.
-///
-/// Character devices like /dev/null and /dev/full can be used by several sinks. Pipes, sockets, block devices and
-/// directories are refused.
+/// Writes to a new file. Existing data is never modified. Each piece is written immediately, so a killed process loses
+/// no data, but a power failure can. If the disk is full, an incomplete piece is removed. Character devices like
+/// /dev/null and /dev/full can be used by several sinks. Pipes, sockets, block devices and directories are refused.
 class FileSink final : public ByteSink {
  public:
-  /// Creates the file, or uses an empty file that is not used by another sink. Throws std::runtime_error if the file is
-  /// not empty or is not writable.
+  /// Creates the file, or uses an empty, unused one. Throws std::runtime_error if it is not empty or not writable.
   explicit FileSink(const std::filesystem::path& path);
   ~FileSink() override;
   FileSink(const FileSink&) = delete;
@@ -57,10 +52,8 @@ class FileSink final : public ByteSink {
 
   const std::filesystem::path& path() const noexcept { return path_; }
   std::uint64_t size() const noexcept { return size_; }
-  /// Returns false for devices.
-  bool is_file() const noexcept { return is_file_; }
-  /// Returns true if `append` has failed because the file has been deleted or truncated.
-  bool gone() const noexcept { return gone_; }
+  bool is_file() const noexcept { return is_file_; }  ///< false for devices
+  bool gone() const noexcept { return gone_; }        ///< `append` has failed because the file was deleted or truncated
 
  private:
   struct Opened {

@@ -10,13 +10,10 @@ namespace tendon {
 
 /// Selects the datagrams that are recorded, so that an attacker cannot fill the disk or the queue of the log thread.
 ///
-/// * Datagrams that do not belong to a client can be sent by anybody. The first `unauthenticated_per_s` of each
-///   second are recorded. A normal handshake consists of four datagrams.
-/// * Datagrams of clients are recorded up to `bytes_per_s`, which is 10 times the rate of a 1 kHz engine and an
-///   observer.
+/// * The first `unauthenticated_per_s` of each second that do not belong to a client. A handshake consists of four.
+/// * Those of clients up to `bytes_per_s`, 10 times the rate of a 1 kHz engine and an observer.
 ///
 /// The caller must count the other datagrams. A second starts with the first datagram after the previous second.
-///
 /// Thread-safe: no. Realtime-safe: yes.
 class DatagramFilter {
  public:

@@ -13,18 +13,16 @@
 
 namespace tendon {
 
-/// Returns the path for the steps before a fault. For a recording `run.mcap`, this is `run.fault-1.mcap`. If there is
-/// no recording, or if it is a device or a pipe, this is `tendon.fault-1.mcap` in the working directory. If `device` is
-/// not empty, it is included, for example `run.left.fault-1.mcap`. It must be empty if there is only one device.
+/// Returns the path for the steps before a fault. For a recording `run.mcap`, this is `run.fault-1.mcap`. Without a
+/// recording, or if it is a device or a pipe, this is `tendon.fault-1.mcap` in the working directory. With a `device`,
+/// which must be empty if there is only one, this is for example `run.left.fault-1.mcap`.
 std::filesystem::path flight_path(const std::optional<std::filesystem::path>& recording, const std::string& device,
                                   int number);
 
-/// Creates the file with the first number that does not exist yet, so the files of earlier runs are kept. Throws
-/// std::runtime_error if the file cannot be created. Log thread only.
+/// Uses the first unused number, to keep earlier files. Throws std::runtime_error on failure. Log thread only.
 std::unique_ptr<FileSink> open_flight(const std::optional<std::filesystem::path>& recording, const std::string& device);
 
-/// Writes the steps before a fault to a new recording. `flight` must be frozen. Throws std::runtime_error if an error
-/// occurs in the sink. Log thread only.
+/// Writes a new recording. `flight` must be frozen. Throws std::runtime_error if the sink fails. Log thread only.
 void write_flight(const StepFlight& flight, const Recorder::Config& config, const SolverPaths& ways, ByteSink& sink);
 
 }  // namespace tendon

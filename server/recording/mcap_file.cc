@@ -139,7 +139,7 @@ File::File(std::unique_ptr<std::istream> input, std::string name) : input_(std::
   if (!*input_ || end < 0) throw std::runtime_error(name_ + ": cannot read the file");
   size_ = zeros_from_ = static_cast<std::uint64_t>(end);
   while (zeros_from_ > 0) {
-    // The first read is only one byte because most files do not end with zeros.
+    // The first read is only one byte, because most files do not end with zeros.
     const std::uint64_t step = zeros_from_ == size_ ? 1 : std::min(zeros_from_, kBlock);
     const auto block = read(zeros_from_ - step, step);
     const auto last = std::find_if(block.rbegin(), block.rend(), [](std::byte b) { return b != std::byte{0}; });

@@ -17,8 +17,7 @@ namespace tendon::mcap {
 
 std::string_view text_of(std::span<const std::byte> bytes);
 
-/// Reads the fields in the content of a record. If a field extends past the end, `ok` becomes false, and all subsequent
-/// fields are empty or zero.
+/// Reads the fields of a record. If one extends past the end, `ok` becomes false, and all later ones are empty or zero.
 class Fields {
  public:
   explicit Fields(std::span<const std::byte> bytes) : rest_(bytes) {}
@@ -45,17 +44,14 @@ struct ChunkHead {
   std::string_view compression;
   std::span<const std::byte> records;  ///< may be compressed
 };
-/// Returns nothing if the lengths are inconsistent with the size of `content`.
 std::optional<ChunkHead> chunk_head(std::span<const std::byte> content);
 
 /// Corrects the lengths in the content of a chunk. Returns false if the CRC of the records does not match.
 bool mend_chunk(std::span<std::byte> content);
 
-/// Returns true if the content of this type of record is checked by `why_damaged`.
 bool is_checked(Opcode opcode);
 
-/// Returns an error message if the lengths of the fields or the CRC of a chunk are not valid, for example "the CRC of a
-/// chunk does not match". Returns an empty string otherwise.
+/// Returns "the CRC of a chunk does not match", for example, or an empty string. Checks lengths of fields and CRCs.
 std::string why_damaged(Opcode opcode, std::span<const std::byte> content);
 
 /// Provides random access to an MCAP file that may be damaged. Thread-safe: no.
@@ -75,7 +71,7 @@ class File {
 
   const std::string& name() const noexcept { return name_; }
   std::uint64_t size() const noexcept { return size_; }
-  /// Returns the position after the last nonzero byte. A power failure can leave zeros at the end of the file.
+  /// The position after the last nonzero byte. A power failure can leave zeros at the end of the file.
   std::uint64_t zeros_from() const noexcept { return zeros_from_; }
 
   void read(std::uint64_t at, std::span<std::byte> bytes);
@@ -84,13 +80,12 @@ class File {
 
   /// Returns nothing if the record is too large or extends past the end of the file.
   std::optional<Record> record_at(std::uint64_t at);
-  /// Returns the chunk at `at`, even if the opcode is damaged. The length of a chunk is stored in three places. Returns
-  /// nothing if all of them are different.
+  /// Returns the chunk at `at`, even if its opcode is damaged, or nothing if all three copies of its length differ.
   std::optional<Record> chunk_at(std::uint64_t at);
   /// Returns true if there is a valid record at `at`, or if the remaining bytes are zero.
   bool goes_on_at(std::uint64_t at);
-  /// Returns the first valid chunk, schema or channel in [from, end). The next record must also be valid because there
-  /// is no CRC for schemas and channels.
+  /// Returns the first valid chunk, schema or channel in [from, end). The next record must also be valid, because
+  /// schemas and channels have no CRC.
   std::optional<std::uint64_t> find_record(std::uint64_t from, std::uint64_t end) { return find(from, end, false); }
   std::optional<std::uint64_t> find_chunk(std::uint64_t from, std::uint64_t end) { return find(from, end, true); }
 

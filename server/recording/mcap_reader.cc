@@ -35,7 +35,7 @@ McapReader::McapReader(std::unique_ptr<std::istream> input, std::string name)
     : file_(std::move(input), std::move(name)) {
   const auto head = file_.read(0, std::min<std::uint64_t>(file_.size(), kMagic.size()));
   ends_with_magic_ = file_.size() > kMagic.size() && file_.magic_at(file_.size() - kMagic.size());
-  // If the file is truncated or ends with zeros, this is less than the size of the head.
+  // Less than the size of the head if the file is truncated or ends with zeros.
   const auto written = static_cast<std::ptrdiff_t>(std::min<std::uint64_t>(file_.zeros_from(), kMagic.size()));
   if (!std::equal(head.begin(), head.begin() + written, kMagic.begin())) {
     const bool zeros = std::ranges::all_of(head, [](std::byte b) { return b == std::byte{0}; });

@@ -19,8 +19,7 @@ namespace tendon {
 
 /// Reads the messages of an MCAP file in the order of the file (https://mcap.dev/spec).
 ///
-/// * If the file is truncated, all messages in complete chunks are returned. This also applies if the file ends with
-///   zeros because of a power failure.
+/// * If the file is truncated, or ends with zeros after a power failure, all messages in complete chunks are returned.
 /// * If a CRC or a length is not valid, the chunk is skipped, and an error message is added to `damage()`. If the
 ///   record of a channel is damaged, the summary at the end of the file is used instead.
 /// * The sequence numbers of each channel are used to count missing messages. McapWriter starts at 0.
@@ -48,32 +47,27 @@ class McapReader {
   /// Throws std::runtime_error if this is not an MCAP file.
   McapReader(std::unique_ptr<std::istream> input, std::string name);
 
-  /// Returns nothing at the end of the file. Throws std::runtime_error if a chunk is compressed or if the file cannot
-  /// be read.
+  /// Returns nothing at the end. Throws std::runtime_error if a chunk is compressed or the file cannot be read.
   std::optional<Message> next();
 
-  /// This must only be called after `next` has returned nothing.
-  bool truncated() const noexcept { return truncated_; }
+  bool truncated() const noexcept { return truncated_; }  ///< only valid after `next` has returned nothing
 
-  /// Returns an error message for each damaged region so far, with its position in the file, the reason, and the times
-  /// of the adjacent messages relative to the first message.
+  /// Describes each damaged region so far: position, reason, and times of adjacent messages since the first message.
   std::vector<std::string> damage() const;
 
-  /// Returns the number of missing messages according to the summary, or 0 if there is no summary. This must only be
-  /// called after `next` has returned nothing.
+  /// The number of missing messages in the summary, or 0 without one. Only valid after `next` has returned nothing.
   std::uint64_t missing_at_end(std::string_view topic);
 
   /// Replaces the channels, including those of messages that have already been returned, with those in the summary.
-  /// Returns false if this is not possible or if it has already been done.
+  /// Returns false if this is not possible or has already been done.
   bool use_summary();
 
   std::uint64_t size() const noexcept { return file_.size(); }
 
   const std::map<std::uint16_t, Channel>& channels() const noexcept { return channels_; }
 
-  /// Adds an error message to `damage()`.
   void note(std::uint64_t offset, const std::string& what) { note(offset, offset, what); }
-  /// Throws std::runtime_error with the message "NAME: byte OFFSET: what".
+  /// Throws std::runtime_error "NAME: byte OFFSET: what".
   [[noreturn]] void corrupt(std::uint64_t offset, const std::string& what) const;
 
  private:

@@ -20,7 +20,6 @@ namespace tendon {
 /// The first call of `flush_chunk` also writes the start of the file, and `close` writes the summary. Therefore, the
 /// file can be read at any time up to the last chunk, but it is reported as truncated without the summary. The output
 /// is deterministic. If the sink fails, all subsequent data is dropped, and `flush_chunk` and `close` return false.
-///
 /// Thread-safe: no. Realtime-safe: no.
 class McapWriter {
  public:
@@ -35,8 +34,7 @@ class McapWriter {
   /// Throws std::invalid_argument if the schema does not exist.
   std::uint16_t add_channel(std::uint16_t schema_id, std::string_view topic, std::string_view message_encoding);
 
-  /// `log_time` is in ns and does not have to be monotonic. Throws std::invalid_argument if the channel does not exist,
-  /// and std::logic_error after `close`.
+  /// `log_time` in ns, in any order. Throws std::invalid_argument for unknown channels, std::logic_error after `close`.
   void write(std::uint16_t channel_id, std::uint64_t log_time, std::string_view data);
 
   std::size_t chunk_size() const noexcept { return records_.size(); }

@@ -104,7 +104,6 @@ bool is_of_another(const fs::path& part, const fs::path& path) {
   return scene && !scene->first_part.empty() && scene->first_part != path.filename();
 }
 
-/// Returns true if the file is still locked by a server.
 bool is_in_use(const fs::path& path) {
   const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
   if (descriptor < 0) return true;

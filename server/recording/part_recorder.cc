@@ -46,7 +46,7 @@ void PartRecorder::record(const StepRecord& step, std::size_t device, std::strin
   look_after(step.hand.at);
 }
 
-/// This does not start a new part because the step with the same tick must be in the same part.
+/// Does not start a new part, because the step with the same tick must be in the same part.
 void PartRecorder::record(const PortRecord& port, std::size_t device) {
   if (recorder_) recorder_->record(port, device);
 }

@@ -17,8 +17,7 @@
 
 namespace tendon {
 
-/// Records a run in one or more complete recordings (part_files.h). The conditions for a new part are:
-///
+/// Records a run in one or more complete recordings (part_files.h). A new part is started in these cases:
 /// * The current part has reached `rotate_bytes` or `rotate_after`.
 /// * The index has 65 536 chunks, which require about 10 MB. This limits the memory for long runs.
 /// * The previous part could not be written because the disk was full or the file was deleted. The new part is started
@@ -31,7 +30,6 @@ namespace tendon {
 /// those that are kept because of their number (Config::one_in). If the process is killed, undecided parts are kept.
 ///
 /// The records must be passed in the same order as to Recorder.
-///
 /// Thread-safe: no, only used by the log thread. Realtime-safe: no.
 class PartRecorder {
  public:
@@ -40,14 +38,12 @@ class PartRecorder {
     Recorder::Config run;
     std::uint64_t rotate_bytes = 4'000'000'000;
     Duration rotate_after = std::chrono::hours(4);
-    /// The maximum total size of all parts with this name, including previous runs. If this is 0, no parts are deleted.
-    /// Otherwise, the size of a part is limited to a quarter of the budget.
+    /// Maximum total size of all parts, also of previous runs; 0: unlimited. A part can use a quarter of it.
     std::uint64_t budget_bytes = 0;
     Keep keep = Keep::kAll;
-    /// With Keep::kFaults, the parts 1, 1 + one_in, 1 + 2 one_in, and so on, are also kept. Not used if this is 0.
+    /// With Keep::kFaults, the parts 1, 1 + one_in, 1 + 2 one_in, and so on, are also kept; 0: none.
     std::uint64_t one_in = 0;
-    /// The period for checking the free space while recording is stopped.
-    Duration retry_after = std::chrono::seconds(1);
+    Duration retry_after = std::chrono::seconds(1);  ///< for checking the free space while recording is stopped
   };
   struct Status {
     std::filesystem::path path;
@@ -62,7 +58,7 @@ class PartRecorder {
     std::uint64_t datagrams_over_budget = 0;
     std::string error;  ///< the reason why recording is stopped, or empty
 
-    /// Returns true if no records are missing, except for those that have been left out by DatagramFilter.
+    /// True if no records are missing, except for those that DatagramFilter has left out.
     bool complete() const noexcept { return lost_steps == 0 && lost_datagrams == 0 && error.empty(); }
   };
   struct Notice {
@@ -101,8 +97,7 @@ class PartRecorder {
 
   Config config_;
   std::unique_ptr<FileSink> sink_;
-  /// The current part. It is empty while recording is stopped, and after `close`.
-  std::optional<Recorder> recorder_;
+  std::optional<Recorder> recorder_;  ///< empty while recording is stopped, and after `close`
   LocalTime part_began_{};
   struct Undecided {
     std::filesystem::path path;

@@ -16,22 +16,17 @@
 
 namespace tendon {
 
-/// Records a run in an MCAP file. It contains the scene, all haptic steps and all datagrams as protobuf messages
-/// (recording.proto). The file can be opened by Foxglove and PlotJuggler.
+/// Records scene, steps and datagrams in an MCAP file, as protobuf (recording.proto), for Foxglove and PlotJuggler.
 ///
 /// * If the server is killed, the file is still readable, but the last `flush_after` may be missing.
 /// * The output is deterministic. It does not depend on a clock or on addresses in memory.
-/// * If the sink fails, for example because the disk is full, no more data is written. Subsequent records are counted,
-///   the existing data is still readable, and the reason is available in `status().error`. PartRecorder then continues
-///   with another file.
+/// * If the sink fails, for example because the disk is full, no more data is written. Later records are counted, the
+///   existing data is readable, and `status().error` is the reason. PartRecorder continues with another file.
 ///
-/// Steps must be passed in chronological order, and datagrams as well. The order between steps and datagrams is
-/// arbitrary.
-///
+/// Steps must be passed in chronological order, and so must datagrams, but not relative to each other.
 /// Thread-safe: no, only used by the log thread. Realtime-safe: no.
 class Recorder {
  public:
-  /// An additional device.
   struct Device {
     std::string name;  ///< used in the topics /NAME/scene and /NAME/haptic/step
     SceneRecord scene;
@@ -42,11 +37,9 @@ class Recorder {
     bool ports = false;  ///< the first device has a coupling
     std::vector<Device> more_devices{};
     LocalTime started{};  ///< log time of the scene
-    /// The maximum duration that can be lost if the process is killed. Each flush requires a write(2), and about 300
-    /// bytes for the chunk and its index.
+    /// The most that is lost if the process is killed. Each flush requires a write(2) and about 300 bytes in the file.
     Duration flush_after = std::chrono::milliseconds(250);
-    /// The size of the messages, in bytes, at which a chunk is closed. A reader seeks to chunks and keeps some of them
-    /// in memory.
+    /// Bytes of messages at which a chunk is closed. A reader seeks to chunks and keeps some of them in memory.
     std::size_t flush_size = std::size_t{256} * 1024;
   };
   struct Status {
@@ -58,32 +51,28 @@ class Recorder {
     std::string error;                 ///< the reason why recording has failed, or empty
   };
 
-  /// Writes the scene immediately. `sink` must outlive the recorder. If it fails, this is reported by `status()`.
+  /// Writes the scene immediately, and reports failures by `status()`. `sink` must outlive the recorder.
   Recorder(const Config& config, ByteSink& sink);
   Recorder(const Recorder&) = delete;
   Recorder& operator=(const Recorder&) = delete;
 
   /// `device` is 0 for the first device, followed by `more_devices`. `force_way` is the name of Step::force_way.
   void record(const StepRecord& step, std::size_t device = 0, std::string_view force_way = {});
-  /// The device must have `ports`. This must be called before recording the step with the same tick.
+  /// The device must have `ports`. Must be called before recording the step with the same tick.
   void record(const PortRecord& port, std::size_t device = 0);
   void record(const DatagramRecord& datagram);
-  /// Records that previous records were dropped by the caller.
-  void lost(const LossRecord& loss);
+  void lost(const LossRecord& loss);  ///< previous records were dropped by the caller
 
-  /// Flushes records that are older than `flush_after`. This should be called after each batch of records.
+  /// Flushes records that are older than `flush_after`. Should be called after each batch of records.
   void tick(LocalTime now);
 
-  /// Finishes the file with an index. Without the index, the file is readable, but it is considered truncated and takes
-  /// longer to open. Subsequent records are counted as lost.
+  /// Adds the index, without which the file counts as truncated and opens slowly. Later records are counted as lost.
   void close();
 
   Status status() const;
-  /// Faster than `status()`.
-  bool failed() const noexcept { return failed_; }
+  bool failed() const noexcept { return failed_; }  ///< faster than `status()`
   std::uint64_t bytes() const noexcept { return writer_.bytes_written(); }
-  /// The number of chunks in the index. It is kept in memory until `close` is called, and requires about 150 bytes per
-  /// chunk.
+  /// The chunks in the index, which requires about 150 bytes of memory per chunk until `close` is called.
   std::size_t chunks() const noexcept { return writer_.chunks(); }
 
  private:

@@ -9,7 +9,7 @@
 #include "server/recording/records.h"
 #include "server/recording/solver_paths.h"
 
-// Converts records to messages of recording.proto, and back. Protobuf must not be used anywhere else in the server.
+// Converts records to messages of recording.proto, and back. The server must not use protobuf anywhere else.
 
 namespace tendon {
 
@@ -20,10 +20,9 @@ struct SceneRecord {
   std::string commit;
   Duration unix_offset{};  ///< log_time − local time
   std::uint32_t part = 0;  ///< starting at 1; 0 if there are no other parts
-  /// The recording may be deleted to limit the total size of all parts to this value. It is kept if this is 0.
+  /// The recording may be deleted to limit the total size of all parts to this value; 0: it is kept.
   std::uint64_t budget_bytes = 0;
-  /// The file name of part 1. This is only set if `budget_bytes` is set. It is required because `subject-2.mcap` can
-  /// also be the first part of a different recording.
+  /// The file name of part 1, if `budget_bytes` is set, because `subject-2.mcap` can also be the first part.
   std::string first_part = {};
 
   bool operator==(const SceneRecord&) const = default;
@@ -62,7 +61,6 @@ inline constexpr std::string_view kEncoding = "protobuf";
 
 std::string schema_data();
 
-/// The output is deterministic.
 std::string encode(const SceneRecord& scene);
 /// `force_way` is the name of Step::force_way. The number is only valid in this run.
 std::string encode(const StepRecord& step, std::string_view force_way = {});
@@ -71,10 +69,8 @@ std::string encode(const ClockRecord& clock);
 std::string encode(const DatagramRecord& datagram);
 std::string encode(const LossRecord& loss);
 
-// Decodes a message. `at` is the local time of the message. All floating-point values are preserved exactly, including
-// NaN. Throws std::invalid_argument if the message is not valid.
+// Floating-point values are preserved exactly, including NaN. Throws std::invalid_argument if a message is not valid.
 SceneRecord decode_scene(std::string_view message);
-/// The name of Step::force_way is added to `ways`.
 StepRecord decode_step(std::string_view message, LocalTime at, SolverPaths& ways);
 PortRecord decode_port(std::string_view message, LocalTime at);
 DatagramRecord decode_datagram(std::string_view message, LocalTime at);

@@ -20,11 +20,10 @@ struct LoopStep {
   std::uint32_t buttons = 0;  ///< bit i: button i is pressed
 };
 
-/// A recorded haptic step with all inputs that are required to replay it.
+/// A haptic step with all inputs that are required to replay it.
 struct StepRecord : Step, LoopStep {};
 
-/// The state of a coupling in a haptic step. It can be replayed together with the StepRecord and the other couplings of
-/// this tick.
+/// The state of a coupling in a haptic step. To be replayed with the StepRecord and the other couplings of this tick.
 struct PortRecord {
   std::uint64_t tick = 0;
   std::uint32_t channel = 0;              ///< used by the leader; 0 if there is one coupling
@@ -38,7 +37,7 @@ struct PortRecord {
   LocalTime peer_arrived{};
 };
 
-/// The offset of the follower's clock from the leader's clock.
+/// Offset of the follower's clock from the leader's clock.
 struct ClockRecord {
   Duration offset{};
   Duration error{};  ///< the true offset is in the range ± error

@@ -10,16 +10,13 @@
 
 namespace tendon {
 
-/// The names of the solver paths of a device (Hello::ways). They are numbered from 1 in the order of their first use,
-/// so that a step can store a number instead of a string. The numbers are valid during the lifetime of this object.
-///
+/// The names of the solver paths of a device (Hello::ways), numbered from 1 in the order of their first use, so that a
+/// step stores a number instead of a string. The numbers are valid during the lifetime of this object.
 /// Thread-safe: only one thread may call `number_of`. Other threads may call `name_of` for a number that they have
-/// received with synchronization, for example through a mailbox.
-/// Realtime-safe: yes.
+/// received with synchronization, for example through a mailbox. Realtime-safe: yes.
 class SolverPaths {
  public:
-  /// Typical engines have about five names. 1.6 kB.
-  static constexpr std::size_t kMost = 63;
+  static constexpr std::size_t kMost = 63;  ///< typical engines have about five names; 1.6 kB
 
   /// Returns 0 if `name` is empty or longer than limits::kMaxLabel, or if it is new and there are already kMost names.
   std::uint8_t number_of(std::string_view name) noexcept;

@@ -9,12 +9,11 @@
 
 namespace tendon {
 
-/// Stores the last steps of a device before a fault. Without handles, this saves half of the memory of a StepRecord.
-///
-/// Thread-safe, Realtime-safe: see FlightRecorder.
+/// Stores the last steps of a device before a fault. Without `handles`, the handles of steps are not stored, which
+/// saves half of the memory of a StepRecord. Thread-safe, Realtime-safe: see FlightRecorder.
 class StepFlight {
  public:
-  /// `capacity` must be a power of two. Without `handles`, the handles of steps are not stored.
+  /// `capacity` must be a power of two.
   explicit StepFlight(std::size_t capacity, bool handles = true) : steps_(capacity) {
     if (handles) handles_.emplace(capacity);
   }
@@ -24,7 +23,7 @@ class StepFlight {
     if (handles_) handles_->record(step.handle);
   }
 
-  /// The order is important because the other thread only checks the recorder of the steps.
+  /// In this order, because the other thread only checks the recorder of the steps.
   void freeze() noexcept {
     if (handles_) handles_->freeze();
     steps_.freeze();

@@ -22,7 +22,6 @@
 namespace tendon::scene_file {
 namespace {
 
-/// The USB port of a device, as named by the kernel.
 struct UsbPort {
   static std::string expected(const Unit&) { return "a port from `tendond devices`, like \"1-2.3\""; }
 
@@ -40,7 +39,7 @@ struct UsbPort {
   static std::string shown(const Unit&, const std::string& value) { return in_quotes(value); }
 };
 
-/// A Haptikfabriken device with published kinematics.
+/// Excludes devices without published kinematics.
 struct ArmModel {
   static std::string expected(const Unit&) {
     std::string text = "one of ";
@@ -65,7 +64,6 @@ struct ArmModel {
   }
 };
 
-/// The resolution of the force sensor, if there is one.
 struct Sensor {
   static std::string expected(const Unit&) {
     return "the size of one count in N, 0 for an exact one, or false for none";
@@ -125,7 +123,7 @@ struct Axes {
   static std::string shown(const Unit&, const std::string& value) { return in_quotes(value); }
 };
 
-/// A scalar that is stored as the x coordinate of a point. This is used for the opening of a gripper.
+/// The x coordinate of a point, for the opening of a gripper.
 struct AlongX {
   static std::string expected(const Unit& unit) { return kAnyNumber.expected(unit); }
 

@@ -40,8 +40,7 @@ bool write_whole(int descriptor, std::string_view text) {
   return true;
 }
 
-/// Returns false and sets errno if the new name is already used. Some file systems like NFS do not support renaming
-/// without overwriting, and some like FAT do not support links.
+/// Returns false and sets errno if the name is used. NFS cannot rename without overwriting, and FAT has no links.
 bool give_name(const std::string& from, const std::filesystem::path& to) {
   if (::renameat2(AT_FDCWD, from.c_str(), AT_FDCWD, to.c_str(), RENAME_NOREPLACE) == 0) return true;
   if (errno != EINVAL || ::link(from.c_str(), to.c_str()) != 0) return false;

@@ -331,9 +331,8 @@ void declare_law(Table& limiter, Draft& draft) {
 /// From 100 µs to 4 ms. At 4 ms, the stiffest wall that felt clean was 0.325 N/mm (Choi and Tan, IROS 2004). The
 /// wake-up latency of an ordinary kernel is about 100 µs.
 constexpr Number kPeriod{.least = 100, .most = 4000};
-/// The maximum number in the cpu_set_t of the kernel.
-constexpr Count kProcessor{1023};
-/// The timeouts in the protocol are in ms.
+constexpr Count kProcessor{1023};  ///< the maximum number in the cpu_set_t of the kernel
+/// The protocol has timeouts in ms.
 constexpr Number kTimeout{.least = 1, .most = limits::kMaxTimeout / std::chrono::milliseconds(1)};
 /// Each observer requires 250 bytes per haptic step. For 1000 observers, this is 2 Gbit/s at 1 kHz.
 constexpr Count kObservers{1000};

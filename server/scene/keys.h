@@ -11,9 +11,8 @@
 #include "server/scene/scene.h"
 #include "server/tables/recorded_motion.h"
 
-// Declares the keys of a scene. The declarations are used by Reader (reader.h), Reference (reference.h) and Parts
-// (parts.h). The default value of a key is the initializer of its target. To add a key, add one line to keys.cc or
-// device_keys.cc. Internal to server/scene.
+// Declares the keys of a scene for Reader (reader.h), Reference (reference.h) and Parts (parts.h). The default value of
+// a key is the initializer of its target. A new key is one line in keys.cc or device_keys.cc. Internal.
 
 namespace tendon::scene_file {
 
@@ -22,7 +21,7 @@ struct DraftMotion {
   std::optional<RecordedMotionFile> recorded{};
 };
 
-/// A scene while it is being read. The values that depend on several keys are computed in resolver.h.
+/// A scene while it is being read. resolver.h computes the values that depend on several keys.
 struct Draft {
   Scene scene;
   SimulatedDevice::Config simulated;  ///< the device, or the simulation of a real device
@@ -67,8 +66,7 @@ struct Draft {
   std::vector<double> place_viscous;
 };
 
-/// N. For a device without motors. Large enough to record the forces of the engines without changes.
-inline constexpr double kUnfelt = 10;
+inline constexpr double kUnfelt = 10;  ///< N, without motors; enough to record the forces of the engines unchanged
 
 template <class Table>
 void declare_scene(Table& scene, Draft& draft);

@@ -43,7 +43,7 @@ class LimiterResolver : SceneErrors {
   }
 
  private:
-  /// The bounds are required if the device has these motors because the limiter must limit all torques.
+  /// Required if the device has these motors, because the limiter must limit all torques.
   void resolve_rotation(HapticController::Config& control) const {
     const auto& device = draft_.simulated.rotation;
     const bool motors = device && device->max_torque;
@@ -136,7 +136,7 @@ class LimiterResolver : SceneErrors {
     }
   }
 
-  /// Refuses a friction bound for a real device if it is higher than the friction of any known device.
+  /// Refuses a friction bound of a real device above the friction of any known device.
   void refuse_impossible(const std::string& key, double bound, double most) const {
     if (bound <= most || !draft_.scene.driver().moves_a_hand) return;
     const Unit& unit = unit_of(key);

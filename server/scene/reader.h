@@ -30,7 +30,7 @@ std::string advice(std::string_view unknown, const std::vector<std::string_view>
 /// Returns the present name of a key of an earlier version, or nothing.
 std::string_view new_name_of(std::string_view path) noexcept;
 
-/// A position in the file. If the line is 0, it is unknown.
+/// A position in the file. Line 0 is unknown.
 struct Place {
   std::uint32_t line = 0;
   std::uint32_t column = 0;
@@ -78,11 +78,10 @@ class SceneProblems {
 /// Reports inconsistencies between several keys of a file.
 class SceneErrors {
  public:
-  /// `name` is the start of error messages. Both arguments must outlive this object.
+  /// `name` starts error messages. Both arguments must outlive this object.
   SceneErrors(const toml::table& file, const std::string& name) : file_(file), name_(name) {}
 
-  /// Throws a SceneError with the line of the first of `places` that exists in the file, or of the innermost table that
-  /// contains the key.
+  /// Throws a SceneError with the line of the first of `places` in the file, or of the innermost table with the key.
   [[noreturn]] void blame(std::string_view key, std::initializer_list<std::string_view> places,
                           const std::string& sentence) const;
 

@@ -8,9 +8,9 @@
 
 namespace tendon {
 
-/// Reads the motion of the hand, of the first device, for a ReplayDevice. If a step does not have a position, there is
-/// a gap in the motion. Throws std::runtime_error for the errors of `RecordingReader`, if there are fewer than 2
-/// positions, or if there are more than `kMaxRecordedSamples`.
+/// Reads the motion of the hand, of the first device, for a ReplayDevice. Steps without a position are gaps in the
+/// motion. Throws std::runtime_error for the errors of `RecordingReader`, if there are fewer than 2 positions, or if
+/// there are more than `kMaxRecordedSamples`.
 std::vector<ReplayDevice::Sample> read_recorded_hand(const std::filesystem::path& recording);
 
 }  // namespace tendon

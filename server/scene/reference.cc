@@ -13,7 +13,7 @@
 namespace tendon {
 namespace {
 
-/// If there are several kinds of a table, each kind has its own chapter.
+/// Each kind of a table has its own chapter.
 struct Chapter {
   std::string table;
   std::string text;

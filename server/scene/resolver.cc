@@ -28,7 +28,7 @@
 namespace tendon::scene_file {
 namespace {
 
-/// If a device does not respond for this time, this is a fault. The same value is used in libfranka.
+/// A device that does not respond for this time is a fault, as in libfranka.
 constexpr Duration kMostMissed = std::chrono::milliseconds(20);
 
 class SceneResolver : SceneErrors {
@@ -353,7 +353,7 @@ class SceneResolver : SceneErrors {
     resolve_limiter(draft_, *this);
   }
 
-  /// The result is compared with the configuration of the peer when the connection is established.
+  /// The peer's configuration is compared with the result when the connection is established.
   void resolve_teleoperation(const std::filesystem::path& directory) {
     auto& peer = draft_.scene.teleoperation;
     if (!peer) return;
@@ -488,7 +488,7 @@ class SceneResolver : SceneErrors {
     }
   }
 
-  /// The error refers to the line of the key that violates a rule.
+  /// Reports the line of the key that violates a rule.
   void blame_rules(const Coupling::Config& coupling) const {
     struct Row {
       std::string_view field;

@@ -13,8 +13,8 @@ namespace tendon::scene_file {
 
 void resolve_limiter(Draft& draft, const SceneErrors& errors);
 
-/// Checks and computes all values that depend on several keys. Files in the scene are read relative to `directory`.
-/// `file` and `name` are used in error messages. Throws SceneError.
+/// Checks and computes all values that depend on several keys. Files in the scene are relative to `directory`. `file`
+/// and `name` are used in error messages. Throws SceneError.
 Scene resolve(Draft draft, const toml::table& file, const std::string& name, const std::filesystem::path& directory);
 
 }  // namespace tendon::scene_file

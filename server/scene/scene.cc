@@ -8,7 +8,7 @@
 namespace tendon {
 namespace {
 
-/// Calls the free function, which would otherwise be hidden by the member function with the same name.
+/// Calls the free function, which the member function with the same name would hide.
 template <class Device>
 const Driver& row_of(const Device& device) {
   return driver(device);

@@ -35,8 +35,7 @@ struct Scene {
     Address listen = parse_address("127.0.0.1:47100");
     std::optional<std::filesystem::path> unix_path{};  ///< see UnixSocket; relative to the current directory
     std::optional<std::filesystem::path> keys;         ///< directory; if empty, no keys are required on this machine
-    /// For clients with a key. Only the suites that are supported by the processor are used.
-    Suites suites = all_suites();
+    Suites suites = all_suites();  ///< for clients with a key; only those that the processor supports
     std::size_t max_observers = NetworkLoop::Config{}.max_observers;
     Duration controller_timeout = NetworkLoop::Config{}.controller_timeout;
     Duration observer_timeout = NetworkLoop::Config{}.observer_timeout;
@@ -55,7 +54,6 @@ struct Scene {
   using AnyDevice = std::variant<SimulatedDevice::Config, falcon::Config, ReplayDevice::Config, spacemouse::Config,
                                  woodenhaptics::Config>;
 
-  /// See PartRecorder and DatagramFilter.
   struct Recording {
     std::filesystem::path path;  ///< relative to the current directory
     double rotate_bytes = 4e9;
@@ -66,7 +64,6 @@ struct Scene {
     double datagram_bytes_per_s = 4e6;
   };
 
-  /// Announces the device by DNS-SD, see Announcer.
   struct Discovery {
     bool announce = false;
     std::string name;  ///< if empty, "NAME at HOST"
@@ -82,7 +79,7 @@ struct Scene {
       std::string channel;
       double share = 0;  ///< initial value of α
     };
-    /// In the same order as loop.control.leaders. If this is empty, there is one leader, which can use any channel.
+    /// In the order of loop.control.leaders. If empty, there is one leader, which can use any channel.
     std::vector<Leader> leaders{};
   };
 
@@ -105,20 +102,17 @@ struct Scene {
 
   std::string name_of(std::uint32_t index) const;
   const Driver& driver() const;
-  /// USB devices may block, so they have their own haptic threads.
-  bool shares_thread() const { return driver().ids.empty(); }
+  bool shares_thread() const { return driver().ids.empty(); }  ///< USB devices may block, so they have their own
   bool dials() const { return teleoperation && teleoperation->dial; }
-  /// For devices other than SimulatedDevice, this is used for measuring the cost of a step.
+  /// For devices other than SimulatedDevice, for measuring the cost of a step.
   SimulatedDevice::Config simulated() const;
 };
 
-/// Returns the key that prevents the use of several network threads, or an empty string. A busy thread requires its own
-/// processor. Datagrams from a Unix socket, or from a dialled server, cannot be distributed by the kernel
-/// (UdpLink::several).
+/// Returns the key that prevents several network threads, or an empty string. A busy thread requires its own processor.
+/// The kernel cannot distribute datagrams from a Unix socket or a dialled server (UdpLink::several).
 std::string_view needs_one_network_thread(const std::vector<Scene>& scenes);
 
-/// In the order of Scene::AnyDevice.
-const std::vector<const Driver*>& drivers();
+const std::vector<const Driver*>& drivers();  ///< in the order of Scene::AnyDevice
 
 /// Thrown if a scene file, or a file that is used by a scene, cannot be read.
 class SceneFileError : public SceneError {
@@ -127,14 +121,12 @@ class SceneFileError : public SceneError {
 };
 
 /// Throws SceneError if the scene is not valid, and SceneFileError if the file cannot be read or is not a regular file.
-/// The first error in the file is reported. Missing keys are only reported if there are no other errors, because a
-/// misspelled key is both unknown and missing.
+/// Reports the first error, and missing keys only if there are no others, because a misspelled key is both.
 Scene read_scene(const std::filesystem::path& file);
 
 /// Reads the scenes of a server. `loop.device` is set to the index of the first device of each scene. Only the first
 /// scene can have tables [network] and [recording]. Device names must be unique, and USB devices must be among the
-/// first limits::kMaxDevices of at most kMostDevices. `overrides` returns the settings from the command line, see
-/// parse_scene().
+/// first limits::kMaxDevices of at most kMostDevices. `overrides` returns settings for parse_scene().
 using Overrides = std::function<std::vector<std::string>(const Scene&)>;
 std::vector<Scene> read_scenes(const std::vector<std::filesystem::path>& files, const Overrides& overrides = {});
 
@@ -142,7 +134,7 @@ std::vector<Scene> each_device(const std::vector<Scene>& scenes);
 
 /// Parses a scene. `name` is used in error messages. Recorded motions are loaded relative to `directory`.
 ///
-/// Each of the `settings` is "TABLE.KEY=VALUE", where the value is in TOML or is a word without quotes. If there is no
+/// Each of the `settings` is "TABLE.KEY=VALUE", where the value is in TOML or is a word without quotes. Without a
 /// value, the key or the table is removed. `Scene::text` then contains the resulting scene without comments.
 Scene parse_scene(std::string_view text, const std::string& name, const std::filesystem::path& directory,
                   std::span<const std::string> settings = {});
@@ -157,14 +149,12 @@ struct ScenePart {
 
 const std::vector<ScenePart>& scene_parts();
 
-/// Also removes everything that depends on the part. The device must be simulated. Returns false if the scene does not
-/// have this part.
+/// Also removes what depends on the part. The device must be simulated. Returns false if there is no such part.
 bool take_out(Scene& scene, std::string_view key);
 
 std::string scene_reference();
 
-/// Returns the documentation of a table, such as "limiter" or "device.hand". Throws std::invalid_argument with the
-/// closest name if there is no such table.
+/// Documents a table, such as "limiter" or "device.hand". Throws std::invalid_argument with the closest name.
 std::string scene_reference(std::string_view table);
 
 std::string scene_tables();

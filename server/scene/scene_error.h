@@ -6,15 +6,13 @@
 
 namespace tendon {
 
-/// The message is "FILE:LINE: KEY: expected …, found …". The line is omitted if it is unknown, for example because a
-/// table is missing. The key is omitted for syntax errors.
+/// "FILE:LINE: KEY: expected …, found …". Without LINE if it is unknown, and without KEY for syntax errors.
 class SceneError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
-/// Bytes. Protects against files of other types. With deeply nested tables, a file of 4 times this size causes a stack
-/// overflow in toml++ if the stack has 8 MiB.
+/// Bytes. Protects against files of other types. At 4 times this size, nested tables overflow a stack of 8 MiB.
 inline constexpr std::size_t kMaxSceneBytes = 16'384;
 
 }  // namespace tendon

@@ -11,7 +11,7 @@
 namespace tendon::scene_file {
 namespace {
 
-/// The axes in the frame of the leader that are coupled. The value is "xyz" or a subset of these letters in this order.
+/// The coupled axes in the frame of the leader, as "xyz" or a subset of these letters in this order.
 struct CoupledAxes {
   static constexpr std::string_view kLetters = "xyz";
 
@@ -41,8 +41,7 @@ struct CoupledAxes {
   }
 };
 
-/// The range for the scales of displacements and forces.
-constexpr Number kScale{.least = 0.01, .most = 100};
+constexpr Number kScale{.least = 0.01, .most = 100};  ///< of displacements and forces
 constexpr Number kShare{.least = 0, .most = 1};
 
 template <class Table>

@@ -33,7 +33,7 @@
 
 namespace tendon::scene_file {
 
-/// `part` is the description for `tendond explain` if the key or table is a part that can be removed from a scene.
+/// `part` describes a key or table that can be removed from a scene, for `tendond explain`.
 struct Name {
   std::string_view name;
   std::string_view part;
@@ -62,8 +62,7 @@ struct Unit {
 
 inline constexpr Unit kNoUnit = {"", "", 1};
 
-/// Returns kNoUnit if the key has no suffix with a unit.
-const Unit& unit_of(std::string_view key);
+const Unit& unit_of(std::string_view key);  ///< kNoUnit if the key has no suffix with a unit
 
 std::string with_symbol(std::string text, const Unit& unit);
 
@@ -74,8 +73,7 @@ std::string in_quotes(std::string_view text);
 
 std::string found_in(const toml::node& node);
 
-/// Returns nothing if this is not an integer or a floating-point number.
-std::optional<double> number_in(const toml::node& node);
+std::optional<double> number_in(const toml::node& node);  ///< nothing unless an integer or floating-point number
 
 struct Refusal {
   const toml::node* found;

@@ -23,7 +23,7 @@ struct RecordedMotionFile {
   ScriptedMotion::Recorded::AtEnd at_end = ScriptedMotion::Recorded::AtEnd::kHold;
 };
 
-/// The maximum number of samples, which is 33 minutes at 2 kHz or 64 MB. It protects against files of the wrong type.
+/// 33 minutes at 2 kHz, or 64 MB. Protects against files of the wrong type.
 inline constexpr std::size_t kMaxRecordedSamples = 4'000'000;
 
 /// Reads a recorded motion from `csv`, which must be the content of `file.path`. This requires memory for all samples.

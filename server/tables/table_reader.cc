@@ -56,7 +56,7 @@ std::optional<double> number_with_comma(std::string_view text) {
   return plain_number(with_point);
 }
 
-/// Returns true for a number like "1,012". Its comma could be a thousands separator.
+/// True for a number like "1,012", whose comma could be a thousands separator.
 bool may_separate_thousands(std::string_view text) {
   if (text.starts_with('-') || text.starts_with('+')) text.remove_prefix(1);
   const auto comma = text.find(',');
@@ -79,8 +79,6 @@ bool is_plain_name(std::string_view text) {
   return !text.empty() && !is_digit(text.front()) &&
          std::ranges::all_of(text, [](char c) { return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_'; });
 }
-
-// ---- Names and units ------------------------------------------------------------------------------------------------
 
 enum class Kind { kTime, kLength, kForce, kTorque, kAngle };
 
@@ -145,7 +143,7 @@ Named named(std::string_view cell) {
 TableReader::Column converted(std::size_t index, const Unit* from, const Unit* to) {
   TableReader::Column column{.index = index};
   if (from == nullptr || to == nullptr || from->kind != to->kind) return column;
-  // This only rounds once. If the number was multiplied by 0.001, it would be rounded twice.
+  // Rounds only once. Multiplying by 0.001 would round twice.
   if (to->per_si >= from->per_si) {
     column.multiply = to->per_si / from->per_si;
   } else {
@@ -162,13 +160,11 @@ TableReader::TableReader(std::istream& from, std::string name, const Options& op
 }
 
 void TableReader::fail(std::string sentence) const {
-  // The message may contain text from the file, including control characters.
+  // The message may contain control characters from the file.
   std::ranges::replace_if(
       sentence, [](unsigned char c) { return std::iscntrl(c) != 0; }, '?');
   throw std::runtime_error(name_ + ':' + std::to_string(std::max<std::size_t>(line_number_, 1)) + ": " + sentence);
 }
-
-// ---- Lines ----------------------------------------------------------------------------------------------------------
 
 std::optional<std::string_view> TableReader::next_line() {
   if (from_.getline(buffer_.data(), static_cast<std::streamsize>(buffer_.size()))) {
@@ -199,8 +195,6 @@ std::string_view TableReader::uncommented(std::string_view line) const {
   }
   return line;
 }
-
-// ---- Rows -----------------------------------------------------------------------------------------------------------
 
 void TableReader::split(std::string_view line) {
   cells_.clear();
@@ -303,8 +297,6 @@ bool TableReader::next_row() {
   return false;
 }
 
-// ---- Columns --------------------------------------------------------------------------------------------------------
-
 std::size_t TableReader::index_of(std::string_view name) const {
   const auto found = std::ranges::find(names_, name);
   if (found == names_.end()) {
@@ -340,8 +332,6 @@ TableReader::Column TableReader::column(std::string_view name) const {
 TableReader::Column TableReader::column(std::size_t index, std::string_view unit) const {
   return converted(index, index < names_.size() ? named(names_[index]).unit : nullptr, tendon::unit_of(unit));
 }
-
-// ---- Numbers --------------------------------------------------------------------------------------------------------
 
 void TableReader::refuse_number(std::size_t column) const {
   const std::string place = !names_.empty() ? " as " + names_[column]

@@ -12,32 +12,26 @@
 namespace tendon {
 
 /// Reads a table of numbers from a text file, one row at a time:
-///
-/// - UTF-8 byte order marks, blank lines, lines that start with #, and blanks around cells are ignored. Lines can end
-///   with CR LF.
+/// - UTF-8 byte order marks, blank lines, lines that start with #, blanks around cells, and CR before LF are ignored.
 /// - The separator is the first of semicolon, tab and comma that is in the first line, except in quotes. If the first
 ///   line only contains numbers and simple names, it can also be a blank.
-/// - Cells can be quoted with double quotes. Inside quotes, "" is a single quote character. Line breaks are not
-///   allowed.
+/// - Cells can be quoted with double quotes. Inside, "" is a single quote. Line breaks are not allowed.
 /// - Numbers can have a decimal point. If the separator is not a comma, they can have a decimal comma instead.
 ///   Thousands separators are not allowed. In quotes or in a tab-separated file, `1,012` could mean 1.012 or 1012. This
 ///   is an error unless an earlier number shows that the comma is a decimal comma.
 /// - The first line is a header if none of its cells is a number. All rows must have the same number of cells.
 ///
 /// All errors are reported as std::runtime_error with the message "NAME:LINE: what was expected, what was found". After
-/// an error in a row, the next row can be read. The reader does not read past the end of the current line, so it can be
-/// used with a pipe.
+/// an error in a row, the next row can be read. It does not read past the current line, as pipes require.
 class TableReader {
  public:
   struct Options {
-    /// If the table has only one column, a blank line after the first row is treated as a row with an empty cell.
+    /// If there is only one column, a blank line after the first row is a row with an empty cell.
     bool blank_lines_are_cells = false;
-    /// Allows comments at the end of a line. They start with a blank and a #.
-    bool trailing_comments = false;
+    bool trailing_comments = false;  ///< at the end of a line, starting with a blank and a #
   };
 
-  /// Bytes. Protects against binary files.
-  static constexpr std::size_t kMaxLine = 65'536;
+  static constexpr std::size_t kMaxLine = 65'536;  ///< bytes; protects against binary files
 
   /// Reads the first nonblank line. `name` is used in error messages.
   TableReader(std::istream& from, std::string name, const Options& options);
@@ -51,22 +45,18 @@ class TableReader {
     double divide = 1;
   };
 
-  /// Empty if there is no header.
-  const std::vector<std::string>& names() const noexcept { return names_; }
-  /// Returns the header or, if there is none, the first row.
-  const std::string& first_line() const noexcept { return first_line_; }
+  const std::vector<std::string>& names() const noexcept { return names_; }  ///< empty if there is no header
+  const std::string& first_line() const noexcept { return first_line_; }     ///< or the first row if there is no header
   char separator() const noexcept { return separator_; }
   std::size_t width() const noexcept { return width_; }
   std::size_t line() const noexcept { return line_number_; }
 
-  /// Returns the column with this name, for example "x_mm". If it does not exist, a column with the same name and a
-  /// compatible unit is used, and its numbers are converted. The unit can be specified as "x_m", "X [m]", "x (m)" or
-  /// "x/m". The names "time" and "timestamp" are equivalent to "t". Returns nothing if there is no such column. Throws
-  /// an error if there are two.
+  /// Returns the column with this name, for example "x_mm", or one with the same name and a compatible unit, whose
+  /// numbers are converted. The unit can be specified as "x_m", "X [m]", "x (m)" or "x/m". The names "time" and
+  /// "timestamp" are equivalent to "t". Returns nothing if there is no such column. Throws an error if there are two.
   std::optional<Column> find(std::string_view name) const;
   Column column(std::string_view name) const;
-  /// Returns the column with this index. If the header specifies another compatible unit, the numbers are converted to
-  /// `unit`.
+  /// Returns the column with this index. Numbers in another compatible unit are converted to `unit`.
   Column column(std::size_t index, std::string_view unit) const;
   /// Throws an error if there is no column with exactly this name, or if there are two.
   std::size_t index_of(std::string_view name) const;
