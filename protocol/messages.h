@@ -202,6 +202,8 @@ struct PeerReport {
   std::string way{};              ///< from Hello::ways; at most 24 bytes
 };
 
+// ---- Requests: reliable, client → server unless stated otherwise ----
+
 /// Sets the state rate of a device. The server uses the nearest rate that divides its own rate, and never a higher one.
 struct SetStateRate {
   std::uint32_t hz = 0;
