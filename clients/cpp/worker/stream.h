@@ -26,7 +26,8 @@
 //     worker → proxy   the same sequence, one frame `force` with based_on_tick = tick of the state and sequence = the
 //                      record's sequence; or no frame if no force is known. valid_for_us is ignored but must be valid
 //
-// Only one state is in flight: the proxy waits for its answer. The worker exits at the end of the stream.
+// Only one state is in flight: the proxy waits for the answer before it sends the next. The worker exits at the end of
+// the stream.
 
 namespace tendon::worker {
 
