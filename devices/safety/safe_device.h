@@ -92,23 +92,23 @@ class SafeDevice final : public Device {
   };
 
   struct Config {
-    Arming arming;
-    std::optional<GrowthLimit::Config> growth_limit;
-    std::optional<ForceLimit::Config> force_limit;
-    std::optional<HeatLimit::Config> heat_limit;
-    std::optional<Workspace::Config> workspace;
-    std::optional<RampIn::Config> ramp_in;
-    std::optional<SpeedTrip::Config> speed_trip;
-    std::optional<StepBound::Config> step_bound;
-    std::optional<Watchdog::Config> command_watchdog;  ///< for calls of `apply`
-    std::optional<Watchdog::Config> link_watchdog;     ///< for positions
-    std::optional<DeadManSwitch::Config> dead_man;
-    const std::atomic<bool>* guardian = nullptr;             ///< Guardian::stands, or null
-    std::optional<ForceLimit::Config> torque_limit;          ///< N·m
-    std::optional<GrowthLimit::Config> torque_growth_limit;  ///< N·m/s
-    std::optional<TurnTrip::Config> turn_trip;
-    std::optional<ForceLimit::Config> grip_limit;          ///< N
-    std::optional<GrowthLimit::Config> grip_growth_limit;  ///< N/s
+    Arming arming{};
+    std::optional<GrowthLimit::Config> growth_limit{};
+    std::optional<ForceLimit::Config> force_limit{};
+    std::optional<HeatLimit::Config> heat_limit{};
+    std::optional<Workspace::Config> workspace{};
+    std::optional<RampIn::Config> ramp_in{};
+    std::optional<SpeedTrip::Config> speed_trip{};
+    std::optional<StepBound::Config> step_bound{};
+    std::optional<Watchdog::Config> command_watchdog{};  ///< for calls of `apply`
+    std::optional<Watchdog::Config> link_watchdog{};     ///< for positions
+    std::optional<DeadManSwitch::Config> dead_man{};
+    const std::atomic<bool>* guardian = nullptr;               ///< Guardian::stands, or null
+    std::optional<ForceLimit::Config> torque_limit{};          ///< N·m
+    std::optional<GrowthLimit::Config> torque_growth_limit{};  ///< N·m/s
+    std::optional<TurnTrip::Config> turn_trip{};
+    std::optional<ForceLimit::Config> grip_limit{};          ///< N
+    std::optional<GrowthLimit::Config> grip_growth_limit{};  ///< N/s
   };
 
   struct Status {
