@@ -56,7 +56,9 @@ TEST_F(AssemblyTest, StepsAndDatagramsAreRecordedUnlessTheCallerWatchesThem) {
     assembly_->log().close(now_, 0);
     const auto recording = assembly_->log().recording();
     EXPECT_EQ(recording.has_value(), !watched);
-    if (recording) EXPECT_EQ(recording->steps + recording->datagrams, 2U);
+    if (recording) {
+      EXPECT_EQ(recording->steps + recording->datagrams, 2U);
+    }
     EXPECT_EQ(mail().steps.front() != nullptr, watched);
     EXPECT_EQ(mail().datagrams.front() != nullptr, watched);
   }

@@ -231,7 +231,7 @@ TEST(Vectors, AFrameAtItsBoundsIsWrittenAgainAsItWasRead) {
     DataWriter writer;
     writer.begin(buffer, {}, LocalTime(content->sent.time_since_epoch()), echo);
     for (const Frame& frame : content->frames) {
-      std::visit([&](const auto& value) { writer.add(value); }, frame);
+      std::visit([&](const auto& message) { writer.add(message); }, frame);
     }
     EXPECT_EQ(Bytes(buffer.begin() + kHeaderSize, buffer.begin() + static_cast<std::ptrdiff_t>(writer.size())), body);
   }

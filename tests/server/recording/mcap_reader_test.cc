@@ -100,7 +100,9 @@ std::string outside_of(std::size_t from, std::size_t to) {
 void expect_at_least(const Outcome& outcome, const std::string& least) {
   EXPECT_EQ(outcome.error, "");
   for (const std::string& chunk : {std::string("012"), std::string("345")}) {
-    if (least.find(chunk) != std::string::npos) EXPECT_NE(outcome.messages.find(chunk), std::string::npos);
+    if (least.find(chunk) != std::string::npos) {
+      EXPECT_NE(outcome.messages.find(chunk), std::string::npos);
+    }
   }
   EXPECT_TRUE(outcome.messages.empty() || outcome.messages == "012" || outcome.messages == "345" ||
               outcome.messages == "012345")
