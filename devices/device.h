@@ -38,7 +38,7 @@ struct PositionSample {
   LocalTime at{};
   Vec3 position = Vec3::Zero();                   ///< m, device base frame
   std::optional<Vec3> hand_force = std::nullopt;  ///< N, of the hand on the handle, from a force sensor
-  std::uint32_t buttons = 0;                      ///< bit i is set while button i is held
+  std::uint32_t buttons = 0;                      ///< bit i is set if button i is pressed
   /// Handle frame → base frame. In the handle frame, −z is the direction of the stylus or finger. In the middle
   /// position of the handle, y is up and x is to the right (OpenXR's aim pose).
   std::optional<Quat> orientation = std::nullopt;
@@ -88,7 +88,8 @@ class Device {
   /// Called instead of `apply` if `info` has a torque or a gripper with a motor. Returns what was actually written.
   virtual Effort apply_all(const Effort& effort) noexcept { return {.force = apply(effort.force)}; }
 
-  /// Ignores unknown outputs and settings of another kind. Outside the energy ledger: outputs do not move the handle.
+  /// Sets a lamp or starts a vibration pulse. An unknown output, or a setting of the wrong kind, has no effect. Outputs
+  /// do not move the handle, so the energy ledger does not contain them.
   virtual void set_output(LocalTime now, std::uint32_t output, const OutputSetting& setting) noexcept;
 };
 

@@ -48,7 +48,7 @@ class Connection {
     kRefused = 2,     ///< an attempt was refused
     kLost = 3,        ///< a session ended
   };
-  /// The attempt or session has ended. GreetingDue follows after the backoff.
+  /// An attempt or a session ended. GreetingDue follows after the backoff.
   struct Ended {
     Cause cause;
     Code code;

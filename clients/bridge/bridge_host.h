@@ -46,7 +46,7 @@ class BridgeHost {
  public:
   using Count = std::pair<std::string_view, std::uint64_t>;  ///< name and value, for the JSON lines
 
-  BridgeHost(BridgeConfig config, LocalTime now);  ///< throws std::runtime_error as UdpTransport does
+  BridgeHost(BridgeConfig config, LocalTime now);  ///< throws std::runtime_error if a socket cannot be opened
 
   std::size_t size() const noexcept { return served_.size(); }
   BridgedDevice& device(std::size_t i) { return served_[i].bridged; }

@@ -54,7 +54,7 @@ class Board {
     std::uint64_t silent_for = 0;  ///< device reports since the engine's last one; no more come after it has left
   };
 
-  /// The states of the two ends of a coupling.
+  /// The newest state of each end of a coupling.
   struct Ports {
     PeerTime at;  ///< newest sampling time of the device when `own` arrived, because the port's own time uses an
                   ///< unrelated clock

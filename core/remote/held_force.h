@@ -32,8 +32,8 @@ struct HandleWanted {
 ///     adaptive_local_model   blends from one stiffness to the next              (AdaptiveLocalModel)
 ///     output_estimator       learns a model of the environment                  (OutputEstimator)
 ///     learned_model          learns how the force depends on the position, for answers without a model (LearnedModel)
-/// A torque follows its own model of rotation, and a grip force is constant. They are held, faded and ramped in like
-/// the force. Only the trusted part of an answer is used, and an answer that is not sound is refused (answer.h). The
+/// A torque follows its own model of rotation, and a grip force is constant. Both are held, faded and ramped in as
+/// the force is. Only the trusted part of an answer is used, and an answer that is not sound is refused (answer.h). The
 /// result must be bounded by a limiter.
 ///
 /// The first force, the first one after a safe stop, and the first one from another source are ramped in linearly over

@@ -102,7 +102,7 @@ class Coupling {
   /// Starts an act; must be called at the leader. Returns true if the coupling is engaging or was engaged before.
   /// Returns false and does nothing if the phase is alone, lost or fault, or if the peer is not ready.
   bool engage() noexcept;
-  void disengage() noexcept;  ///< ends the act; can be called at both ends
+  void disengage() noexcept;  ///< ends the act; can be called at either end
 
   void renew() noexcept;  ///< must be called if the peer has been replaced or has restarted
 

@@ -17,8 +17,8 @@ namespace tendon {
 ///     r_f = R r_l R⁻¹         ω_f = R ω_l       τ_l = (s_f/s_x) Rᵀ τ_f,  so K_l = (s_f/s_x) K_f for rotations
 ///     g_f = g_l                                 F_l = s_f F_f,           so K_l = s_f K_f for grippers
 /// With this scale of torques, τ·ω has the same factor s_x/s_f as F·ẋ, so force and torque can share an account.
-/// Grippers have their own account, in which one joule of the leader is 1/s_f joules of the follower. Rotations are
-/// coupled about all axes, whatever `axes` is.
+/// Grippers have their own account, in which one joule of the leader is 1/s_f joules of the follower. `axes`
+/// does not apply to rotations, which are coupled about all axes.
 /// Immutable. Thread-safe. Realtime-safe: yes, except the constructor.
 class PoseMap {
  public:

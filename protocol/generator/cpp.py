@@ -18,7 +18,7 @@ _HEAD = """\
 # Messages whose code is written by hand.
 _BY_HAND = ("Datagram", "Frame", "DeviceStates", "Vec3", "Quat")
 
-# Constants of fields/field.h. They say what the Writer does with a length of time out of bounds.
+# Constants of fields/field.h. Each contains the value that the Writer uses for a duration out of bounds.
 _PERIODS = {
     "valid_for_us": "kValidity", "period_us": "kValidity", "max_silence_us": "kMaxSilence", "duration_ms": "kPulse",
     "wait_ms": "kWait", "lease_ms": "kWait", "timeout_ms": "kTimeout",

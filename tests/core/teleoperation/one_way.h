@@ -33,7 +33,7 @@ struct Network {
   std::function<std::vector<int>(int now)> arrivals{};
 };
 
-/// One direction of a bad network. The time is the number of the period. It is the same at both ends.
+/// One direction of a bad network. The time is the number of the period, which both ends share.
 template <class Message>
 class OneWay {
  public:

@@ -63,7 +63,7 @@ std::vector<injector::Decision> decisions(const std::string& line, const NetemOp
   return result;
 }
 
-/// For a Gilbert chain, the correlation is equal to 1 − P(good → bad) − P(bad → good).
+/// The correlation of a Gilbert chain is 1 − P(good → bad) − P(bad → good).
 double mean_burst(double probability, double correlation) { return 1 / ((1 - correlation) * (1 - probability)); }
 
 Losses our_losses(double probability, double correlation, const NetemOptions& options) {
