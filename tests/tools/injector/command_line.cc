@@ -90,6 +90,7 @@ struct Said {
   ImportTask import;
   std::string share;
   double interval_ms = 1000;
+  double clock_offset_ms = 0;
   std::filesystem::path trace;
   SelftestOptions selftest;
   std::string data;
@@ -113,10 +114,25 @@ Subcommands add_subcommands(CLI::App& app, Said& said) {
   verbs.import = app.add_subcommand("import", "Convert a measurement to a trace for --replay");
   verbs.import
       ->add_option("FORMAT", said.import.format,
-                   "ping, irtt (its JSON), csv (delays in ms), or mahimahi (log of mm-link)")
+                   "ping, irtt (its JSON), csv (delays in ms), mahimahi (log of mm-link), or pcap (capture by tcpdump)")
       ->required()
-      ->check(usage::one_of({"ping", "irtt", "csv", "mahimahi"}));
-  verbs.import->add_option("FILE", said.import.from, "File with the measurement")->required();
+      ->check(usage::one_of({"ping", "irtt", "csv", "mahimahi", "pcap"}));
+  verbs.import->add_option("FILE", said.import.from, "File with the measurement; pcap: capture at the client")
+      ->required();
+  verbs.import->add_option("SERVER", said.import.server, "pcap: capture at the server, for one-way delays of UDP");
+  verbs.import->add_option("--port", said.import.taps.port, "pcap: UDP port of the server")
+      ->type_name("PORT")
+      ->check(between(1, 65535));
+  verbs.import
+      ->add_option("--server-port", said.import.taps.server_port,
+                   "pcap: this port in the capture at the server, if a proxy or a NAT translates it")
+      ->type_name("PORT")
+      ->check(between(1, 65535));
+  verbs.import
+      ->add_option("--clock-offset-ms", said.clock_offset_ms,
+                   "pcap: clock at the server minus clock at the client, ms. Default: 0, for synchronized clocks")
+      ->type_name("MS")
+      ->check(between(-1e12, 1e12));
   verbs.import->add_option("--out", said.import.to, "Output file")->type_name("TRACE")->required();
   verbs.import
       ->add_option("--share", said.share,
@@ -138,6 +154,8 @@ Subcommands add_subcommands(CLI::App& app, Said& said) {
       "Other units are converted (t_s, delay_us, \"delay [s]\"). The separator is a comma, semicolon or tab. With\n"
       "semicolons or tabs, numbers can have decimal commas. A profile can use the same file: delay=samples(FILE).\n\n"
       "Examples\n"
+      "  tcpdump -s 0 -w client.pcap udp port 47100       at the client, and in the same way at the server\n"
+      "  tendon-inject import pcap client.pcap server.pcap --port 47100 --out run.csv\n"
       "  ping -D -c 1000 -i 0.2 example.org >ping.txt\n"
       "  tendon-inject import ping ping.txt --out run.csv\n"
       "  printf 't_ms,delay_ms\\n0,20.1\\n10,\\n20,21\\n' >delays.csv\n"
@@ -164,7 +182,18 @@ Subcommands add_subcommands(CLI::App& app, Said& said) {
 
 ImportTask import_task(Said said) {
   ImportTask task = std::move(said.import);
-  const bool round_trips = task.format == "ping" || task.format == "irtt";
+  if (task.format != "pcap" &&
+      (!task.server.empty() || task.taps.port + task.taps.server_port != 0 || said.clock_offset_ms != 0)) {
+    throw std::invalid_argument("a second file, --port, --server-port and --clock-offset-ms are only for import pcap");
+  }
+  if (task.server.empty() != (task.taps.port == 0)) {
+    throw std::invalid_argument("import pcap: expected two captures and --port, or one capture of pings");
+  }
+  if (!task.server.empty() && !said.share.empty()) {
+    throw std::invalid_argument("--share: expected one capture, because two captures have both directions");
+  }
+  task.taps.clock_offset = from_seconds(said.clock_offset_ms / 1e3);
+  const bool round_trips = task.format == "ping" || task.format == "irtt" || task.format == "pcap";
   const std::string share = said.share.empty() ? (round_trips ? "halves" : "both") : said.share;
   task.options.share = share == "halves" ? Share::kHalves
                        : share == "up"   ? Share::kUp

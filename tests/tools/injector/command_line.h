@@ -11,6 +11,7 @@
 #include "tests/tools/injector/proxy/prepared_network.h"
 #include "tests/tools/injector/selftest/selftest.h"
 #include "tests/tools/injector/traces/import.h"
+#include "tests/tools/injector/traces/import_capture.h"
 
 namespace tendon::injector {
 
@@ -31,10 +32,12 @@ struct ControlTask {
   std::string line;
 };
 struct ImportTask {
-  std::string format;  ///< ping, irtt, csv or mahimahi
+  std::string format;  ///< ping, irtt, csv, mahimahi or pcap
   std::filesystem::path from;
+  std::filesystem::path server;  ///< a second capture, at the server
   std::filesystem::path to;
   ImportOptions options;
+  TapOptions taps;
 };
 struct ExportTask {
   std::filesystem::path trace;

@@ -17,6 +17,26 @@
 namespace tendon::injector {
 namespace {
 
+Tap read_tap(const std::filesystem::path& file) {
+  std::ifstream from = open_regular_file(file);
+  return {.name = file.string(), .capture = read_capture(from, file.string())};
+}
+
+Trace imported(const ImportTask& task) {
+  if (task.format == "pcap") {
+    if (task.server.empty()) return import_echoes(read_tap(task.from), task.options);
+    TwoTaps taps = import_two_taps(read_tap(task.from), read_tap(task.server), task.taps);
+    std::cerr << taps.summary;
+    return std::move(taps.trace);
+  }
+  std::ifstream from = open_regular_file(task.from);
+  const std::string name = task.from.string();
+  return task.format == "ping"   ? import_ping(from, name, task.options)
+         : task.format == "irtt" ? import_irtt(from, name, task.options)
+         : task.format == "csv"  ? import_csv(from, name, task.options)
+                                 : import_mahimahi_log(from, name, task.options);
+}
+
 struct Runner {
   int operator()(const HelpTask& task) const {
     std::cout << task.text;
@@ -66,19 +86,15 @@ struct Runner {
   }
 
   int operator()(const ImportTask& task) const {
-    std::ifstream from = open_regular_file(task.from);
-    const std::string name = task.from.string();
-    const Trace trace = task.format == "ping"   ? import_ping(from, name, task.options)
-                        : task.format == "irtt" ? import_irtt(from, name, task.options)
-                        : task.format == "csv"  ? import_csv(from, name, task.options)
-                                                : import_mahimahi_log(from, name, task.options);
+    const Trace trace = imported(task);
     expect_replaceable(task.to, {kTraceBegins});
     std::ofstream to(task.to, std::ios::binary);
     write_trace(to, trace);
     to.flush();
     if (!to) throw std::runtime_error("cannot write " + task.to.string());
     std::cerr << import_summary(trace);
-    if (task.options.share == Share::kHalves) std::cerr << "each delay is half of a round trip\n";
+    if (task.server.empty() && task.options.share == Share::kHalves)
+      std::cerr << "each delay is half of a round trip\n";
     std::cerr << "tendon-inject: replay with --replay " << task.to.string() << " --by time\n";
     return 0;
   }

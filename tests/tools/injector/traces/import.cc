@@ -530,6 +530,16 @@ Trace import_mahimahi_log(std::istream& from, const std::string& name, const Imp
   return std::move(building).trace();
 }
 
+Trace import_round_trips(const std::vector<MeasuredRoundTrip>& trips, const std::string& name,
+                         const ImportOptions& options) {
+  need_shared(name, options);
+  Building building(name);
+  for (const MeasuredRoundTrip& trip : trips) {
+    building.add(trip.at, options.share, shared(options.share, trip.round_trip), trip.size);
+  }
+  return std::move(building).trace();
+}
+
 std::string import_summary(const Trace& trace) {
   std::string text;
   for (const Direction direction : {Direction::kUp, Direction::kDown}) {

@@ -4,7 +4,9 @@
 #include <chrono>
 #include <cstdint>
 #include <iosfwd>
+#include <optional>
 #include <string>
+#include <vector>
 
 #include "core/base/time.h"
 #include "tests/tools/injector/traces/trace.h"
@@ -53,6 +55,16 @@ Trace import_irtt(std::istream& from, const std::string& name, const ImportOptio
 /// Reads open_delays(). Sending times t_ms must not decrease; without this column they are options.interval apart. The
 /// column dir replaces the share, as in a file from write_delays(); without it, times are shifted to begin at 0.
 Trace import_csv(std::istream& from, const std::string& name, const ImportOptions& options);
+
+/// Sent `at` after the first; an empty round trip is a loss.
+struct MeasuredRoundTrip {
+  Duration at{};
+  std::optional<Duration> round_trip;
+  std::uint32_t size = 0;
+};
+/// A trace of round trips. `options.interval` is not used.
+Trace import_round_trips(const std::vector<MeasuredRoundTrip>& trips, const std::string& name,
+                         const ImportOptions& options);
 
 /// For each direction: number of datagrams and losses, first and last time, minimum, median and maximum delay.
 std::string import_summary(const Trace& trace);
