@@ -19,6 +19,7 @@ PAGES = r"(?!CHANGELOG).*\.(?:md|cmake\.in)"
 # Name, files, and pattern of each place in a text. Each of them must be found at least once.
 PLACES = (
     ("wheel", r"clients/python/pyproject\.toml", re.compile(r'^version = "(.*)"', re.M)),
+    ("citation", r"CITATION\.cff", re.compile(r"^version: (.*)", re.M)),
     ("image", r"deploy/kubernetes/.*\.yaml", re.compile(r'newName: \S+/tendon[a-z-]*, newTag: "(.*)"')),
     ("file name", PAGES, re.compile(r"\b(?:lib)?tendon[a-z-]*_(\d+\.\d+\.\d+)_")),
     ("find_package", PAGES, re.compile(r"\bfind_package\(tendon (\S+?)[ )]")),
@@ -79,7 +80,7 @@ def main():
     wanted = {"release", "npm", "lock", *(name for name, _, _ in PLACES)}
     checked, bad = 0, []
     for path in listed:
-        if not path.endswith((".md", ".in", ".toml", ".json", ".yaml")) or not (root / path).is_file():
+        if not path.endswith((".md", ".in", ".toml", ".json", ".yaml", ".cff")) or not (root / path).is_file():
             continue
         for name, version in found(path, (root / path).read_text(encoding="utf-8")):
             wanted.discard(name)

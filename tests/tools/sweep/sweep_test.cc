@@ -257,6 +257,12 @@ TEST_F(SweepOf, BoundaryIsWhatOneProcessSays) {
 
 TEST_F(SweepOf, PaperIsWhatOneProcessSays) { expect_the_same({"tendon-lab", "paper"}, "0:31", "9"); }
 
+TEST_F(SweepOf, SweepIsWhatOneProcessSays) {
+  expect_the_same({"tendon-lab", "sweep", TENDON_SCENES "/demo.toml", "--network", "delay={1,20}ms loss=2%", "--law",
+                   "aol,feel", "--for-s", "2", "--seeds", "2"},
+                  "0:8", "3");
+}
+
 TEST_F(SweepOf, TeleopIsWhatOneProcessSays) {
   expect_the_same({"tendon-lab", "teleop", "--hands", "1", "--seed", "5"}, "0:48", "31");
 }

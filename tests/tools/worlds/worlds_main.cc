@@ -21,7 +21,6 @@
 #include "tests/support/json_line.h"
 #include "tests/tools/worlds/day.h"
 #include "tests/tools/worlds/runner.h"
-#include "tests/tools/worlds/second_look.h"
 #include "tests/tools/worlds/shrink_world.h"
 
 namespace tendon::simulation {
@@ -186,27 +185,13 @@ void add_day(CLI::App& app, DayArguments& arguments) {
       "Exit: 0 success, without a violation; 1 failed, or a violation; 2 wrong usage.");
 }
 
-void add_replay(CLI::App& app, SecondLookOptions& options) {
-  CLI::App* const verb =
-      app.add_subcommand("replay", "Run a scene and a wall with a recorded network, in virtual time, with each law");
-  verb->add_option("SCENE", options.scene, "Scene with the device, the hand and the loop. Its law is also compared")
-      ->type_name("SCENE.toml")
-      ->required();
-  verb->add_option("--trace", options.trace, "Network trace from tendon-inject --record")
-      ->type_name("FILE")
-      ->required();
-  verb->add_option("--law", options.laws, "Law to compare; can be repeated. Default: those that guarantee passivity")
-      ->type_name("NAME")
-      ->allow_extra_args(false);
-  verb->add_option("--stiffness", options.stiffness, "Stiffness of the wall at x = 0, N/m")->capture_default_str();
-  verb->add_option("--rate-hz", options.rate_hz, "Forces per second of the wall")->capture_default_str();
-  verb->add_option("--for-s", options.length_s, "Virtual time, s. Default: length of the trace");
-  verb->add_flag("--json", options.json, "Print JSON on stdout, one object per law, instead of the table");
-  verb->footer(
-      "\n"
-      "Example: compare energy bounding with aol+ on the same network\n"
-      "  tendon-worlds replay scene.toml --trace run.csv --law energy-bounding --law aol+\n\n"
-      "Exit: 0 success; 1 failed, because the trace or the scene cannot be read; 2 wrong usage.");
+/// For one release, the former verb names its successor.
+void add_replay(CLI::App& app) {
+  CLI::App* const verb = app.add_subcommand("replay", "")->group("")->allow_extras();
+  verb->callback([] {
+    throw std::invalid_argument(
+        "replay is now a network of tendon-lab sweep: tendon-lab sweep SCENE.toml --network trace:FILE --law LAW,…");
+  });
 }
 
 int main_of(int argc, char** argv) {
@@ -224,32 +209,19 @@ int main_of(int argc, char** argv) {
   RunArguments run_arguments;
   run_arguments.options.jobs = std::max(1U, std::thread::hardware_concurrency());
   ShrinkArguments shrink_arguments;
-  SecondLookOptions replay_options;
   add_run(app, run_arguments);
   add_shrink(app, shrink_arguments);
   DayArguments day_arguments;
   add_day(app, day_arguments);
-  add_replay(app, replay_options);
+  add_replay(app);
   try {
     usage::parse(app, argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return usage::exit_code(app, error);
-  }
-  try {
     if (app.got_subcommand("run")) return run(run_arguments);
     if (app.got_subcommand("day")) return day(day_arguments);
-    if (app.got_subcommand("shrink")) {
-      return shrink_world(shrink_arguments.seed, shrink_arguments.out, std::cout) ? kDone : kFailed;
-    }
-    second_look(replay_options, std::cout);
-    return kDone;
+    return shrink_world(shrink_arguments.seed, shrink_arguments.out, std::cout) ? kDone : kFailed;
+  } catch (const CLI::ParseError& error) {
+    return usage::exit_code(app, error);
   } catch (const std::invalid_argument& error) {
-    std::cerr << "tendon-worlds: " << error.what() << " (see --help)\n";
-    return kWrongUsage;
-  } catch (const SceneFileError& error) {
-    std::cerr << "tendon-worlds: " << error.what() << '\n';
-    return kFailed;
-  } catch (const SceneError& error) {
     std::cerr << "tendon-worlds: " << error.what() << " (see --help)\n";
     return kWrongUsage;
   } catch (const std::exception& error) {

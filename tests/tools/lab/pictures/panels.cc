@@ -17,6 +17,8 @@ constexpr int kAbovePanels = 110;  ///< pixels above the first row
 constexpr std::size_t kMostPoints = 1200;
 constexpr std::size_t kNamesInRow = 4;  ///< names in a row of the legend
 constexpr int kKeyRow = 18;             ///< pixels for each row of the legend after the second
+constexpr std::size_t kLetters = 170;   ///< per line below the panels
+constexpr int kLine = 24;               ///< pixels
 
 const char* words(Curve::Style style) {
   switch (style) {
@@ -93,6 +95,21 @@ std::vector<std::size_t> labels_at(const Panel& panel, const Curve& curve, bool 
   return found;
 }
 
+/// Breaks paragraphs at spaces. A longer word is broken anywhere.
+std::vector<std::string> lines_of(const std::vector<std::string>& paragraphs) {
+  std::vector<std::string> lines;
+  for (std::string rest : paragraphs) {
+    while (rest.size() > kLetters) {
+      const std::size_t space = rest.rfind(' ', kLetters);
+      const bool found = space != std::string::npos && space > 0;
+      lines.push_back(rest.substr(0, found ? space : kLetters));
+      rest = rest.substr(found ? space + 1 : kLetters);
+    }
+    lines.push_back(rest);
+  }
+  return lines;
+}
+
 }  // namespace
 
 std::vector<std::pair<double, double>> thinned(const std::vector<std::pair<double, double>>& points) {
@@ -111,11 +128,13 @@ std::vector<std::pair<double, double>> thinned(const std::vector<std::pair<doubl
 }
 
 std::string panels_script(const std::filesystem::path& path, const std::string& heading, const std::string& figures,
-                          const std::vector<Panel>& panels) {
+                          const std::vector<Panel>& panels, const std::vector<std::string>& below) {
   check_picture_name(path);
   const std::size_t rows = (panels.size() + 1) / 2;
   const int keys = room_for_keys(panels);
-  const int height = kAbovePanels + (kRow + keys) * static_cast<int>(rows);
+  const int end_of_panels = kAbovePanels + (kRow + keys) * static_cast<int>(rows);
+  const std::vector<std::string> lines = lines_of(below);
+  const int height = end_of_panels + kLine * static_cast<int>(lines.size());
   std::ostringstream out;
   out << begin_picture(path, kWidth, height) << "set border 3 lc rgb '" << kPale << "'\n"
       << "set tics nomirror out scale 0.6 textcolor rgb '" << kPale << "'\n"
@@ -144,6 +163,10 @@ std::string panels_script(const std::filesystem::path& path, const std::string& 
   out << "set label " << literal(heading) << " at screen 0.04," << up(34) << " noenhanced font ':Bold,20' tc rgb '"
       << kInk << "'\n";
   out << "set label " << literal(figures) << " at screen 0.04," << up(70) << " noenhanced tc rgb '" << kPale << "'\n";
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    out << "set label " << literal(lines[i]) << " at screen 0.04," << up(end_of_panels + kLine * static_cast<double>(i))
+        << " noenhanced tc rgb '" << kPale << "'\n";
+  }
   for (std::size_t p = 0; p < panels.size(); ++p) {
     const Panel& panel = panels[p];
     const double left = p % 2 == 0 ? 0.045 : 0.545;
@@ -183,12 +206,13 @@ std::string panels_script(const std::filesystem::path& path, const std::string& 
 }
 
 std::vector<std::filesystem::path> draw_panels(const std::filesystem::path& stem, const std::string& heading,
-                                               const std::string& figures, const std::vector<Panel>& panels) {
+                                               const std::string& figures, const std::vector<Panel>& panels,
+                                               const std::vector<std::string>& below) {
   std::vector<std::filesystem::path> files;
   for (const char* const extension : {".svg", ".png"}) {
     std::filesystem::path file = stem;
     file += extension;
-    run_gnuplot(panels_script(file, heading, figures, panels), file);
+    run_gnuplot(panels_script(file, heading, figures, panels, below), file);
     files.push_back(file);
   }
   return files;

@@ -39,12 +39,14 @@ struct Panel {
 /// Minimum and maximum of each interval of points sorted by x, at the resolution of a panel.
 std::vector<std::pair<double, double>> thinned(const std::vector<std::pair<double, double>>& points);
 
-/// Returns a gnuplot script that draws the panels in rows of two, with a heading and a line of figures.
+/// Returns a gnuplot script that draws the panels in rows of two, with a heading, a line of figures, and the paragraphs
+/// `below` them, which are wrapped.
 std::string panels_script(const std::filesystem::path& path, const std::string& heading, const std::string& figures,
-                          const std::vector<Panel>& panels);
+                          const std::vector<Panel>& panels, const std::vector<std::string>& below = {});
 
 /// Writes `stem`.svg and `stem`.png and returns their names. Throws the exceptions of `run_gnuplot`.
 std::vector<std::filesystem::path> draw_panels(const std::filesystem::path& stem, const std::string& heading,
-                                               const std::string& figures, const std::vector<Panel>& panels);
+                                               const std::string& figures, const std::vector<Panel>& panels,
+                                               const std::vector<std::string>& below = {});
 
 }  // namespace tendon::lab
