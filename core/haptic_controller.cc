@@ -255,7 +255,7 @@ void HapticController::take(Step& step, const Motion& hand, const Vec3& applied,
 [[gnu::always_inline]] inline void HapticController::limit_force(const ForceChannels::Wanted& wanted,
                                                                  const Vec3& applied, Step& step) noexcept {
   const Limited saturated = saturate(step.force, config_.max_force);
-  // The slew limit uses at most one longest_hold, also after a pause.
+  // Even after a pause, the slew limit assumes at most one longest_hold.
   const Duration elapsed = std::min(step.held, config_.limiter.longest_hold);
   const Limited slewed = limit_slew(saturated.force, applied, config_.max_slew, elapsed);
   if (friction_map_) limiter_.adapt(friction_map_->at(step.hand.position));

@@ -30,7 +30,7 @@ struct DeviceCounter {
   std::string_view degraded;  ///< sent to observers, if not empty
 };
 
-/// If several counters have increased, a report contains only the first reason, using at most 18 bytes.
+/// If several counters have increased, a report only contains the first reason. Each reason has at most 18 bytes.
 inline constexpr std::array kDeviceCounters = {
     DeviceCounter{DeviceCount::kAnswers, "answers", "replies of the device that were accepted", ""},
     // A serial line can start in the middle of an answer, so a few bytes after opening are normal.

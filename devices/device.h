@@ -69,7 +69,7 @@ class Device {
 
   /// The operator requests forces, also after a fault. SafeDevice grants this later; others are ready when homed.
   virtual void arm() noexcept {}
-  /// No forces until `arm`. For safety layers (SafeDevice). Otherwise, the law disarms (HapticController::disarm).
+  /// Prevents forces until `arm`. Only for safety layers (SafeDevice); without one, use HapticController::disarm.
   virtual void disarm() noexcept {}
   virtual bool armed() const noexcept;                              ///< false if a safety layer keeps the force at zero
   virtual std::uint32_t times_armed() const noexcept { return 0; }  ///< grants of `arm`, which also clear faults

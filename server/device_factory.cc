@@ -40,7 +40,7 @@ std::unique_ptr<usb::Pipe> open_pipe(const Scene& scene, const Driver& driver, c
                        .transfers = driver.transfers};
   pipe.on_start = [device = scene.loop.device] {
     name_thread("usb-" + std::to_string(device));
-    enter_realtime(kUsbPriority);  // the haptic thread reports refusals
+    enter_realtime(kUsbPriority);  // the haptic thread reports if this is refused
   };
   pipe.tell = [name = scene.name](const std::string& why) { log::warn(name + ": " + why); };
   if (driver.moves_a_hand) pipe.opened = notify_guardian(*guardian, scene, driver);

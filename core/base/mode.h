@@ -9,8 +9,8 @@ namespace tendon {
 enum class Mode : std::uint8_t {
   kIdle = 1,      ///< no force has arrived yet
   kActive = 2,    ///< a fresh force is rendered
-  kHolding = 3,   ///< the force is no longer valid and still held
-  kDecaying = 4,  ///< the force fades after that
+  kHolding = 3,   ///< the force has expired and is still held
+  kDecaying = 4,  ///< the force fades out after it was held
   kSafeStop = 5,  ///< the force is zero until a fresh one is ramped in
   kFault = 6,     ///< the force is zero until an explicit re-arm
 };

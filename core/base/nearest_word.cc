@@ -34,7 +34,7 @@ std::string_view nearest_word(std::string_view unknown, const std::vector<std::s
   std::size_t fewest = unknown.size() <= kLongestWord ? unknown.size() / 3 + 1 : 0;
   for (const std::string_view word : known) {
     const auto [shorter, longer] = std::minmax({unknown.size(), word.size()});
-    if (longer - shorter >= fewest) continue;  // lower bound of the distance
+    if (longer - shorter >= fewest) continue;  // the distance cannot be smaller
     if (const std::size_t count = edits(unknown, word); count < fewest) {
       fewest = count;
       closest = word;

@@ -44,14 +44,14 @@ constexpr std::array<double, N> alternating(int first, double sign) {
 constexpr auto kSine = alternating<8>(3, -1);   // to x¹⁷: the remainder is below 1e-19
 constexpr auto kCosine = alternating<8>(4, 1);  // to x¹⁸
 
-/// x = k ln 2 + rest, |rest| slightly above ½ ln 2 at most.
+/// x = k ln 2 + rest, where |rest| is at most slightly above ½ ln 2.
 struct Doublings {
   std::int64_t k;
   double rest;
 };
 Doublings doublings(double x) noexcept {
-  // The critical path uses this k: adding a double without fractional bits rounds the product. The exact quotient that
-  // defines k follows off the critical path, and replaces k in the rare case where both round differently.
+  // This k is on the critical path: adding a double without fractional bits rounds the product. The exact quotient,
+  // which defines k, is computed off the critical path and replaces k in the rare case that the two round differently.
   constexpr double kWhole = 0x1.8p52;
   double whole = (x * (1 / std::numbers::ln2) + kWhole) - kWhole;
   auto k = static_cast<std::int64_t>(whole);
@@ -62,14 +62,14 @@ Doublings doublings(double x) noexcept {
   return {k, (x - whole * kLn2High) - whole * kLn2Low};
 }
 
-/// 1 + r/first (1 + r/(first + 1) (… (1 + r/last))), summed from the smallest term: each sum is 1 + sum * r / n of the
-/// previous one. Each division depends on the previous one, which takes 100 ns. The function therefore predicts the
-/// sums with r / n, whose divisions are independent, and compares each with its definition off the critical path. If a
-/// prediction differs in its last bit (in one of 15 series), the following sums use the definition. This takes 5 ns if
-/// the loop is unrolled with constant n.
+/// 1 + r/first (1 + r/(first + 1) (… (1 + r/last))), summed from the smallest term. Each sum is 1 + sum * r / n, where
+/// `sum` is the previous one. Because each division depends on the previous one, this takes 100 ns. The function
+/// therefore predicts the sums with r / n, whose divisions are independent, and checks each prediction off the critical
+/// path. If a prediction differs in its last bit (in one of 15 series), the following sums use the definition. This
+/// takes 5 ns if the loop is unrolled with constant n.
 template <std::size_t kFirst, std::size_t kLast>
 double taylor(double r) noexcept {
-  std::array<double, kLast + 1> sums;  // [n]: from n + 1 on
+  std::array<double, kLast + 1> sums;  // [n]: the sum of the terms from n + 1 on
   sums[kLast] = 1;
 #pragma GCC unroll 16
   for (std::size_t n = kLast; n >= kFirst; --n) sums[n - 1] = 1 + sums[n] * (r / static_cast<double>(n));
@@ -87,7 +87,7 @@ double power_of_two(std::int64_t k) noexcept {
   return std::bit_cast<double>(static_cast<std::uint64_t>(k + 1023) << 52);
 }
 
-/// x = quarter · π/2 + rest, |rest| slightly above π/4 at most.
+/// x = quarter · π/2 + rest, where |rest| is at most slightly above π/4.
 struct Angle {
   double rest;
   std::int64_t quarter;

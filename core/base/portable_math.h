@@ -6,12 +6,13 @@
 
 /// Functions of doubles with bitwise identical results on every processor, compiler and C library.
 ///
-/// libm is not enough: glibc uses other instructions on processors with FMA, and its versions can round the last bit
-/// differently. A simulation with an encoder amplifies such a bit to a different run. These functions only use + − · ÷
-/// √, rounding to integers and std::fmod, which are exact or correctly rounded in IEEE 754, in a fixed order. Compile
-/// with -ffp-contract=off (as in CMakeLists.txt), because a fused multiply-add rounds only once.
+/// The functions of libm can differ: glibc uses other instructions on processors with FMA, and its versions can round
+/// the last bit differently. In a simulation with an encoder, a single different bit leads to a different run. These
+/// functions only use + − · ÷ √, rounding to integers and std::fmod, which are exact or correctly rounded in IEEE 754,
+/// in a fixed order. Compile with -ffp-contract=off (as in CMakeLists.txt), because a fused multiply-add rounds only
+/// once.
 ///
-/// Unless noted otherwise, the error is at most the larger of 1e-16 and 2e-16 of the result. NaN gives NaN.
+/// Unless noted otherwise, the error is at most 1e-16 or 2e-16 of the result, whichever is larger. NaN gives NaN.
 /// Realtime-safe: yes.
 namespace tendon::portable {
 

@@ -13,18 +13,18 @@ enum class Reason : std::uint32_t {
   kMaxForce = 1U << 1,       ///< force limit of the device or the scene
   kSlew = 1U << 2,           ///< slew rate limit
   kRampIn = 1U << 3,         ///< ramp after (re-)engaging
-  kHeld = 1U << 4,           ///< the remote force is no longer valid and still held
-  kDecaying = 1U << 5,       ///< the remote force fades
+  kHeld = 1U << 4,           ///< the remote force has expired and is still held
+  kDecaying = 1U << 5,       ///< the remote force is fading out
   kSafeStop = 1U << 6,       ///< the remote force is zero until a fresh one arrives
   kNotFinite = 1U << 7,      ///< NaN or infinity in the demand or a measurement
   kFault = 1U << 8,          ///< the force is zero until the fault is cleared
   kDeviceClamp = 1U << 9,    ///< the device applied less than the commanded force
-  kOverrun = 1U << 10,       ///< no limit: the last interval exceeded the longest_hold of the scene
-  kWatchdog = 1U << 11,      ///< no limit: the last interval was longer than the watchdog of the device
+  kOverrun = 1U << 10,       ///< not a limit: the last interval was longer than the longest_hold of the scene
+  kWatchdog = 1U << 11,      ///< not a limit: the last interval was longer than the watchdog of the device
   kUnseen = 1U << 12,        ///< no position was measured, so the force is zero
   kDisarmed = 1U << 13,      ///< the operator has disarmed the device
   kDamped = 1U << 14,        ///< damper of the output limiter: the hand vibrates in contact
-  kAcceleration = 1U << 15,  ///< no limit: the hand broke bounded_acceleration, so this step uses the plain bound
+  kAcceleration = 1U << 15,  ///< not a limit: the hand exceeded bounded_acceleration, so the plain bound applies
 };
 
 class Reasons {

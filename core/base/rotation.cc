@@ -38,7 +38,7 @@ bool is_rotation(const Quat& q) noexcept {
 
 Quat rotation_by(const Vec3& vector) noexcept {
   const double angle = vector.norm();
-  // sin(a/2)/a; below this angle the next term of its series is lost in rounding.
+  // sin(a/2)/a. Below this angle, the next term of the series is smaller than the rounding error.
   const double share = angle > 1e-8 ? portable::sin(angle / 2) / angle : 0.5;
   return made_of(portable::cos(angle / 2), vector * share);
 }
@@ -47,7 +47,7 @@ Vec3 rotation_vector(const Quat& q) noexcept {
   const double sign = q.w < 0 ? -1.0 : 1.0;
   const Vec3 v = sign * axis_part(q);
   const double sine = v.norm();
-  // a/sin(a/2), likewise.
+  // a/sin(a/2), with the same threshold.
   const double share = sine > 1e-8 ? 2 * portable::atan2(sine, sign * q.w) / sine : 2.0;
   return v * share;
 }

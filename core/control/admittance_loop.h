@@ -19,12 +19,12 @@ namespace tendon {
 ///
 /// Anti-windup: if the applied force was smaller than the command, the last integration step is not taken in the
 /// direction of the shortfall, and the integral in that direction is limited to the applied force. The force therefore
-/// leaves its bound when the velocity error changes sign.
+/// leaves its bound as soon as the velocity error changes sign.
 ///
-/// Limitation: the account of the limiter contains friction, but not kinetic energy. To accelerate a handle of mass m
-/// like a lighter tool, the motors must provide ½ (m − M) v² before the hand does. The limiter clips the part that the
-/// damping of the tool has not earned, and the hand feels the mass of the device. A credit of ½ m (|v| − a_max T)₊²
-/// would not be passive (admittance_loop_test.cc contains a motion that breaks it).
+/// Limitation: the account of the limiter includes friction but not kinetic energy. To accelerate a handle of mass m
+/// like a lighter tool of mass M, the motors must provide ½ (m − M) v² in advance. The limiter clips the part that has
+/// not been earned by the damping of the tool, so the hand feels the mass of the device. A credit of ½ m (|v| − a_max
+/// T)₊² would not be passive (admittance_loop_test.cc contains a counterexample).
 ///
 /// If a measurement is not finite, the tool and the integral are reset to rest, the demand is not finite, and the law
 /// returns zero force with the reason. An interval is ignored if it is not finite or not positive.

@@ -11,7 +11,8 @@
 namespace tendon {
 
 /// The Adjusting Output-Limiter with one ledger. It keeps the direction of the force. The N = Blocks · Size coordinates
-/// form `Blocks` groups of `Size` with isotropic friction, of lower bounds f_c,i and b_i. All groups share one account:
+/// form `Blocks` groups of `Size` coordinates each. The friction of a group is isotropic and has the lower bounds f_c,i
+/// and b_i. All groups share one account:
 ///     E(n) = Σₖ [ −F(k−1)·Δx(k) + Σ_i ( f_c,i ‖Δx_i‖ + b_i ‖Δx_i‖²/T(k) ) ]
 ///     F    = γ F_wanted,  γ ≤ 1 the largest with  Σ_i T_max (γ‖F_wanted,i‖ − f_c,i)₊²/(4 b_i) ≤ max(E, 0)
 ///

@@ -25,8 +25,8 @@
 
 namespace tendon {
 
-// The catalogue of the laws. A new law is an enumerator and a row here. Scenes, `tendon-lab`, the property tests and
-// the golden numbers find it through laws().
+// The catalogue of the laws. To add a law, add an enumerator and a row here. Scenes, `tendon-lab`, the property tests
+// and the golden numbers find it through laws().
 
 enum class Law : std::uint8_t {
   kNone,
@@ -74,8 +74,8 @@ struct LimiterConfig {
   double max_force = 0;                           ///< N, of kClamp
   std::optional<double> environment_stiffness{};  ///< N/m, for demands without a stiffness
   Duration environment_delay{};                   ///< t_d of kPassiveSynthesis, the delay of the environment
-  /// N·s/m, the largest damping of the passivity controllers and kReferenceEnergy. It must be far below 2m/T, where a
-  /// digital damper is unstable. 20 is an eighth of that for 75 g and 1 kHz.
+  /// N·s/m, the largest damping of the passivity controllers and kReferenceEnergy. It must be far below 2m/T, because a
+  /// digital damper becomes unstable there. For 75 g and 1 kHz, 20 is an eighth of this limit.
   double max_damping = 20;
   /// Other ports can credit the account and draw on it (EnergyTank). Refused for laws that cannot share.
   bool shared_account = false;

@@ -49,7 +49,8 @@ LimitedForce<N> EnergyBounding<N>::limit(const Demand<N>& demand) noexcept {
 
   Vec<N> f = centre + law_support::shortened<N>(wanted - centre, radius);
   if (along.dot(f) > ceiling) {
-    // The nearest force in the half-space if it is in the ball, too. Otherwise that on the disc where they intersect.
+    // Use the nearest force in the half-space if it is also in the ball. Otherwise use the nearest force on the disc
+    // where they intersect.
     const double height = along.dot(wanted);
     const Vec<N> across = wanted - height * along;
     f = std::min(height, ceiling) * along + across;

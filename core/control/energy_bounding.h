@@ -13,10 +13,11 @@ namespace tendon {
 ///     (i)   f(n)·Δx ≤ f(n−1)·Δx + c₁ ‖Δx‖²              the slope is at most c₁
 ///     (ii)  ‖f(n)‖² ≤ ‖f(n−1)‖² + 2 c₂ f(n)·Δx           it stores no more than was put in
 /// with c₂ ≤ c₁ ≤ b/T in N/m. If c₂ > c₁, the conditions can contradict each other. The law displays at most about c₁,
-/// half of what force bounding and the AOL display with the same friction.
-///
-/// The port is passive because E(n) ≥ ‖f(n)‖²/(2c₂), even if the device shortens the force. The proof requires holds of
-/// at most `longest_hold`. The law restarts from zero force after an interval that is not finite or was not measured.
+/// with c₂ ≤ c₁ ≤ b/T in N/m. If c₂ > c₁, the conditions can contradict each other. The law can display a stiffness of
+/// at most about c₁, which is half of what force bounding and the AOL can display with the same friction.
+/// The port is passive because E(n) ≥ ‖f(n)‖²/(2c₂), even if the device reduces the force. The proof requires that no
+/// hold is longer than `longest_hold`. After an interval that is not finite or was not measured, the law restarts from
+/// zero force.
 ///
 /// Source: Kim & Ryu, IROS 2004; Int. J. Robotics Research 29(6), 2010 (recalled; the exact published form of (ii) is
 /// unchecked). Proof: core/PROOFS.md, "Comparison laws". The vector form is ours: the intersection of a ball and a

@@ -10,9 +10,9 @@ namespace tendon {
 ///     E(n)  = E(n−1) − F(n−1)·Δx + b ‖Δx‖²/T(n)         E(n−1) := 0 first, when F(n−1) = 0 (no contact)
 ///     F(n)  = F_wanted · min(1, F_max/‖F_wanted‖),       F_max = 2 √( b max(E, 0)/T_max )
 /// F is in N on the hand, Δx in m, E in J. Within one contact this is the Adjusting Output-Limiter without Coulomb
-/// friction. The reset of a positive E between contacts softens the first millimetres of each contact, and keeps energy
-/// from free motion out of a vibration. The port is passive for every demand if each force is held for at most T_max,
-/// because E never exceeds the ledger of the port (core/PROOFS.md, "Discarded credit").
+/// friction. Resetting a positive E between contacts softens the first millimetres of each contact, and prevents that
+/// energy from free motion feeds a vibration. The port is passive for every demand if each force is held for at most
+/// T_max, because E never exceeds the ledger of the port (core/PROOFS.md, "Discarded credit").
 ///
 /// Source: Kim, Baek, Ryu, 2015 (recalled; form as in published code), B = b/T · I.
 /// Thread-safe: no. Realtime-safe: yes, except the constructor.

@@ -22,7 +22,7 @@ void NonlinearCoupling<N>::observe(const Interval<N>& interval) noexcept {
     return;
   }
   elastic_ = max_slope_ * interval.dx - interval.applied;
-  // A device that rounds up stretches the spring, and the account of the proxy pays.
+  // If the device rounds the force up, it stretches the spring. The account of the proxy pays for this.
   const double beyond = interval.applied.squaredNorm() - returned_.squaredNorm();
   if (beyond > 0) account_ -= beyond / (2 * max_slope_);
 }

@@ -8,10 +8,12 @@
 
 namespace tendon {
 
-/// Scales a whole force field by one factor, such that the friction of the device pays for sampling and delay.
+/// Scales a whole force field by one factor, so that the friction of the device dissipates the energy that sampling and
+/// delay generate.
 ///     F = γ F_wanted,    γ = min(1, b / (K_max (T/2 + t_d)))
 /// K_max (N/m) is the steepest slope of the field: the larger of `stiffness` and the spectral norm of the stiffest
-/// demand so far. So γ never increases. If the slope is unknown, the force is zero. Soft parts become softer, too.
+/// demand so far. Therefore, γ never increases. The force is zero while the slope is unknown. Soft parts of the field
+/// become softer as well.
 ///
 /// The port is passive for a static field with a convex potential and slopes up to K_max, if it is sampled in every
 /// period, delivered t_d late (a multiple of the period), and applied unchanged. The field must not change with time.

@@ -103,7 +103,7 @@ LimitedForce<N> ParallelPassivityController<N>::limit(const Demand<N>& demand) n
   const double squared = force.squaredNorm();
   if (missing > 0 && squared > config_.min_force * config_.min_force) {
     const double slip = std::min(missing / squared, config_.max_mobility * seconds(last_.held));  // m/N
-    // At most to where the force of the environment is zero.
+    // Do not go beyond the point where the force of the environment is zero.
     const double stiffness = force.dot(demand.stiffness * force) / squared;
     slipped_ = -(stiffness * slip > 1 ? 1 / stiffness : slip) * force;
     dissipated_ = -force.dot(slipped_);

@@ -68,10 +68,10 @@ class PassivityController {
 /// when the observer finds that the environment generates energy.
 ///     1/α(n) = −E(n) / (T ‖f(n)‖²)  when E(n) < 0, within [0, max_mobility]
 ///     v₁ = v₂ + f/α           hand v₁, environment v₂ (m/s), f = −F (N)
-/// The environment is then at x − δ with δ = Σ T f/α, and the stiffness of the demand gives its force there: F =
+/// The environment is then at x − δ with δ = Σ T f/α. The force there follows from the stiffness of the demand: F =
 /// F_wanted + K δ. The controller has no effect if the demand has no stiffness. Hand and environment drift apart by δ,
-/// a known weakness. δ is reset when both the force and the stiffness of the demand are zero. The linear model can pull
-/// the hand although the true environment would release it. The port is not guaranteed to be passive. See
+/// which is a known weakness. δ is reset when both the force and the stiffness of the demand are zero. The linear model
+/// can pull the hand although the true environment would release it. The port is not guaranteed to be passive. See
 /// PassivityController, also for the observers and sources.
 /// Thread-safe: no. Realtime-safe: yes, except the constructor.
 template <int N>

@@ -10,7 +10,7 @@
 namespace tendon {
 namespace {
 
-/// ns: four readings and a midpoint, each truncated.
+/// ns, because four time stamps and the midpoint are each truncated.
 constexpr double kRounding = 3;
 
 double ns_between(LocalTime from, LocalTime to) noexcept { return static_cast<double>((to - from).count()); }
@@ -26,7 +26,7 @@ std::optional<ClockOffsetEstimator::Sample> ClockOffsetEstimator::sample_of(cons
   const Duration theirs = e.answered - e.received;
   if (ours < Duration::zero() || theirs < Duration::zero()) return std::nullopt;
   Duration round_trip = ours - theirs;
-  // A peer with a faster clock has delayed the answer.
+  // The difference is slightly negative if the clock of the peer is faster.
   const auto ns = [](Duration time) { return static_cast<double>(time.count()); };
   if (ns(round_trip) < -fastest_drift_ * ns(theirs)) return std::nullopt;
   const double doubt = ns(round_trip) + fastest_drift_ * ns(ours);
@@ -88,7 +88,7 @@ std::optional<ClockOffsetEstimator::Estimate> ClockOffsetEstimator::estimate(Loc
   });
   if (anchor == nullptr) return std::nullopt;
 
-  // Relative to the best sample, because a double cannot represent all offsets with 1 ns.
+  // Offsets are relative to the best sample, because a double cannot represent every offset with a resolution of 1 ns.
   struct Point {
     double weight, t, offset;
   };
@@ -115,7 +115,7 @@ std::optional<ClockOffsetEstimator::Estimate> ClockOffsetEstimator::estimate(Loc
 
   const Interval interval = permitted(at, anchor->offset_ns);
   const double line = mean_o + drift * (ns_between(anchor->at, at) - mean_t);
-  // Not std::clamp: contradicting samples (an undetected step) leave an empty interval.
+  // std::clamp cannot be used, because contradictory samples (after an undetected step) result in an empty interval.
   const double offset = std::max(interval.low, std::min(interval.high, line));
   const double bound = std::max({offset - interval.low, interval.high - offset, 0.0});
   return Estimate{.offset = Duration(anchor->offset_ns + std::llround(offset)),

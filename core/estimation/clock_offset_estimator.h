@@ -35,7 +35,7 @@ class ClockOffsetEstimator {
   static constexpr std::size_t kBlocks = 8;
   static constexpr int kExchangesPerBlock = 16;
   static constexpr Duration kLeastBlock = std::chrono::milliseconds(3200);
-  /// δ₀. Smaller differences of the round trip are due to the scheduler, not to the path.
+  /// δ₀. Smaller differences in the round trip are caused by the scheduler and not by the path.
   static constexpr Duration kResolution = std::chrono::microseconds(100);
 
   struct Estimate {
@@ -48,7 +48,8 @@ class ClockOffsetEstimator {
     LocalTime to_local(PeerTime theirs) const noexcept { return LocalTime(theirs.time_since_epoch() - offset); }
   };
 
-  /// `fastest_drift` is ρ in s/s. No quartz drifts by 200 ppm. Throws std::invalid_argument if not in 0 … 0.01.
+  /// `fastest_drift` is ρ in s/s. The drift of a quartz is below 200 ppm. Throws std::invalid_argument if not in 0 …
+  /// 0.01.
   explicit ClockOffsetEstimator(double fastest_drift = 200e-6);
 
   /// Ignores T4 < T1, T3 < T2, and a negative round trip that exceeds the drift. `answered_at` should not decrease.

@@ -8,8 +8,8 @@ namespace tendon {
 /// Units follow the parameters θ and the output y.
 struct LeastSquaresConfig {
   double forgetting = 0.95;  ///< λ, (0, 1]; 1 never forgets
-  /// After a reset P is this times the identity: the squared error of a parameter over the squared noise of y. Scale
-  /// the regressor so that one value fits all parameters.
+  /// After a reset, P is this value times the identity. It is the squared error of a parameter divided by the squared
+  /// noise of y. Scale the regressor so that one value fits all parameters.
   double prior_variance = 1e8;
   double dead_zone = 0;  ///< smaller errors are ignored; about the noise of y, or 0
 };
@@ -17,12 +17,12 @@ struct LeastSquaresConfig {
 /// Fits y = φᵀθ to a stream of samples. The covariance P stays positive definite, even in float32. θ minimizes
 ///     λⁿ/p0 · |θ − θ0|² + Σ_i λ^(n−i) · (y_i − φ_iᵀθ)²
 /// θ0 is the estimate at the last reset. These weights apply while the cap below is inactive. The textbook recursion P
-/// ← (P − K φᵀP)/λ subtracts nearly equal numbers, and becomes indefinite within tens of samples if the regressors are
-/// almost parallel. Here P = U D Uᵀ with U unit upper triangular, and D is only multiplied by positive numbers.
+/// ← (P − K φᵀP)/λ subtracts nearly equal numbers. If the regressors are almost parallel, P becomes indefinite within
+/// tens of samples. Here P = U D Uᵀ with U unit upper triangular, and D is only multiplied by positive numbers.
 ///
-/// **Forgetting is capped:** a sample forgets by max(λ, min(1, tr P / (M p0))), so tr P never exceeds its value after a
-/// reset. Directions that are not excited do not wind up. A sample is ignored if not finite or if D under- or
-/// overflows.
+/// **Forgetting is capped:** the forgetting factor of a sample is max(λ, min(1, tr P / (M p0))), so tr P never exceeds
+/// its value after a reset, and P does not wind up in directions that are not excited. A sample is ignored if it is not
+/// finite or if D under- or overflows.
 ///
 /// Source: Bierman, "Factorization Methods for Discrete Sequential Estimation", 1977, ch. V.
 /// Thread-safe: no. Realtime-safe: yes; O(M²) per sample. Instantiated for M = 1…4, float and double.

@@ -39,7 +39,7 @@ Vec<N> VelocityEstimatorOf<N>::observe(LocalTime at, const Vec<N>& position) noe
   }
   count_ = std::min(count_ + 1, kWindow + 1);
 
-  // Divisions are slow: the axes share one per sample.
+  // All axes share one division per sample, because divisions are slow.
   std::array<double, kWindow + 1> rate;  // 1/s
   std::size_t known = 1;                 // number of valid entries of `rate`
   const auto rate_to = [&](const Sample& past) { return 1e9 / static_cast<double>((at - past.at).count()); };

@@ -15,8 +15,8 @@ namespace tendon {
 ///     v = (x(k) − x(k−n)) · r(n),        r(n) = 1 / (t(k) − t(k−n)),
 ///     n = max { n ≤ window : |v − (x(k) − x(k−i)) · r(i)| ≤ resolution · r(i), 0 < i < n }
 /// The estimate is smooth at low speed and fast at high speed, without a cut-off frequency. With resolution 0 (exact
-/// positions) it is the backward difference, except on a straight line. A sample costs the length of the window of each
-/// axis, without the counts during which the axis has not moved.
+/// positions) it is the backward difference, except on a straight line. The cost of a sample is proportional to the
+/// length of the window of each axis. Samples at which the axis did not move are not counted.
 ///
 /// Source: Janabi-Sharifi, Hayward, Chen, "Discrete-time adaptive windowing for velocity estimation", IEEE TCST 8(6),
 /// 2000 (end-fit form), with measured time stamps in place of a fixed period. Error: core/PROOFS.md, "Velocity
@@ -42,8 +42,8 @@ class VelocityEstimatorOf {
   static constexpr std::size_t kSlots = 2 * kWindow;
 
   double resolution_;
-  /// Newest first, from `newest_` on. A newer sample is put before it; when there is no room, the samples of a window
-  /// move to the end. (A ring would need a wrap per sample and step.)
+  /// The samples from `newest_` on, newest first. A new sample is inserted before them. If there is no room, the
+  /// samples of one window are moved to the end. (In a ring buffer, every access would have to wrap the index.)
   std::array<Sample, kSlots> samples_{};
   std::size_t newest_ = kSlots;
   std::size_t count_ = 0;  ///< from `newest_` on, at most kWindow + 1

@@ -109,8 +109,8 @@ struct GripLimits {
 /// are specific to the position. The account is shared if that of `point` is, through a separate tank.
 GripPort::Config grip_config(const LimiterConfig& point, const GripLimits& grip);
 
-/// A wrench after a memoryless limit. `saturate` applies the first s to the wrench, and `limit_slew` the second s to
-/// its change. s ≤ 1 is the largest value with
+/// The result of a limit without memory on a wrench. `saturate` applies the first s to the wrench, and `limit_slew` the
+/// second s to its change. s ≤ 1 is the largest value with
 ///     ‖s F‖ ≤ max_force,   ‖s τ‖ ≤ max_torque
 ///     ‖s (F − F_before)‖ ≤ max_slew · T,   ‖s (τ − τ_before)‖ ≤ max_torque_slew · T
 struct LimitedWrench {

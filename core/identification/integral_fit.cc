@@ -70,8 +70,8 @@ double median_of_absolutes(const VectorXd& values) {
   return *middle;
 }
 
-/// Lᵀu, with the residuals r = L ε of force noise ε. Noise that is held from t_j to t_j + h changes the double integral
-/// at a later t by h (t − t_j − h/2).
+/// Returns Lᵀu. The residuals are r = L ε with the force noise ε. Noise that is held from t_j to t_j + h changes the
+/// double integral at a later t by h (t − t_j − h/2).
 VectorXd transposed_double_integral(const Regression& r, const VectorXd& u) {
   VectorXd result = VectorXd::Zero(u.size());
   double sum = 0;

@@ -13,10 +13,10 @@ namespace tendon {
 /// Friction from a slide of any length. The equation of motion is integrated twice from the first sample of the slide,
 /// so the fit does not need a derivative or a steady state:
 ///     m X + b ∫X dt + f_c τ²/2 + c τ = ∬F dt²,       τ = t − t_a,  X = x − x(t_a)
-/// It is linear in b, f_c, the unknown momentum term c at t_a, and m if that is unknown. Huber weights reduce the
-/// influence of outliers. White noise ε of the force enters as ∬ε dt², so the residuals are not independent. This is
-/// included in `unit_covariance`. The errors of the textbook formula σ²(AᵀA)⁻¹ are 35 to 70 times too small. Source:
-/// core/PROOFS.md, "Friction identification".
+/// The equation is linear in b, f_c, the unknown momentum term c at t_a, and m if that is unknown. Huber weights reduce
+/// the influence of outliers. White noise ε of the force enters as ∬ε dt², so the residuals are correlated.
+/// `unit_covariance` accounts for this. The errors from the textbook formula σ²(AᵀA)⁻¹ are 35 to 70 times too small.
+/// Source: core/PROOFS.md, "Friction identification".
 struct IntegralFit {
   Friction friction;  ///< not a lower bound; can be negative
   double mass = 0;    ///< kg, given or fitted
@@ -29,9 +29,9 @@ struct IntegralFit {
   double force_noise() const noexcept;
 };
 
-/// `mass`: kg, of handle and mechanism. If it is empty, the mass is fitted as well, which needs a slide that is long
-/// enough to show both mass and friction, and increases the errors. Throws std::invalid_argument if the mass is not a
-/// number > 0. Thread-safe: yes. Realtime-safe: no.
+/// `mass`: kg, of handle and mechanism. If it is empty, the mass is fitted as well. This increases the errors, and the
+/// slide must be long enough to show the effects of both mass and friction. Throws std::invalid_argument if the mass is
+/// not a number > 0. Thread-safe: yes. Realtime-safe: no.
 IntegralFit integral_fit(const Slide& slide, std::optional<double> mass);
 
 }  // namespace tendon

@@ -84,7 +84,7 @@ Slide slide_of(const RampRun& run, double encoder_step) {
   while (!(path[i] > margin)) ++i;
   double fastest = 0;  // m per sample
   for (std::size_t j = 1; j < path.size(); ++j) fastest = std::max(fastest, path[j] - path[j - 1]);
-  const double end = travel - margin - 2 * fastest;  // the median cuts off the top of a rebound, 2 samples
+  const double end = travel - margin - 2 * fastest;  // the median cuts off the peak of a rebound (2 samples)
   double farthest = path[i];
   for (; path[i] < end; ++i) {
     farthest = std::max(farthest, path[i]);

@@ -30,14 +30,16 @@ class EnergyLedger {
     return book(-applied.dot(dx), squared, held);
   }
 
-  /// Books the worst motion of an interval without a position measurement, because the watchdog of the device ended the
-  /// hold or a reading failed. A force of norm `applied` (N) was held for at most `at_most` and then vanished:
+  /// Books the worst motion of an interval in which the position was not measured, because the watchdog of the device
+  /// ended the hold or because a reading failed. A force of norm `applied` (N) was held for at most `at_most` and then
+  /// vanished:
   ///     ΔE = −at_most · (‖F‖ − f_c)₊² / (4b)
-  /// If b is 0, a force above f_c has no such bound. Then nothing is booked; the limiter keeps the force at f_c.
+  /// If b is 0, there is no such bound for a force above f_c. Nothing is booked then, and the limiter keeps the force
+  /// at f_c.
   double observe_unseen(double applied, Duration at_most) noexcept;
 
   /// Adds energy (J) from the account of another port, or subtracts it if the value is negative. E is then a shared
-  /// account (EnergyTank). Ignores a value that is not finite.
+  /// account (EnergyTank). Ignores values that are not finite.
   void transfer(double energy) noexcept;
 
   /// Sets the lower bounds of friction from the next interval on. Ignores values that are negative or not finite.

@@ -3,10 +3,11 @@
 
 namespace tendon {
 
-/// **Lower bounds** of the friction of a device, isotropic in its base frame. Besides the work of the hand they are the
-/// only income of the energy ledger. Values above the true friction void the passivity theorem: with twice the true
-/// viscous friction an adversarial motion draws 7.6 mJ (core/PROOFS.md, "Energy ledger"). Lower values only make
-/// contact softer. Subtract any friction or gravity compensation by the driver.
+/// **Lower bounds** of the friction of a device, isotropic in its base frame. The energy ledger is only credited with
+/// the work of the hand and with this friction. If a value is larger than the true friction, the passivity theorem does
+/// not hold: with twice the true viscous friction, an adversarial motion extracts 7.6 mJ (core/PROOFS.md, "Energy
+/// ledger"). A value that is too small only makes contact softer. Subtract any compensation of friction or gravity by
+/// the driver.
 struct Friction {
   double coulomb = 0;  ///< f_c, N
   double viscous = 0;  ///< b, N·s/m

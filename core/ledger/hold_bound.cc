@@ -19,7 +19,7 @@ HoldBound::HoldBound(Duration longest_hold, const Follow& follow) : follow_(foll
 void HoldBound::observe(Duration held) noexcept {
   if (held <= Duration::zero()) return;
   if (held > in_force()) {
-    // Rounded up, because with a margin of 0 the bound must still cover `held` itself.
+    // The product is rounded up, because the bound must still cover `held` if the margin is 0.
     const double seen = std::ceil((1 + follow_.margin) * static_cast<double>(held.count()));
     const double most = follow_.most * static_cast<double>(longest_hold_.count());
     excess_ = std::max(excess_, Duration(static_cast<Duration::rep>(std::min(seen, most))) - longest_hold_);

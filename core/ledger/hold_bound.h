@@ -5,12 +5,13 @@
 
 namespace tendon {
 
-/// The bound T on the time for which the next force can be held. It follows the measured times, for OutputBound.
+/// An upper bound T on the time for which the next force is held. It follows the measured times and is used by
+/// OutputBound.
 ///     T(0)   = T_max                                        from the scene
 ///     T(n+1) = min((1 + margin) · held, most · T_max)       if held > T(n); never below T(n)
 ///     T(n+1) = T(n) − max(1 ns, (T(n) − T_max) · held/memory), not below T_max            otherwise
-/// T rises immediately and falls slowly, so a machine that is late again within `memory` already has a suitable bound.
-/// T is equal to T_max if no interval was longer.
+/// T rises immediately and falls slowly. If a machine is late again within `memory`, T is therefore already large
+/// enough. As long as no interval was longer than T_max, T is equal to T_max.
 ///
 /// A force F that is held for T_act > T can take E below zero, but by no more than
 ///     (T_act − T)(‖F‖ − f_c)₊²/(4b)  ≤  (T_act/T − 1) · E
@@ -21,10 +22,10 @@ class HoldBound {
  public:
   struct Follow {
     double margin = 0.25;  ///< ≥ 0: the relative margin of T
-    /// > 0. Time constant of the return to T_max. Overruns of ordinary kernels are minutes apart.
+    /// > 0. Time constant of the return to T_max. With ordinary kernels, overruns are minutes apart.
     Duration memory = std::chrono::seconds(60);
-    /// ≥ 1: the largest T, in T_max. If an interval is longer than this, the machine was stopped, so it does not show
-    /// the jitter. With 4 T_max the limiter still permits half of the force above f_c.
+    /// ≥ 1: the largest T as a multiple of T_max. A longer interval means that the machine was stopped and says nothing
+    /// about the jitter. With 4 T_max, the limiter still permits half of the force above f_c.
     double most = 4;
   };
 

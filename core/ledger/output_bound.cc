@@ -39,7 +39,7 @@ double largest_scale(const std::array<OutputBound, Parts>& bounds, const std::ar
   }
   const double budget = energy > 0 ? energy : 0;
   // The scales at which a part exceeds Coulomb friction (starts) or reaches L (corners). Excesses are measured from
-  // `starts`, because scale · size can round to above the Coulomb friction at the start itself.
+  // `starts`, because scale · size can round to a value above the Coulomb friction at the start itself.
   std::array<double, Parts> starts;
   std::array<double, 2 * Parts> corners;
   std::size_t count = 0;
@@ -69,7 +69,7 @@ double largest_scale(const std::array<OutputBound, Parts>& bounds, const std::ar
   double from = corners[0];
   for (std::size_t k = 1; k < count && corners[k] <= ceiling && loss_at(corners[k]) <= budget; ++k) from = corners[k];
 
-  // Up to the next corner, where the sum exceeds the budget, it is ℓ₀ + ℓ₁ δ + ℓ₂ δ².
+  // Between two corners, the sum is ℓ₀ + ℓ₁ δ + ℓ₂ δ². Stop at the corner after which it exceeds the budget.
   double slope = 0;
   double curvature = 0;
   for (std::size_t i = 0; i < Parts; ++i) {

@@ -59,7 +59,7 @@ void RobustLedger<N>::observe(const Interval<N>& interval) noexcept {
     credited_ = travel;
     to_peak_ = from_turn_;
   } else if (const Vec<N> back = from_turn_ - to_peak_; beyond<N>(config_.encoder_step, back).squaredNorm() > 0) {
-    // The hand has turned by more than one count, so a new path begins at the peak.
+    // The hand has moved back by more than one count, so a new path begins at the peak.
     from_turn_ = back;
     to_peak_ = back;
     least_coulomb_ = config_.friction.coulomb;

@@ -7,16 +7,16 @@
 
 namespace tendon {
 
-/// The energy ledger for positions from an encoder. It is a lower bound of the E of EnergyLedger for the true
-/// positions. A position is rounded to a count of Δ, so the error of each component is at most Δ/2. Therefore:
+/// The energy ledger for positions from an encoder. It is a lower bound of the E that EnergyLedger would compute from
+/// the true positions. Positions are rounded to a count Δ, so the error of each component is at most Δ/2. Therefore:
 ///     work       Σ f·dx measured ≤ Σ f·dx true + (Δ/2) Σ ‖f(k) − f(k−1)‖₁ + (Δ/2) ‖f(n)‖₁      (Abel summation);
 ///                the ledger subtracts the two terms
 ///     Coulomb    credits f_c times the net travel since the last turning point, each component reduced by Δ. The path
 ///                is never shorter. A handle at rest on the edge of a count earns nothing
 ///     viscous    credits b ‖D‖² / (T₁ + … + T_N) once per `window` of N intervals, each component of the net travel D
 ///                reduced by Δ (Cauchy–Schwarz). Per interval, one count of 30 µm at 1 kHz would count as 30 mm/s
-/// Credit arrives late and is never too large, so E − (Δ/2)‖f‖₁ may be spent. Net travel replaces a play filter per
-/// axis, which would follow a diagonal as a staircase and over-credit it by √N.
+/// Credit may arrive late but is never too large, so E − (Δ/2)‖f‖₁ can be spent. The ledger uses net travel, because a
+/// play filter per axis would follow a diagonal as a staircase and over-credit it by √N.
 ///
 /// Source: core/PROOFS.md, "Encoder counts".
 /// One account for N components with isotropic friction. Thread-safe: no. Realtime-safe: yes.

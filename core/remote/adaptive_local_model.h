@@ -14,20 +14,20 @@ namespace tendon {
 ///     F_j(x) = f_j − share · K_j (x′ − x_j),   x′ the position nearest to x in the model's valid radius of x_j
 ///     F(x, t) = (1 − s) F_{j−1}(x) + s F_j(x),   s = clamp((t − t_r)/slow period, 0, 1)
 /// A new answer that differs by ΔF at the same x therefore adds ΔF · dt/period per step. A sudden change would generate
-/// |ΔF · dx| at the next motion; blending spreads this energy, and the limiter accounts for it. If the environment has
-/// not changed, old and new model are the same line, and the prediction does not lag. The slow period is the time
-/// between the motions of the two answers, and at most `max_blend`. A force without a model counts as a model with K =
-/// 0. The contact and the table of an answer are ignored, because they cannot be blended.
+/// |ΔF · dx| at the next motion. Blending spreads this energy over time, and the limiter accounts for it. If the
+/// environment has not changed, the old and the new model are the same line, and the prediction does not lag. The slow
+/// period is the time between the motions of the two answers, but at most `max_blend`. A force without a model is
+/// treated as a model with K = 0. The contact and the table of an answer are ignored, because they cannot be blended.
 ///
-/// Source: Barbagli et al., IJRR 24(9), 2005 (recalled): stable if share · K does not exceed the true stiffness. K must
-/// be a `believed` one (answer.h). See core/PROOFS.md, "Local models".
+/// Source: Barbagli et al., IJRR 24(9), 2005 (recalled). The loop is stable if share · K does not exceed the true
+/// stiffness. K must be the result of `believed` (answer.h). See core/PROOFS.md, "Local models".
 /// Thread-safe: no. Realtime-safe: yes.
 class AdaptiveLocalModel {
  public:
   struct Config {
     /// The share of the stiffness that is used, (0, 1]. Use less than 1 if the engine estimates its stiffness.
     double share = 1;
-    /// The longest blend. With a slower engine, the model is in full use after this time.
+    /// The longest time of a blend. With a slower engine, the new model is fully in use after this time.
     Duration max_blend = std::chrono::milliseconds(100);
   };
 

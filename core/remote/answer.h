@@ -42,9 +42,9 @@ Vec3 within(const LocalModel& model, const Vec3& position) noexcept;
 /// s = N / (n·force), clamped to [0, 1]: the tangential force fades with the normal force. The stiffness is −∂F/∂x for
 /// constant s. It is zero beyond the radius, at the ends of the table, and where the table decreases.
 ///
-/// Source: in a comparison with hold, extrapolation in time and secants, the table was best below 50 answers per second
-/// and the stiffness above (tests/tools/lab/experiments/reconstruction_test.cc). Engines that send their model: James
-/// and Pai, "A unified treatment of elastostatic contact simulation for real-time haptics", Haptics-e 2(1), 2001;
+/// Source: a comparison with hold, extrapolation in time and secants. Below 50 answers per second the table was best,
+/// and above that the stiffness (tests/tools/lab/experiments/reconstruction_test.cc). Engines that send their model:
+/// James and Pai, "A unified treatment of elastostatic contact simulation for real-time haptics", Haptics-e 2(1), 2001;
 /// Mahvash and Hayward, IEEE CG&A 24(2), 2004 (curves of force against depth). Realtime-safe: yes.
 Prediction reconstruct(const RemoteForce& answer, const Vec3& position) noexcept;
 

@@ -7,8 +7,8 @@ namespace tendon {
 
 /// How a device combines the forces of its channels (ForceChannels). Part of the wire format: never renumber.
 enum class ChannelRule : std::uint8_t {
-  kSum = 1,       ///< its force is added
-  kPriority = 2,  ///< while its force is fresh, later channels of this rule are silent
+  kSum = 1,       ///< the force is added to those of the other channels
+  kPriority = 2,  ///< while the force is fresh, later channels with this rule have no effect
 };
 
 }  // namespace tendon

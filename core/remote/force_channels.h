@@ -12,10 +12,10 @@ namespace tendon {
 
 /// Combines the forces of several engines into one demand. There is a channel with a HeldForce for each engine.
 ///     F  =  Σ Fᵢ  over the channels of rule kSum  +  Σ wⱼ Fⱼ  over those of rule kPriority
-/// The first channel of rule kPriority with a fresh force (or with the freshest, if no force is fresh) gets all the
-/// weight. Its w goes to 1 at a rate of 1 per `ramp_in`, and the others keep their proportions, so Σ w = 1 and the
-/// engines are cross-faded. Stiffnesses, torques and grip forces are combined in the same way. The limiter bounds the
-/// result, even if the engines oppose each other (core/PROOFS.md, "Several channels").
+/// The first kPriority channel with a fresh force gets all the weight; if no force is fresh, it is the channel with the
+/// freshest force. Its w increases to 1 at a rate of 1 per `ramp_in`, while the others keep their proportions, so that
+/// Σ w = 1 and the engines are cross-faded. Stiffnesses, torques and grip forces are combined in the same way. The
+/// limiter bounds the result, even if the engines oppose each other (core/PROOFS.md, "Several channels").
 /// Thread-safe: no. Realtime-safe: yes, except the constructor.
 class ForceChannels {
  public:

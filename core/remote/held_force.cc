@@ -92,7 +92,7 @@ HeldForce::Wanted HeldForce::wanted(const Motion& hand, const Quat* orientation)
   result.age = std::max(Duration::zero(), hand.at - newest_->received);
   result.loop_age = std::max(Duration::zero(), hand.at - newest_->answers);
   const Duration overdue = result.age - validity();
-  // A safe stop must be ended by `observe` and not by a clock that goes back.
+  // Only `observe` may end a safe stop, even if the clock goes back.
   if (mode_ == Mode::kSafeStop || overdue >= config_.safe_stop) {
     mode_ = Mode::kSafeStop;
     rendered_.setZero();

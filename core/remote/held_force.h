@@ -14,7 +14,7 @@
 
 namespace tendon {
 
-/// The demands other than the force.
+/// All demands other than the force.
 struct HandleWanted {
   Vec3 torque = Vec3::Zero();  ///< N·m, on the hand
   double grip = 0;             ///< N; opens the fingers if positive
@@ -36,15 +36,15 @@ struct HandleWanted {
 /// the force is. Only the trusted part of an answer is used, and an answer that is not sound is refused (answer.h). The
 /// result must be bounded by a limiter.
 ///
-/// The first force, the first one after a safe stop, and the first one from another source are ramped in linearly over
-/// `ramp_in`, starting from the current force. A fresh force during the decay is ramped in over (1 − gain) · ramp_in.
-/// The force does not jump if an engine returns, stutters or takes over.
+/// The first force, the first force after a safe stop, and the first force from another source are ramped in linearly
+/// over `ramp_in`, starting from the current force. A fresh force that arrives during the decay is ramped in over (1 −
+/// gain) · ramp_in. The force does not jump if an engine returns, stutters or takes over.
 /// Thread-safe: no. Realtime-safe: yes.
 class HeldForce {
  public:
   struct Config {
     Duration hold = std::chrono::milliseconds(20);  ///< covers two lost datagrams of a 100 Hz engine
-    /// Time constant. The force is reduced by 90 % after 115 ms, which is not felt as a kick and cannot be leaned on.
+    /// Time constant. The force decreases by 90 % in 115 ms, which does not feel like a kick.
     Duration decay = std::chrono::milliseconds(50);
     /// Time from the end of validity to the safe stop. The force is then below 1 %.
     Duration safe_stop = std::chrono::milliseconds(250);
@@ -103,7 +103,7 @@ class HeldForce {
   LocalTime engaged_{};       ///< start of the ramp
   Duration ramp_{};           ///< its length
   Vec3 from_ = Vec3::Zero();  ///< N, the force at the start of the ramp
-  double presence_ = 0;       ///< share of the environment in `rendered_`, 0 to 1
+  double presence_ = 0;       ///< 0 to 1, share of the environment in `rendered_`
   Vec3 rendered_ = Vec3::Zero();
   std::optional<HandleWanted> handle_from_;
   std::optional<HandleWanted> handle_rendered_;

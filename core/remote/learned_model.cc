@@ -8,8 +8,8 @@
 namespace tendon {
 namespace {
 
-constexpr double kOtherSide = 3e-4;   // m: a zero force at this distance from the last push ends the object
-constexpr double kSameObject = 3e-3;  // m: a force that reverses within this is of one object
+constexpr double kOtherSide = 3e-4;   // m: a zero force at this distance from the last push ends the contact
+constexpr double kSameObject = 3e-3;  // m: if a force reverses within this distance, it belongs to the same object
 constexpr double kBeyond = 1.5;       // limit of predictions, in F_late
 constexpr double kOfLate = 1;         // s, time constant of F_late
 constexpr double kOfTheNewGap = 0.2;  // the weight of a new value in the mean time between answers
@@ -99,7 +99,7 @@ void LearnedModel::correct(const RemoteForce& answer) noexcept {
   rest_ = before - led().force;
 }
 
-/// The anchor, moved to the newest position.
+/// Returns the anchor, moved to the newest position.
 Prediction LearnedModel::led() const noexcept {
   Prediction result{.force = anchor_->force, .stiffness = Mat3::Zero()};
   if (!known_place_ || trust_ == 0 || (one_sided_ && anchor_->force.isZero(0))) return result;

@@ -12,21 +12,23 @@
 
 namespace tendon {
 
-/// Learns from the answers how the remote force changes with the position of the hand, and moves the newest answer to
-/// the current position. This compensates the delay, and interpolates between answers. x_a is the position that answer
-/// F_a belongs to. At a new answer, with the last pair (F_p, x_p) that was used, p = x_a − x_p, if ‖p‖ ≥ ℓ:
+/// Learns from the answers how the remote force depends on the position of the hand, and extrapolates the newest answer
+/// to the current position. This compensates for the delay and interpolates between answers. x_a is the position to
+/// which answer F_a belongs. (F_p, x_p) is the last pair that was used. At a new answer, with p = x_a − x_p, if ‖p‖ ≥
+/// ℓ:
 ///     q = K p                                                              N, prediction of the model
 ///     N ← λ N − (F_a − F_p)·q,   D ← λ D + ‖q‖²,   θ = clamp(N/D, 0, 1)    trust; 0 before two lessons
 ///     K ← K + g (−(F_a − F_p) − q) pᵀ / (‖p‖² + ℓ²/10)                     N/m, 3 × 3
 ///     (F_p, x_p) ← (F_a, x_a)
 /// and in every haptic step, with d = x − x_a:
 ///     F = F_a − θ K d + r,   ‖θ K d‖ ≤ max_stiffness ‖d‖,   ‖F − r‖ ≤ 1.5 F_late;   r ← r τ_r/(τ_r + T)
-/// r is set such that F does not jump at an answer. τ_r is the smaller of `blend` and `blend_share` of the mean time
-/// between answers. F_late is the largest recent answer (within 1 s). θ decreases if the force changes with time.
+/// r is chosen so that F does not jump at an answer. τ_r is `blend` or `blend_share` times the mean time between
+/// answers, whichever is smaller. F_late is the largest recent answer (within 1 s). θ decreases if the force changes
+/// with time.
 ///
-/// One-sided contact: if an answer is exactly zero, at least 0.3 mm from the last force, the object only pushes. F then
-/// fades to zero along F_a without reversing, F_a = 0 predicts zero, and pairs with a zero are not used. This ends if a
-/// force reverses within 3 mm.
+/// One-sided contact: an answer of exactly zero, at least 0.3 mm away from the last force, means that the object only
+/// pushes. F then fades to zero along F_a without reversing, F_a = 0 predicts zero, and pairs with a zero are not used.
+/// This mode ends when a force reverses within 3 mm.
 ///
 /// The result must be bounded by a limiter. Use `reconstruct` for answers that have a model.
 ///
@@ -35,7 +37,7 @@ namespace tendon {
 /// Thread-safe: no. Realtime-safe: yes; observe and predict O(1), correct O(log kSlots).
 class LearnedModel {
  public:
-  static constexpr std::size_t kSlots = 1024;  ///< number of stored steps; there is no model for older answers
+  static constexpr std::size_t kSlots = 1024;  ///< number of stored steps; older answers have no model
 
   struct Config {
     double least_travel = 2e-4;                     ///< ℓ, m, > 0: about seven encoder counts

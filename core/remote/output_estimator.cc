@@ -9,8 +9,8 @@
 namespace tendon {
 namespace {
 
-/// m/N; scales the regressor F(k−1) so that pole and stiffness have the same prior. p0 = 1e8 (N/m)² corresponds to an
-/// error of 10 of the pole.
+/// m/N. Scales the regressor F(k−1) so that pole and stiffness have the same prior. For p0 = 1e8 (N/m)², the prior
+/// error of the pole is 10.
 constexpr double kPoleScale = 1e-3;
 
 LeastSquaresConfig checked(const OutputEstimator::Config& config) {
@@ -151,7 +151,7 @@ double OutputEstimator::output(int axis, double position, double before) const n
   return std::clamp(free, -config_.max_force, config_.max_force);
 }
 
-/// Sets the force at the newest answered motion to the answer, and recomputes the forces since.
+/// Sets the force for the newest answered motion to the answer, and recomputes all later forces.
 void OutputEstimator::anchor() noexcept {
   Step& known = step(anchor_->step);
   if (config_.model != Model::kOutputError) {

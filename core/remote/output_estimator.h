@@ -19,21 +19,22 @@ namespace tendon {
 ///     kPolynomial     F = −(θ₁ x + θ₂ x|x|/ℓ) − off           −∂F/∂x = θ₁ + 2 θ₂ |x|/ℓ
 ///     kSpringAndBias  F = −(θ₁ x + θ₂ ℓ) − off                −∂F/∂x = θ₁
 ///     kOutputError    F(k) = a F(k−1) − θ₂ x(k)               −∂F/∂x = θ₂, of this step
-/// A force that answers the motion at time t is compared with the force of the model for that motion, so the time and
-/// the order of arrival have no effect. Then:
+/// A force that answers the motion at time t is compared with the force of the model for that motion. The time and the
+/// order of arrival therefore have no effect. Then:
 ///     e = −F − φᵀθ
 ///     if |e| > reset_error, and reset_cooldown answers since the last one:  P ← p0 I  (θ stays)
 ///     θ, P ← least squares with forgetting, capped, outside the dead zone
 ///     θ ← into its bounds: stiffness 0 … max_stiffness (other parameters either sign), |a| ≤ 0.9
 ///     re-anchor on the newest motion that was answered: off = −F − φᵀθ, or F(k) computed again since
-/// An axis does not learn if the hand has moved by less than three encoder counts since the last lesson. The prediction
-/// is the held force until the first lesson. The pole is bounded, because a pole fitted to 25 Hz data is often unstable
-/// at 1 kHz. The prediction is bounded, too, because its error can be some newtons after a change of the environment.
-/// The result must be bounded by a limiter. The axes are independent: a wall at an angle to the axes appears as three
-/// springs that are only right along the direction of the last press. Engines can send a LocalModel instead.
+/// An axis does not learn while the hand has moved by less than three encoder counts since the last update. Before the
+/// first update, the prediction is the held force. The pole is bounded, because a pole that was fitted to 25 Hz data is
+/// often unstable at 1 kHz. The prediction is also bounded, because its error can be some newtons after a change of the
+/// environment. The result must be bounded by a limiter. The axes are independent: a wall at an angle to the axes is
+/// modelled by three springs that are only correct along the direction of the last press. Engines can send a LocalModel
+/// instead.
 ///
-/// Source: Lee and Lee, "Multirate output estimation for real-time haptic rendering" (only the abstract is available,
-/// so the condition of the P reset is a guess). Cap, cooldown, bounds, freeze and re-anchoring are ours:
+/// Source: Lee and Lee, "Multirate output estimation for real-time haptic rendering". Only the abstract is available,
+/// so the condition for resetting P is a guess. Cap, cooldown, bounds, freeze and re-anchoring are ours:
 /// core/PROOFS.md, "Local models".
 /// Thread-safe: no. Realtime-safe: yes; observe and predict O(1), correct at most kSlots steps.
 class OutputEstimator {

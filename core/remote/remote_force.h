@@ -11,8 +11,9 @@
 
 namespace tendon {
 
-/// The force along the normal of a contact at several depths. force[i] is along +normal, with the tool `depth_i = first
-/// + i · step` deeper than at the answer, at the position `at − depth_i · normal`. Linear in between, constant beyond.
+/// The force along the normal of a contact at several depths. force[i] is along +normal, for a tool that is `depth_i =
+/// first + i · step` deeper than at the answer, at the position `at − depth_i · normal`. Linear in between, constant
+/// beyond.
 struct ForceTable {
   static constexpr std::size_t kMinEntries = 2;
   static constexpr std::size_t kMaxEntries = 16;  ///< 5 mm with 0.3 mm between entries; 128 bytes of a datagram
@@ -62,7 +63,7 @@ struct RemoteTorque {
 struct RemoteForce {
   std::uint64_t sequence = 0;      ///< increases strictly within a session; 0 if there is no force yet
   std::uint64_t answers_tick = 0;  ///< the haptic step with the answered motion
-  LocalTime answers{};             ///< sample time of that motion; now − answers is the age of the loop
+  LocalTime answers{};             ///< sample time of that motion; now − answers is `loop_age`
   LocalTime received{};            ///< arrival time
   Vec3 force = Vec3::Zero();       ///< N, on the hand
   std::optional<LocalModel> model{};

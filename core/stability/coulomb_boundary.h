@@ -27,8 +27,9 @@ struct Diolaiti {
   double sigma = 0;  ///< f_c/(KΔ); infinite for K = 0 or Δ = 0
   double tau = 0;    ///< delay in periods: d
   DiolaitiRegion region = DiolaitiRegion::kPassive;
-  /// m/s, v_lim = (4/π) f_c/(K (T/2 + dT) − b), or infinite if β ≥ ½ + τ. The velocity amplitude of the limit cycle
-  /// from its describing function, for KT² ≪ m. In simulation the motion decays at 0.94 v_lim and grows at 1.18 v_lim.
+  /// m/s, v_lim = (4/π) f_c/(K (T/2 + dT) − b), or infinite if β ≥ ½ + τ. This is the velocity amplitude of the limit
+  /// cycle according to its describing function, for KT² ≪ m. In simulation, the motion decays at 0.94 v_lim and grows
+  /// at 1.18 v_lim.
   double speed_limit = 0;
 };
 

@@ -39,7 +39,7 @@ double refined_maximum(const SampledSpring& spring, double low, double high) {
 
 double passive_viscous_friction(const SampledSpring& spring) {
   check(spring);
-  // 32 points per half wave of the fastest term locate the maximum, and the section search refines it.
+  // The maximum is located with 32 points per half wave of the fastest term, and refined by a golden-section search.
   const int points = 32 * (spring.delay_samples + 1);
   int best = 0;
   double most = -std::numeric_limits<double>::infinity();

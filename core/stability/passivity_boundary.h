@@ -8,11 +8,11 @@
 
 namespace tendon {
 
-/// Returns the smallest viscous friction b (N·s/m) for which the spring and damper are passive: no motion of the hand,
-/// and no passive hand, can extract energy. This is stronger than stability (stability_boundary.h) and independent of
-/// the mass. The condition of Colgate and Schenkel with delay is:
+/// Returns the smallest viscous friction b (N·s/m) for which the spring and damper are passive, which means that
+/// neither a motion of the hand nor a passive hand can extract energy. This is stronger than stability
+/// (stability_boundary.h) and independent of the mass. The condition of Colgate and Schenkel with delay is:
 ///     b = max over 0 ≤ θ ≤ π of  (KT/2) sin((d+½)θ)/sin(θ/2) − B cos((d+1)θ),      θ = ωT
-/// Without delay this is KT/2 + |B|, and without damper K (T/2 + dT). Uses K, B, T, d. Source: J. Robotic Systems
+/// Without delay this is KT/2 + |B|, and without a damper K (T/2 + dT). Uses K, B, T, d. Source: J. Robotic Systems
 /// 14(1), 1997; with delay: core/PROOFS.md, "Stability boundaries". Thread-safe: yes. Realtime-safe: no.
 double passive_viscous_friction(const SampledSpring& spring);
 
@@ -24,7 +24,7 @@ double passive_viscous_friction(const std::function<std::complex<double>(std::co
                                 Duration period, int points = 10'000);
 
 /// Returns the largest K (N/m) that is passive with the b, B, T and d of `spring`, or 0 if B alone is too large.
-/// Ignores its K. The result is b/(T/2 + dT) without a damper, and never infinite.
+/// Ignores its K. The result is b/(T/2 + dT) without a damper, and always finite.
 double largest_passive_stiffness(const SampledSpring& spring);
 
 /// Returns the smallest b (N·s/m) for which any force field with slopes in [0, `steepest`] (N/m) is passive:
@@ -35,8 +35,8 @@ double largest_passive_stiffness(const SampledSpring& spring);
 double passive_viscous_friction_of_field(double steepest, Duration period, int delay_samples);
 
 /// Returns the stiffness that the hand feels for K (N/m) behind a virtual coupling K_c: K_c K/(K_c + K). The coupling
-/// must satisfy the conditions above, because the device only touches it. Source: Colgate, Stanley and Brown, IROS 1995
-/// (recalled).
+/// must satisfy the conditions above, because it is the only part that the device is in contact with. Source: Colgate,
+/// Stanley and Brown, IROS 1995 (recalled).
 double felt_stiffness(double coupling, double environment);
 
 }  // namespace tendon

@@ -23,7 +23,7 @@ struct SampledSpring {
   double encoder_step = 0;  ///< Δ, m, one count; 0 = exact
 };
 
-/// Limits the size of an eigenvalue problem. The laws are not useful for such delays.
+/// Limits the size of the eigenvalue problem. The laws are of no use for longer delays.
 inline constexpr int kMaxDelaySamples = 200;
 
 /// Returns the mean age of the held force, T/2 + d T, in s. Most boundaries compare friction with stiffness × this age.

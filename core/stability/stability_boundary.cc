@@ -60,7 +60,7 @@ double largest_stable_stiffness(const SampledSpring& spring) {
     tried.stiffness = stiffness;
     return spectral_radius(tried) < 1;
   };
-  // Such a soft spring moves the slowest eigenvalue by about 1e-6 from 1, far more than rounding.
+  // Even such a soft spring moves the slowest eigenvalue by about 1e-6 away from 1, which is far more than rounding.
   double stable = 1e-6 * (spring.viscous + std::abs(spring.damping)) / seconds(spring.period);
   if (stable == 0 || !is_stable(stable)) return 0;
   double unstable = stable;

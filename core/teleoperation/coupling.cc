@@ -37,7 +37,7 @@ std::optional<EnergyTank> tank_of(const CouplingConfig& config, const MappedEnd&
   EnergyTank::Config tank = *config.tank;
   tank.peers = 1;
   tank.joule[0] = frame.joule();
-  // The start value must be the same at both ends. Otherwise it is too small where a joule is worth less.
+  // `start` must have the same value at both ends. Otherwise, it is too small where a joule is worth less.
   tank.start = frame.worth(tank.start);
   tank.epoch = config.spring.epoch;
   return EnergyTank(tank);
@@ -129,7 +129,7 @@ void Coupling::receive(const PortState& peer, LocalTime now) noexcept {
     }
   }
   take_scales(peer);
-  // PositionPosition accepts every state that passed the checks above, so a state is used entirely or not at all.
+  // PositionPosition accepts every state that passed the checks above, so a state is never used only partially.
   std::visit(
       [&](auto& law) {
         spring_.receive({.epoch = peer.epoch,

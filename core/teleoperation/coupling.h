@@ -17,8 +17,8 @@
 
 namespace tendon {
 
-/// Implements one end of a coupling between two devices: engaging, clutch, loss of the peer, position mapping, law, and
-/// energy exchange. There is an object in the haptic loop of each device; the network only transfers PortStates.
+/// Implements one end of a coupling between two devices: engaging, clutch, loss of the peer, position mapping, control
+/// law, and exchange of energy. The haptic loop of each device owns one object. The network only transfers PortStates.
 ///
 /// **In each period**, in this order:
 ///     coupling.receive(state of the peer)            any number of states, possibly late or duplicated
@@ -30,44 +30,44 @@ namespace tendon {
 ///     coupling.conclude(applied, contact)            the end of the period
 ///     send(coupling.message())
 ///
-/// **Displacements.** Each end has an offset p₀ and sends u = p − p₀ in its own axes. If an end is not *live*, its u is
-/// constant and p₀ moves with the handle. The leader is live if it is engaged and the follower has answered the act.
-/// The follower is live if it is engaged, and it then sets its u to the mapped u of the leader, so that the force of
-/// the law is 0. The u of the leader is 0 at the start of each act and continues from its last value after the clutch,
-/// which does not move the other end.
+/// **Displacements.** Each end has an offset p₀ and sends u = p − p₀ in its own axes. While an end is not *live*, its u
+/// is constant and p₀ moves with the handle. The leader is live if it is engaged and the follower has answered this
+/// engagement. The follower is live if it is engaged. It then starts with the mapped u of the leader, so that the
+/// initial force of the law is 0. The u of the leader starts at 0 in each engagement. After the clutch, it continues
+/// from its last value, so the other end does not move.
 ///
 /// **Phases** (the table is in phase_machine.h). The device is ready if it is connected, armed, and has no fault. The
 /// leader engages if its operator calls engage() or presses the button, the leader is ready, and the peer is fresh and
-/// in the phase coupled, engaged, or clutched. The follower engages if it receives an act that is newer than all
-/// previous acts and belongs to the current epoch of the follower. An act ends if the peer has restarted or is no
-/// longer engaged in this act. The leader also ends the act if the peer knows the act and is not engaged, if the peer
-/// is not ready, or without an answer within kAnswerWithin. If it is clutched, the follower stays engaged and holds its
-/// position.
+/// in the phase coupled, engaged, or clutched. This starts a new *act*, an engagement with a number. The follower
+/// engages if it receives an act that is newer than all previous acts and belongs to the current epoch of the follower.
+/// An act ends if the peer has restarted or is no longer engaged in it. The leader also ends the act if the peer knows
+/// the act and is not engaged, if the peer is not ready, or if there is no answer within kAnswerWithin. While the
+/// leader is clutched, the follower stays engaged and holds its position.
 ///
 /// The force increases within `ramp` and decreases within ForceRamp::kFade, so there are no steps. A fault sets the
 /// force to 0 immediately. If there is no position in a period, the gain decreases at the same rate.
 ///
-/// **A new peer** (renew). A client that takes over a channel may have an epoch that is not larger than that of the
-/// previous one. renew() resets the peer, so that each epoch is accepted, and increments the own epoch, so that
-/// previous totals and acts are not used. The act ends and the force decreases to 0.
+/// **A new peer** (renew). If another client takes over a channel, its epoch may not be larger than that of the
+/// previous client. renew() resets the peer, so that any epoch is accepted, and increments this port's own epoch, so
+/// that previous totals and acts are not used. The act ends and the force decreases to 0.
 ///
 /// **Scales that change** (set_scale, MappedEnd). The displacement of the leader is multiplied by the old s_x over the
 /// new s_x, so that its mapped position does not change. The force changes within ForceRamp::kFade. The methods waves
 /// and passivity (keeps_scales) and a coupling of grippers cannot change their scales.
 ///
 /// **Loss of the peer** (LossStages). If the peer is silent, the force decreases. If the peer is gone, the phase is
-/// `lost` and the force is 0. A link with a delay of more than max_delay counts as lost. A robot (`holds_place`) that
-/// is ready and not live holds its last position with a spring of K and B along all axes, and the ramp blends this
-/// spring with the law. After a loss the round trip is measured again, so that the spring of the next act does not
-/// depend on the silence. The pair loses the energy that the network has not delivered.
+/// `lost` and the force is 0. A link whose delay exceeds max_delay is treated as lost. A robot (`holds_place`) that is
+/// ready and not live holds its last position with a spring of K and B along all axes, and the ramp blends this spring
+/// with the law. After a loss, the round trip is measured again, so that the spring of the next act does not depend on
+/// the silence. Energy that the network has not delivered is lost to the pair.
 ///
 /// **Laws.** The folder methods/ contains one law per method. K, D, and B are the values of the leader, and the values
 /// of the follower are smaller by s_f s_x. The norm of all forces is at most max_force.
 ///
 /// **Energy tank.** If Config::tank is set, the port exchanges energy with its peer (EnergyTank). It only gives energy
-/// if it is live and the peer is engaged and not silent. A pair is only passive with an energy tank if the method is
-/// position-position, set-position, or passivity. If there is no energy tank, each end is passive because of its
-/// limiter, and the follower cannot move. This is also true for the other methods except for waves.
+/// if it is live and the peer is engaged and not silent. A pair with an energy tank is only passive if the method is
+/// position-position, set-position, or passivity. Without an energy tank, the limiter makes each end passive by itself,
+/// so the follower cannot move. This is also true for the other methods except for waves.
 ///
 /// **The rest of a handle.** Config::turn couples the orientations (TurnCoupling), and Config::grip the grippers
 /// (GripCoupling), with the same phases and ramp. The force and the torque share one account, which `settle` changes.
@@ -129,10 +129,11 @@ class Coupling {
   /// Returns the changes of the account, 0 without a tank or waves. Must be called between `command` and the limiter.
   EnergyTank::Settlement settle(double payable, double loss, Duration elapsed) noexcept;
 
-  /// The same for the account of the gripper. Both values are 0 if the grippers are not coupled.
+  /// Returns the same for the account of the gripper. Both values are 0 if the grippers are not coupled.
   EnergyTank::Settlement settle_grip(double payable, double loss, Duration elapsed) noexcept;
 
-  /// Ends the period. `applied` (N), `torque` (N·m), and `grip` (N) are by the device, `contact` (N) on the tool.
+  /// Ends the period. `applied` (N), `torque` (N·m), and `grip` (N) were applied by the device, `contact` (N) acts on
+  /// the tool.
   void conclude(const Vec3& applied, const std::optional<Vec3>& contact, const Vec3& torque = Vec3::Zero(),
                 double grip = 0) noexcept;
   /// Returns the state to send in this period. Must be called after `conclude`.
@@ -191,7 +192,7 @@ class Coupling {
 
   PortPhase phase_ = PortPhase::kAlone;
   std::uint64_t sequence_ = 0;    ///< number of periods
-  std::uint64_t engagement_ = 0;  ///< of the newest act that was made (leader) or followed (follower)
+  std::uint64_t engagement_ = 0;  ///< of the newest act that was started (leader) or followed (follower)
   std::uint64_t seen_ = 0;        ///< at the follower, acts up to this one are ignored
   bool answered_ = false;         ///< leader: the follower is engaged in this act
   bool ready_ = false;
@@ -200,7 +201,7 @@ class Coupling {
   LocalTime acted_at_{};
   Clutch clutch_;
   Alignment alignment_;
-  std::uint32_t buttons_ = ~std::uint32_t{0};  ///< initially all, so that a button counts only after it was released
+  std::uint32_t buttons_ = ~std::uint32_t{0};  ///< initially all set: a button must first be released
   LocalTime now_{};
   Duration elapsed_{};
 

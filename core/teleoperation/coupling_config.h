@@ -18,10 +18,10 @@
 
 namespace tendon {
 
-/// An absolute map, in which u is the position p at both ends and p_f = s_x R p_l. There is no clutch. Each act starts
-/// with the alignment of the leader (Alignment), in which the follower does not move. The limiter only allows the
-/// motion of the leader if there is enough energy in the account. Each act adds `energy` to the account, so L ≥ −energy
-/// · acts. If `energy` is 0, the hand must move the handle.
+/// An absolute map, in which u is the position p at both ends and p_f = s_x R p_l. There is no clutch. Each act
+/// (engagement) starts with the alignment of the leader (Alignment), in which the follower does not move. The limiter
+/// only allows the motion of the leader if there is enough energy in the account. Each act adds `energy` to the
+/// account, so L ≥ −energy · acts. If `energy` is 0, the hand has to move the handle.
 struct CouplingAbsolute {
   double within = 0.02;  ///< m, > 0; the leader can engage if the distance is smaller
   double energy = 0;     ///< J, ≥ 0; added to the account of the leader at each act
@@ -31,9 +31,10 @@ struct CouplingConfig {
   PortRole role = PortRole::kLeader;
   CouplingMethod method = CouplingMethod::kPositionPosition;
   PoseMap::Config map{};
-  /// `stiffness`, `damping`, and `own_damping` are those of the leader. The others are for this end.
+  /// `stiffness`, `damping`, and `own_damping` are the values of the leader. The other fields are for this end.
   PositionPosition<3>::Config spring{};
-  /// `start` is in joules of the leader, `max_power` and `max_account` of this end. The constructor sets the others.
+  /// `start` is in joules of the leader, `max_power` and `max_account` in joules of this end. The constructor sets the
+  /// rest.
   std::optional<EnergyTank::Config> tank{};
   /// Used by the follower if the method is `surface`, in the scale of the follower.
   SurfaceEstimator<3>::Config surface{

@@ -9,10 +9,10 @@ namespace tendon {
 ///     gain · law  +  (1 − gain) · spring that holds the position of a robot  +  fade · left
 /// where `left` is the difference to the previous force when the source of the force changes.
 struct CouplingPeriod {
-  bool in_act = false;    ///< engaged or clutched
+  bool in_act = false;    ///< an engagement is in progress, possibly clutched
   bool live = false;      ///< the motion of the handle is sent
   bool driven = false;    ///< the law computes the force
-  bool changed = false;   ///< `driven` has changed, or there is a new act
+  bool changed = false;   ///< `driven` has changed, or an engagement has started
   bool placed = false;    ///< a robot starts to hold its current position
   bool holds = false;     ///< a robot holds a position
   bool fault = false;     ///< the force is 0

@@ -50,7 +50,7 @@ void Coupling::advance(LocalTime now, std::uint32_t buttons, bool ready) noexcep
     if (in_act()) lost_sequence_ = sequence_;
     take(PhaseInput::kGone);
   }
-  // If there was a fault after the loss, the peer may still not know about the loss.
+  // If a fault followed the loss, the peer may not have received the loss yet.
   const bool told = lost_sequence_ == 0 || heard_since(lost_sequence_);
   if (loss_stage_.fresh && told) {
     take(PhaseInput::kHeard);

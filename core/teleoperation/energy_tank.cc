@@ -39,7 +39,7 @@ void EnergyTank::receive(std::size_t peer, const EnergyTankMessage& message) noe
     return;
   }
   if (message.epoch < from.epoch || (message.epoch == from.epoch && message.sequence <= from.sequence)) return;
-  // The own numbering continues, because the peer may have messages that answered its previous epoch.
+  // The own sequence continues, because the peer may have messages that answered its previous epoch.
   if (message.epoch > from.epoch) from = {.epoch = message.epoch, .sent = from.sent};
   const bool ours = message.answers_epoch == config_.epoch;
   // The peer returns G itself, and a copy of a double is exact.
@@ -90,7 +90,7 @@ double EnergyTank::give(double account, double need) noexcept {
     there[j] = peer.account * config_.joule[j] + (peer.given - peer.arrived);
     needs[j] = peer.need * config_.joule[j];
   }
-  // The common ratio of all ports below it. A port above the ratio is excluded.
+  // All ports below the common ratio are raised to it. A port above the ratio is excluded.
   double ratio = 0;
   for (std::size_t round = 0; round < config_.peers; ++round) {
     double accounts = account;
@@ -122,7 +122,7 @@ double EnergyTank::give(double account, double need) noexcept {
   for (std::size_t j = 0; j < config_.peers; ++j) {
     Peer& peer = peers_[j];
     const double total = std::min(peer.given + std::min(share * gifts[j], left), EnergyTankMessage::kMostTotal);
-    // The actual increase of the rounded total, which the peer will count.
+    // Use the increase of the rounded total, because the peer will compute the same value.
     const double grown = total - peer.given;
     if (!(grown > 0) || grown > left) continue;
     peer.given = total;

@@ -11,8 +11,8 @@
 
 namespace tendon {
 
-/// The message from one port to another about its account. Messages may be rare, late, duplicated or reordered. All
-/// energies are in joules of the sender.
+/// The message that one port sends to another about its account. Messages may be rare, late, duplicated or reordered.
+/// All energies are in joules of the sender.
 struct EnergyTankMessage {
   std::uint64_t epoch = 0;          ///< of the sender; 0: no message
   std::uint64_t answers_epoch = 0;  ///< epoch of the receiver for `given` and `taken`; 0: not known
@@ -26,12 +26,12 @@ struct EnergyTankMessage {
   static constexpr double kMostTotal = 1e6;
 };
 
-/// An energy tank (Franken et al.) for one of several coupled ports, which exchange energy. The ports are passive
-/// together, and each of them may generate net energy.
+/// An energy tank (Franken et al.) for one of several coupled ports that exchange energy. The ports are passive
+/// together, although each of them may generate net energy.
 ///
-/// A limiter at each of two coupled devices makes each device passive **by itself**, but a follower that must not do
-/// net work cannot move. Only the sum of all ports must be passive. Therefore each port gives energy from its account
-/// to the others, and its limiter bounds the force by this account instead of its own ledger. Port i has
+/// A limiter at each of two coupled devices makes each device passive **by itself**. But then the follower cannot move,
+/// because it must not do net work. Only the sum of all ports has to be passive. Therefore each port gives energy from
+/// its account to the others, and its limiter bounds the force by this account instead of its own ledger. Port i has
 ///     L_i       its ledger (EnergyLedger), with the applied force
 ///     G_ij      the total given to j;    R_ji the largest received G_ji
 ///     A_i = L_i − Σ_j G_ij + Σ_j R_ji − discarded_i          the account: Limiter::energy
@@ -46,7 +46,7 @@ struct EnergyTankMessage {
 /// retransmission. All holds must be at most T_max long; see OutputBound for longer holds. Several tanks may use one
 /// account one after the other, each with the remaining energy as `payable` (Couplings). This satisfies the condition.
 ///
-/// **Amount.** The ports equalize the ratio of account to need, including the energy in transit:
+/// **Amount.** The ports equalize the ratio of account to need, and count the energy in transit:
 ///     n_i = ℓ_i(F_wanted) + ε          ℓ: SharesAccount::worst_loss;  ε > 0, so that a port at rest can start to move
 ///     Â_j = A_j(received) + G_ij − R_ij(received)
 ///     ΔG_ij = (ρ n_j − Â_j)₊,     ρ = (A_i + Σ Â_j) / (n_i + Σ n_j)    over i and the peers that receive energy
@@ -58,8 +58,8 @@ struct EnergyTankMessage {
 ///
 /// **Changes of the scales.** Energy that was given at one value must not be credited at a higher one, and an account
 /// must not become more valuable for the peer. Therefore, a port that changes `joule` (revalue) discards the energy in
-/// transit until the peer knows the new value, and the follower gives up the part of its account by which (s_f/s_x) A
-/// has increased. No change of the scales increases the sum of the accounts in joules of the leader.
+/// transit until the peer knows the new value. If (s_f/s_x) A has increased, the follower discards this increase. A
+/// change of the scales therefore never increases the sum of the accounts in joules of the leader.
 ///
 /// **Epochs.** A port that restarts loses its totals. Its new tank must have an epoch above all previous ones (a
 /// persistent counter, or the time of day at the start; clocks of two machines are not compared). Totals belong to a

@@ -11,7 +11,8 @@
 
 namespace tendon {
 
-/// The phase of a coupling. There is only a force in `kEngaged`, in the fade after it, and if a robot holds still.
+/// The phase of a coupling. There is only a force in `kEngaged`, while it fades out after that, and if a robot holds
+/// still.
 enum class PortPhase : std::uint8_t {
   kAlone = 1,  ///< no peer
   kCoupled,    ///< receives states; waits for the operator to engage; no force

@@ -13,7 +13,7 @@
 namespace tendon {
 namespace {
 
-using namespace usb::ftdi;  // NOLINT(google-build-using-namespace): the requests below are all its
+using namespace usb::ftdi;  // NOLINT(google-build-using-namespace): all requests below are from it
 using namespace std::chrono_literals;
 using falcon::Counts;
 using falcon::Reply;

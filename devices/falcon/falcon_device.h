@@ -28,9 +28,9 @@ namespace tendon {
 ///     any ──unplugged, a transfer failed, or silent for 100 ms──▶ kAbsent, and starts again
 ///
 /// Every packet contains torques. They are only nonzero in kHomed, while there are plausible replies (at least every 10
-/// ms). A reply is plausible if a hand can move the encoders as fast. After 100 ms without a plausible reply, the
-/// encoders have lost counts and the device must be reset, either by loading the firmware again or, if the driver does
-/// not have the file, by switching it off and on. A watchdog of the device is not documented.
+/// ms). A reply is plausible if a hand can move the encoders at this speed. If there is no plausible reply for 100 ms,
+/// the encoders have lost counts and the device must be reset, either by loading the firmware again or, if the driver
+/// does not have the file, by switching it off and on. The device has no documented watchdog.
 ///
 /// Positions are relative to `falcon::kCentre`: x to the right, y up, z towards the user. Samples use the time of
 /// `read`, but can be up to one period older. The buttons, starting at bit 0, are right, forward, centre and left.
@@ -53,8 +53,9 @@ class FalconDevice final : public Device {
   std::optional<PositionSample> read(LocalTime now) noexcept override;
   Joints joints(const Motion& hand) const noexcept override;
   Vec3 apply(const Vec3& force) noexcept override;
-  /// Output 0, "ring", consists of light-emitting diodes. Red, green and blue are on from half their intensity. The
-  /// color is used while forces may be rendered. Pure red means not ready, so green replaces pure red and off.
+  /// Output 0, "ring", consists of light-emitting diodes. Each of red, green and blue is on if its intensity is at
+  /// least half. The color is used while forces may be rendered. Pure red means not ready, so green replaces pure red
+  /// and off.
   void set_output(LocalTime now, std::uint32_t output, const OutputSetting& setting) noexcept override;
 
  private:

@@ -16,10 +16,10 @@ namespace tendon {
 /// Plays a recorded motion with its original positions and time stamps, so that engines and the whole loop can be run
 /// repeatedly with the same motion. There is no force: `apply` always returns zero.
 ///
-/// The first `read` returns the first sample. Sample i is due tᵢ − t₀ later and uses this time. There is no
-/// interpolation: `read` returns a sample, or nullopt if a new sample is not due. A sample waits for a single `read`. A
-/// loop as fast as the recording therefore returns all samples, even with jitter, and a slower loop returns the newest
-/// sample that was due in the previous `read`. The times always increase.
+/// The first `read` returns the first sample. Sample i is due tᵢ − t₀ later and has this time. There is no
+/// interpolation: `read` returns a sample, or nullopt if no new sample is due. A sample that is due can be returned by
+/// this `read` or the next one. A loop as fast as the recording therefore returns all samples, even with jitter. A
+/// slower loop returns the newest sample that was already due in the previous `read`. The times always increase.
 /// Thread-safe: no. Realtime-safe: `read` and `apply`.
 class ReplayDevice final : public Device {
  public:

@@ -8,9 +8,9 @@
 namespace tendon {
 
 // The parts of the safety layer that reduce a force. Each part returns a factor s, 0 ≤ s ≤ 1, for all components, so it
-// cannot increase, rotate or lengthen a force. The force also stays within the bounds of the energy limiter, both on
-// the norm and on each axis. Torques have a separate limit and growth limit in N·m, and a grip force is used as a
-// vector with one component. `field` is used in error messages.
+// cannot increase or rotate a force. The force also stays within the bounds of the energy limiter, both on the norm and
+// on each axis. Torques have a separate limit and growth limit in N·m, and a grip force is used as a vector with one
+// component. `field` is used in error messages.
 // Thread-safe: no. Realtime-safe: all except the constructors, which throw std::invalid_argument naming the field.
 
 /// Limits the norm of a force: s = max / ‖F‖. Clipping each component would rotate the force, and integer overflow
@@ -31,8 +31,8 @@ class ForceLimit {
 /// Limits how fast a force grows in its own direction:
 ///
 ///     ‖s F‖ ≤ (F_before · F/‖F‖)₊ + rate · T
-///
-/// Forces may decrease at once, and reversed forces start at zero. Limiting every change would extend a force that is
+/// Forces may decrease at once, and reversed forces start at zero. If every change was limited, a force would continue
+/// after it is no longer requested. Source: HD_EXCEEDED_MAX_FORCE_IMPULSE (0x0202) of OpenHaptics.
 /// no longer requested. Source: HD_EXCEEDED_MAX_FORCE_IMPULSE (0x0202) of OpenHaptics.
 class GrowthLimit {
  public:

@@ -82,7 +82,8 @@ class Watchdog {
   Config config_;
 };
 
-/// A button that must be held, as on a teach pendant (ISO 10218-1: enabling device); released with the handle.
+/// A button that must be held, as on a teach pendant (ISO 10218-1: enabling device). Letting go of the handle releases
+/// it.
 class DeadManSwitch {
  public:
   struct Config {

@@ -11,7 +11,7 @@
 
 namespace tendon {
 
-/// Starting with the most reliable.
+/// How a number is known, starting with the most reliable.
 enum class Provenance {
   kMeasured,  ///< measured by us on a real device
   kQuoted,    ///< read in the source, or computed from it

@@ -209,7 +209,7 @@ Effort SimulatedDevice::written(const Effort& effort) const noexcept {
   return most;
 }
 
-/// When a command has reached the motors.
+/// Called when a command has reached the motors.
 void SimulatedDevice::hold(const Effort& effort) noexcept {
   command_ = effort.force;
   if (turns_or_grips_) hold_torque_and_grip(effort);

@@ -69,8 +69,8 @@ namespace tendon {
 ///
 /// If the velocity reaches or crosses zero and friction can hold the device, it stops: v₁ = 0. Sticking is exact,
 /// without a velocity threshold. This rule is stable for any hand. It does not add or remove energy, since m (v₁ −
-/// v₀)·v̄ is exactly the change of the kinetic energy. With numerical damping, all limiters would look better than they
-/// are: using semi-implicit Euler at 50 µs, springs that are 5 % too stiff for the real device are still stable. In a
+/// v₀)·v̄ is exactly the change of the kinetic energy. Numerical damping would make all limiters look better than they
+/// are: with semi-implicit Euler at 50 µs, springs are still stable that are 5 % too stiff for the real device. In a
 /// structural mode, the mean deflection is used for the spring, and both velocities are computed from a linear
 /// equation; its frequency is (2/h) atan(ω h/2), 0.03 % low at 200 Hz.
 ///

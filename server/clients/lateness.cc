@@ -7,8 +7,8 @@
 namespace tendon {
 namespace {
 
-/// Moves an estimate of the median towards each sample by at most 1/16 of its value, so that outliers have little
-/// effect. It converges after about 100 forces.
+/// Moves an estimate of the median towards each sample by at most 1/16 of its value, which limits the effect of
+/// outliers. It converges after about 100 forces.
 void track_median(Duration& median, Duration sample) noexcept {
   const Duration step = std::max<Duration>(median / 16, std::chrono::microseconds(20));
   if (sample > median) median += std::min(step, sample - median);

@@ -12,7 +12,7 @@
 namespace tendon {
 namespace {
 
-/// Removes values that do not fit into a frame: the forces of engines are limited, but not their sum or the sensor.
+/// Removes values that do not fit into a frame. Forces of engines are limited, but not their sum or the sensor.
 void leave_out_what_no_frame_carries(DeviceState& state) {
   for (auto* const vector : {&state.force_wanted, &state.hand_force}) {
     if (*vector && !((*vector)->array().abs() <= limits::kMaxValue).all()) vector->reset();

@@ -12,7 +12,7 @@
 
 namespace tendon {
 
-/// Logs the number of Hellos with an unknown key, and the newest address, at most once per minute. They get no reply.
+/// Logs the number of Hellos with an unknown key, which get no reply, and the newest address, at most once per minute.
 class UnknownKeys {
  public:
   static constexpr Duration kPeriod = std::chrono::minutes(1);

@@ -328,7 +328,7 @@ void declare_law(Table& limiter, Draft& draft) {
   if (used_by({Law::kAolPlus})) declare_parts(limiter, draft);
 }
 
-/// From 100 µs to 4 ms. At 4 ms, the stiffest wall that felt clean was 0.325 N/mm (Choi and Tan, IROS 2004). The
+/// From 100 µs to 4 ms. At 4 ms, the stiffest wall that still felt clean had 0.325 N/mm (Choi and Tan, IROS 2004). The
 /// wake-up latency of an ordinary kernel is about 100 µs.
 constexpr Number kPeriod{.least = 100, .most = 4000};
 constexpr Count kProcessor{1023};  ///< the maximum number in the cpu_set_t of the kernel

@@ -48,7 +48,7 @@ struct Draft {
   std::optional<double> max_torque;  ///< N·m
   std::optional<double> max_grip;    ///< N
   std::optional<double> ledger_step;
-  /// m; of the ledger if a scene has it, or else of the device.
+  /// m; from the ledger if the scene has a value for it, otherwise from the device.
   std::optional<double> encoder_step() const { return ledger_step ? ledger_step : simulated.encoder_step; }
   std::optional<Preset> preset;
   Coupling::Config coupling;

@@ -29,17 +29,19 @@ namespace tendon {
 /// **Law** at each end, in N on the fingers, positive to open them:
 ///     F_l = K (g_f − w) − B v_l        F_f = K (z − g_f) − B v_f        |F| ≤ max_force
 ///     K = min(stiffness, 2 B/T_loop)   with `adapts` (QuietStiffness), K_l = s_f K_f, B_l = s_f B_f
-/// At rest, the leader feels the grasped object, F_l = −s_f F_f. The opening of the peer is extrapolated by v e if its
-/// newest state is late by e. K follows T_loop only in periods with a new state: a spring to a constant position is not
-/// in a loop, so the grip keeps its force while the link is interrupted. K and B are set at the leader.
+/// At rest, the leader feels the grasped object, F_l = −s_f F_f. If the newest state of the peer is late by e, its
+/// opening is extrapolated by v e. K follows T_loop only in periods with a new state. A spring to a constant position
+/// is not in a loop, so the grip keeps its force while the link is interrupted. K and B are set at the leader.
 ///
 /// **Account.** One joule of the follower's gripper is s_f joules of the leader's, since openings are not scaled. The
 /// grippers have a separate tank, with the same messages (PortGrip) and limits, so the theorem of EnergyTank is also
-/// true for the pair of grippers. The motion of the leader's fingers pays for that of the follower's.
+/// true for the pair of grippers. The energy for the motion of the follower's fingers comes from the motion of the
+/// leader's.
 ///
 /// **Robots.** A follower with `holds_place` that is not live holds the opening z_h with the full K_f, where z_h = g_f
-/// + F/K_f is chosen once such that the force does not change. An object is neither dropped nor squeezed more, even
-/// when the leader acts again, because w then starts at this opening. A fault ends the force. The grip of a hand fades.
+/// + F/K_f is chosen once such that the force does not change. An object is neither dropped nor squeezed harder. This
+/// is also true when the leader engages again, because w then starts at this opening. A fault ends the force. The grip
+/// of a hand fades.
 ///
 /// **Bad input.** A state that the tank would refuse is refused entirely (`accepts`). Openings must be finite.
 /// Thread-safe: no. Realtime-safe: yes, except the constructor.

@@ -45,8 +45,8 @@ void SurfaceEstimator<N>::Moments::add(double share, const Vec<N>& y, const Vec<
   both = (1 - share) * (both + share * from_place * from_force.transpose());
 }
 
-// The mean force and the previous normal, weighted with four times the memory, without the components along the
-// directions in which the undeformed surface under the tool spreads.
+// Moves the previous normal towards the mean force with a time constant of four times the memory. Removes the
+// components along the directions in which the points of the undeformed surface under the tool spread.
 template <int N>
 Vec<N> SurfaceEstimator<N>::find_normal() const noexcept {
   const double size = moments_.force.norm();
@@ -72,7 +72,7 @@ Vec<N> SurfaceEstimator<N>::find_normal() const noexcept {
   return left > 0.1 && normal.dot(mean) > kWidest * left ? Vec<N>(normal / left) : mean;
 }
 
-// m, maximum depth of the tool inside of the surface without a measurable force.
+// Returns the maximum depth (m) of the tool in the surface without a measurable force.
 template <int N>
 double SurfaceEstimator<N>::unseen() const noexcept {
   return 2 * config_.contact_force / std::max(model_.stiffness, least_stiffness()) + config_.position_noise;

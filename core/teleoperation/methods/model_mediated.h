@@ -25,17 +25,17 @@ struct SurfaceModel {
 ///     K and d: least squares of n·f = K d − K (n·x) over the contact, with fading weights
 /// f is the force on the tool (N) at the position x (m). There is contact if ‖f‖ ≥ contact_force. Each contact starts
 /// new moments about its first point, so the position of the origin does not matter. On an elastic surface with
-/// friction, x + f/K is a point of the plane n·x = d, moved along it. Principal axes with a spread of at least
-/// `least_spread` are therefore in the surface, and the force along them is friction. Without such a spread (a push
-/// without sliding), the mean force is the normal, tilted by friction; n is limited to the tilt of a friction
+/// friction, x + f/K is a point in the plane n·x = d, displaced along this plane. Principal axes with a spread of at
+/// least `least_spread` are therefore in the surface, and the force along them is friction. Without such a spread (a
+/// push without sliding), the mean force is the normal, tilted by friction; n is limited to the tilt of a friction
 /// coefficient of 0.75. Until the tool has moved enough to determine a slope, K is `first_stiffness`, or the previous K
 /// if the contact starts at the last surface. After that it is limited to first_stiffness/10 … `max_stiffness`. d is
 /// chosen such that the force of the model at the newest sample is n·f.
 ///
-/// Without contact, the last surface is kept as a prediction of the next contact. If the tool is deeper in it than 2
-/// contact_force/K + position_noise without a force, K becomes 0 until the next contact. This removes energy from the
-/// model, so a SurfaceRenderer uses it immediately. (Moving d to the tool is not enough: the hand is ahead of the tool
-/// by a round trip and would only be released gradually.) Samples are ignored if they are not finite.
+/// Without contact, the last surface is kept as a prediction of the next contact. If the tool is more than 2
+/// contact_force/K + position_noise deep in it without a force, K becomes 0 until the next contact. This removes energy
+/// from the model, so a SurfaceRenderer uses it immediately. (Moving d to the tool would not be enough: the hand is
+/// ahead of the tool by a round trip and would only be released gradually.) Samples are ignored if they are not finite.
 ///
 /// Source: the idea of Mitra and Niemeyer, IJRR 27(2), 2008 (recalled, not re-read); the estimator is ours
 /// (core/PROOFS.md, "Surfaces").

@@ -38,25 +38,26 @@ Vec<N> paid_stretch(const Vec<N>& stretch, double stiffness, double energy) noex
 ///     K = min(stiffness, 2B/T_loop)                             with `adapt_to_delay`
 /// x, v are the position and velocity of this end, and y, ẏ those of the other end: the newest received values,
 /// extrapolated to y + ẏ e if they are later than the fastest recent messages by e (e ≤ kMostAhead; beyond that y is
-/// constant and ẏ = 0). If a message is 5 ms later than the previous one, y would otherwise be wrong by 1 mm at 0.2
-/// m/s, which causes 0.4 N of noise at 400 N/m. The law is isotropic.
+/// constant and ẏ = 0). Without the extrapolation, a message that is 5 ms later than the previous one would cause an
+/// error of 1 mm in y at 0.2 m/s, which is a noise of 0.4 N at 400 N/m. The law is isotropic.
 ///
-/// **Dependence of K on the delay** (core/PROOFS.md, "Coupling springs"). A delayed spring generates energy. It is
-/// dissipated by a damper of K·T_loop/2 at each end. The coupling is quiet for K ≤ 2B/T_loop, where B is the reliable
-/// damping at one end. The pair is also passive above this because of the limiters and the tank, but there are
-/// oscillations of 0.04 … 0.08 m/s in free motion for delays above 50 ms.
+/// **Dependence of K on the delay** (core/PROOFS.md, "Coupling springs"). A delayed spring generates energy. A damper
+/// of K·T_loop/2 at each end dissipates it. The coupling is quiet for K ≤ 2B/T_loop, where B is the reliable damping at
+/// one end. With a larger K, the pair is still passive because of the limiters and the tank, but it oscillates with
+/// 0.04 … 0.08 m/s in free motion for delays above 50 ms.
 ///
 /// **T_loop** is measured without a common clock, by counting the periods since the sequence that a message answers.
-/// This includes delay, loss and waiting of the other end. Both ends use the maximum of the two measurements, because
+/// This includes delay, loss and waiting at the other end. Both ends use the larger of the two measurements, because
 /// the forces would differ if the ends used different values of K. T_loop increases immediately. It is the maximum over
 /// the last one to two intervals of `recovery`, so that a held force does not change. K has the time constant
 /// kSettling, because the ends do not measure a longer delay at the same time. Without messages T_loop increases and K
-/// decreases; the caller must detect this loss. A change of K under stretch costs ½ ΔK δ², which the accounts pay.
+/// decreases; the caller must detect this loss. If K changes while the spring is stretched by δ, the accounts pay ½ ΔK
+/// δ².
 ///
 /// **Felt damping** in free motion, for a sine with the peak speed v̂ and the friction b_f, f_c of the follower:
 ///     b_felt = K·T_loop + B_l + B_f + b_f + 4 f_c/(π v̂)
 /// The stiffness that a hand can feel is at most K_op of the two limiters, 1/K_op = T_l/(2 b_l) + T_f/(2 b_f). Both
-/// ends must use the same K, D and B up to the scales: K_l = s_f s_x K_f, and likewise for D and B. This law is not
+/// ends must use the same K, D and B up to the scales: K_l = s_f s_x K_f, and the same for D and B. This law is not
 /// passive. There must be a limiter and an EnergyTank at both ends.
 ///
 /// Messages that are not finite or out of bounds are dropped and counted in `refused`. A higher epoch of the other end

@@ -8,11 +8,11 @@ namespace tendon {
 /// The method `waves` uses a WavePort at both ends. The impedance is B at the leader and B/(s_f s_x) at the follower. K
 /// and D are only used for the position of a robot.
 ///
-/// The account of the limiter pays for the energy that the line sends, and receives the energy of the peer. The pair is
-/// therefore passive even if a limiter reduces the force. The line uses the force that remains after the limiter and
-/// the motors, and sends the difference later (WavePort::SharedAccount). The ramp does not count as such a difference,
-/// so the two positions do not drift. If the leader is clutched, its end of the line does not move, and the follower
-/// stays at its position. Waves are only sent by an engaged end, but are always received.
+/// The energy that the line sends is taken from the account of the limiter, and the energy of the peer is added to it.
+/// The pair is therefore passive even if a limiter reduces the force. The line uses the force that remains after the
+/// limiter and the motors, and sends the difference later (WavePort::SharedAccount). The ramp does not count as such a
+/// difference, so the two positions do not drift. If the leader is clutched, its end of the line does not move, and the
+/// follower stays at its position. Waves are only sent by an engaged end, but are always received.
 class WaveLaw : public CouplingLaw {
  public:
   /// The delay of the line without the network and the playout: W and a period.

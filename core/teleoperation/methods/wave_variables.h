@@ -55,9 +55,9 @@ struct WaveMessage {
 /// but A can become negative if the motion in a period is not v. Nothing is then sent until A is positive. (In all
 /// cases the limiter at the device bounds the leader's port.)
 ///
-/// **Felt dynamics.** A spring K = B/d with the inertia B d, and a damper B for fast motion. d is the minimum delay
-/// from `observe` to the `command` that uses it, plus the playout D, averaged over both directions, plus W. A hand k_h
-/// that pushes by Δx on an object k_w feels
+/// **Felt dynamics.** The hand feels a spring K = B/d with the inertia B d, and a damper B in fast motion. d is the
+/// minimum delay from `observe` to the `command` that uses it, plus the playout D, averaged over both directions, plus
+/// W. A hand k_h that pushes by Δx on an object k_w feels
 ///     F = Δx / (1/k_h + d/B + 1/k_w)
 /// Messages and intervals that are not finite are ignored, as are messages whose time is not between those of their
 /// neighbors. If `velocity` is not finite, the demand is not finite, and the limiter sets the force to 0.
