@@ -6,7 +6,7 @@
 
 namespace tendon {
 
-/// Stored in recordings and tables. Defined in a separate file, the only one that a new commit recompiles.
+/// Stored in recordings and tables. Defined in a separate file, so that a new commit only recompiles this file.
 extern const std::string_view kVersion;  ///< project() version in CMakeLists.txt, e.g. 0.1.0
 extern const std::string_view kCommit;   ///< 12 hex digits, or "unknown" if built without git
 

@@ -21,9 +21,8 @@ namespace tendon {
 ///                        and one factor γ for force and torque, so the wrench keeps its direction
 ///     HandlePort<1>      a gripper: N and m at its fingers
 /// Δθ is the rotation vector between two samples, in base frame axes. If the axis of the handle turns during the
-/// interval, the true energy can be lower than the booked one by up to (‖τ‖T/b_r)²/48 of the viscous friction of the
-/// interval. A friction bound that is 2 % below the truth covers this while ‖τ‖ ≤ b_r/T (core/PROOFS.md, "Several
-/// coordinates").
+/// interval, the ledger can overestimate the energy by up to (‖τ‖T/b_r)²/48 of the viscous friction of the interval. A
+/// friction bound that is 2 % below the truth covers this while ‖τ‖ ≤ b_r/T (core/PROOFS.md, "Several coordinates").
 /// Satisfies StabilityController and SharesAccount. Thread-safe: no. Realtime-safe: yes, except the constructor.
 template <int Blocks, int Size = 1>
 class HandlePort {

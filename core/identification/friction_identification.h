@@ -63,8 +63,8 @@ struct Identification {
 /// Kelly's fit is valid at a place if there are two ramps in each direction, the slowest and one that is at least 1.5
 /// times as fast. Both must slide for 4 m/b after break-away and give f_c > 0, and their b must agree within 10 %. (On
 /// 0.25 m of travel the difference is 1.5 % at b = 0.26 N·s/m, and 19 % or more where the fit is wrong.) The two
-/// methods agree if their b differ by at most 10 %. Friction that depends on the direction looks like a constant force,
-/// and its mean is published as f_c. Only a stop of a free handle in both directions could distinguish them.
+/// methods agree if their b differ by at most 10 %. Friction that depends on the direction cannot be distinguished from
+/// a constant force without another experiment, and its mean is published as f_c.
 struct IdentificationConfig {
   std::optional<double> mass;  ///< kg, of the handle and the mechanism, or empty if it is fitted
   double encoder_step = 0;     ///< m, one count

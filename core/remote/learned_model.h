@@ -88,8 +88,8 @@ class LearnedModel {
   std::uint64_t next_ = 0;  ///< the number of the next step
 
   Mat3 stiffness_ = Mat3::Zero();
-  double came_ = 0;       ///< N, of the trust
-  double predicted_ = 0;  ///< D
+  double came_ = 0;       ///< N of the trust θ
+  double predicted_ = 0;  ///< D of the trust θ
   double trust_ = 0;
   int lessons_ = 0;  ///< 0, 1, or 2 for more
   std::optional<Answered> teacher_;

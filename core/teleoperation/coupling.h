@@ -106,8 +106,9 @@ class Coupling {
 
   void renew() noexcept;  ///< must be called if the peer has been replaced or has restarted
 
-  /// Sets the scales of the leader, 0.01 … 100. Returns false and does nothing while the coupling is engaged or
-  /// aligning, for a method or grippers that cannot change their scales, at a follower, and if a scale is out of range.
+  /// Sets the scales of the leader, 0.01 … 100. Returns false and does nothing if this end is the follower, if the
+  /// coupling is engaged or aligning, if the method or a gripper requires constant scales, or if a scale is out of
+  /// range.
   bool set_scale(double position_scale, double force_scale) noexcept;
   /// Sets the share α of a follower with Config::share for the next `command`. `others` is the gain of the ramp of
   /// another leader. A robot only holds its position with the remaining part.

@@ -19,7 +19,7 @@ struct CouplingPeriod {
   double gain = 0;        ///< 0 … 1, of the ramp
   double fade = 0;        ///< 0 … 1
   Duration round_trip{};  ///< 0: not known
-  double ahead = 0;       ///< s, delay of the newest state beyond the fastest ones (≤ 20 ms)
+  double ahead = 0;       ///< s, additional delay of the newest state, compared with the fastest ones (≤ 20 ms)
 };
 
 }  // namespace tendon

@@ -82,7 +82,7 @@ class FalconDevice final : public Device {
 
   falcon::ReplyParser parser_;
   std::optional<falcon::Reply> newest_{};
-  bool fresh_ = false;         ///< located in this `read`
+  bool fresh_ = false;         ///< number of consecutive replies that are homed, or −number of those that are not
   int homed_replies_ = 0;      ///< consecutive replies, < 0 if not homed
   bool moved_origin_ = false;  ///< encoders have lost counts
   std::optional<falcon::Pose> pose_{};

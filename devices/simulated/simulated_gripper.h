@@ -17,8 +17,8 @@ namespace tendon {
 /// rigid and inelastic: v = 0 there, until a force opens or closes the gripper again.
 ///
 /// **Integration** as in SimulatedDevice, using the implicit midpoint rule with set-valued friction. Substeps end at
-/// the stops. This does not generate energy, because all other forces decrease with v: with d = x₁ − x₀ and the mean
-/// velocity v̄ without the stop, |v̄| ≥ |d|/h, the stop absorbs m v₀²/2 + F·d ≥ m (v₀ − 2 d/h)²/2.
+/// the stops. This does not generate energy. Let d = x₁ − x₀, and let v̄ be the mean velocity without the stop. All
+/// other forces decrease with v and |v̄| ≥ |d|/h, so the stop absorbs m v₀²/2 + F·d ≥ m (v₀ − 2 d/h)²/2.
 /// Thread-safe: no. Realtime-safe: all except the constructor.
 class SimulatedGripper {
  public:

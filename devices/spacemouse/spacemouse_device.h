@@ -31,7 +31,7 @@ namespace tendon {
 /// Thread-safe: `counts` and `state` only. Realtime-safe: `read`, `apply`, `counts`.
 class SpaceMouseDevice final : public Device {
  public:
-  /// From spacenavd: from the SpaceMouse Plus XT to Bluetooth models connected by a cable.
+  /// The list of spacenavd, from the SpaceMouse Plus XT to Bluetooth models that are connected by a cable.
   static constexpr std::array kIds = std::to_array<usb::Id>(
       {{0x046D, 0xC603}, {0x046D, 0xC605}, {0x046D, 0xC606}, {0x046D, 0xC621}, {0x046D, 0xC623}, {0x046D, 0xC625},
        {0x046D, 0xC626}, {0x046D, 0xC627}, {0x046D, 0xC628}, {0x046D, 0xC629}, {0x046D, 0xC62B}, {0x046D, 0xC640},

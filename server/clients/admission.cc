@@ -133,7 +133,7 @@ std::optional<Refusal> Admission::reason_to_refuse(const Address& from, const Cl
   }
   std::size_t channels = 0;
   for (const ServedDevice& device : devices) channels += device.channels.size();
-  // A controller that waits for a lease receives as many states as an observer.
+  // A controller that waits for a lease receives states at the same rate as an observer.
   const std::size_t all = count([](const ServedClient&) { return true; });
   if (all >= config_.max_observers + channels) {
     return Refusal{Code::kBusy, "there are " + std::to_string(all) + " clients already"};

@@ -99,7 +99,7 @@ class Reference {
   std::string& text_;
   std::string path_;
   std::string indent_ = "  ";
-  /// For a kind: the output for its tables, which are printed last.
+  /// The output for the tables of each kind, which are printed last.
   std::string* tables_ = nullptr;
   std::string of_kind_;
 };
