@@ -52,7 +52,8 @@ void HapticController::book_unseen(const Vec3& applied, const HandleSample* hand
   if (admittance_) admittance_->observe_unseen();
 }
 
-// The functions of every step are inlined. A device that only has a position pays one branch for the other parts.
+// The functions that are used in every step are inlined. If a device only has a position, the cost of the other parts
+// is one branch.
 [[gnu::always_inline]] inline void HapticController::book_seen(const Motion& hand, const Vec3& applied,
                                                                const HandleSample* handle, Step& step) noexcept {
   const Vec3 dx = hand.position - last_->position;
@@ -91,7 +92,7 @@ void HapticController::add_accounts(Step& step) const noexcept {
   } else if (last_) {
     book_seen(hand, applied, handle, step);
   } else if (started_) {
-    // The previous position is unknown, and the device may hold a force despite a command of zero.
+    // The previous position is unknown, and the device may still apply a force if the command was zero.
     book_unseen(applied, handle, step.held);
   }
   add_accounts(step);
@@ -240,7 +241,7 @@ void HapticController::take(Step& step, const Motion& hand, const Vec3& applied,
     limit_wrench(wanted.loop_age, applied, step);
   } else {
     limit_force(wanted, applied, step);
-    // The device has no motor for rotation. There is no torque demand for a device without an orientation.
+    // This device has no motor for rotation. If a device has no orientation, there is no demand for a torque.
     if (step.turn() && !step.turn()->wanted.isZero(0)) step.reasons |= Reason::kMaxForce;
   }
   if (grip_) limit_grip(step);
@@ -277,7 +278,7 @@ void HapticController::take(Step& step, const Motion& hand, const Vec3& applied,
   }
 }
 
-/// As limit_force, for force and torque together. The laws of a wrench do not use stiffness.
+/// Similar to limit_force, but for both force and torque. The stiffness is not used by the laws of a wrench.
 void HapticController::limit_wrench(Duration age, const Vec3& applied, Step& step) noexcept {
   const RotationLimits& rotation = *config_.rotation;
   TurnStep& turn = *step.turn();

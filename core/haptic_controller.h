@@ -21,7 +21,7 @@ namespace tendon {
 
 struct TurnStep {
   Turning hand;
-  Vec3 was_applied = Vec3::Zero();  ///< N·m, applied in the last interval
+  Vec3 was_applied = Vec3::Zero();  ///< N·m, applied during the last interval
   Vec3 wanted = Vec3::Zero();       ///< N·m, demand of the remote environment
   Vec3 torque = Vec3::Zero();       ///< N·m, the torque to apply
   Vec3 applied = Vec3::Zero();      ///< N·m, applied by the device
@@ -30,7 +30,7 @@ struct TurnStep {
 /// The gripper has a separate account.
 struct GripStep {
   Grip hand;
-  double was_applied = 0;  ///< N, applied in the last interval
+  double was_applied = 0;  ///< N, applied during the last interval
   double wanted = 0;       ///< N, demand of the remote environment
   double force = 0;        ///< N, to be applied now
   double applied = 0;      ///< N, applied by the device
@@ -39,8 +39,8 @@ struct GripStep {
 };
 
 struct HandleStep {
-  std::optional<TurnStep> turn{};  ///< empty: the device does not measure its orientation
-  std::optional<GripStep> grip{};  ///< empty: it has no gripper
+  std::optional<TurnStep> turn{};  ///< empty if the device does not measure its orientation
+  std::optional<GripStep> grip{};  ///< empty if it has no gripper
   std::optional<Joints> joints{};  ///< empty if not measured; not used by the laws
 };
 
@@ -48,17 +48,17 @@ struct HandleStep {
 struct PositionStep {
   Motion hand;                       ///< measured motion; hand.at is the time of the step
   Duration held{};                   ///< T_act, the length of the last interval, or 0 in the first step
-  Vec3 was_applied = Vec3::Zero();   ///< N, applied in the last interval
-  std::optional<Vec3> hand_force{};  ///< N, the measured force of the hand on the handle; empty without a sensor
+  Vec3 was_applied = Vec3::Zero();   ///< N, applied during the last interval
+  std::optional<Vec3> hand_force{};  ///< N, measured force of the hand on the handle; empty if there is no sensor
   Vec3 wanted = Vec3::Zero();        ///< N, demand of the remote environment (HeldForce)
   Mat3 stiffness = Mat3::Zero();     ///< N/m, −∂wanted/∂x from the remote environment; zero if unknown
   double permitted = 0;  ///< N, bound of the limiter on ‖force‖ (per axis: on the largest component); ∞ when off
   Vec3 force = Vec3::Zero();  ///< N, to be applied now
-  double energy = 0;          ///< J, the account of the limiter after the interval (per axis: the minimum)
+  double energy = 0;          ///< J, account of the limiter after the interval (the minimum if there are several)
   Duration longest_hold{};    ///< T: `force` can be applied for this time
   Reasons reasons;            ///< why `force` is not `wanted`
   Mode mode = Mode::kIdle;
-  std::uint8_t force_way = 0;           ///< solver path of the engine for the remote force in use; 0: unknown
+  std::uint8_t force_way = 0;           ///< solver path of the engine for the remote force in use, or 0 if unknown
   std::uint32_t channel = 0;            ///< channel of `mode`, `force_sequence` and the ages
   std::uint64_t force_sequence = 0;     ///< the remote force in use; 0 = none
   Duration force_age{};                 ///< since it arrived
@@ -93,16 +93,17 @@ struct Step : PositionStep {
 /// are added to those of the remote environment.
 ///
 /// The limiter is the last step, so the force cannot exceed its bound, but it can fall faster than the slew limit
-/// allows. It is guaranteed that E ≥ −1 nJ in every step, if each force is applied for at most the `longest_hold` of
-/// its step. Otherwise E can fall below zero by at most (T_act − T)(‖F‖ − f_c)₊²/(4b), and forces are limited to f_c
-/// until E has recovered. See core/PROOFS.md, "Output bound" and "Late holds".
+/// allows. If each force is applied for at most the `longest_hold` of its step, it is guaranteed that E ≥ −1 nJ in all
+/// steps. Otherwise E can fall below zero by at most (T_act − T)(‖F‖ − f_c)₊²/(4b), and forces are limited to f_c until
+/// E has recovered. See core/PROOFS.md, "Output bound" and "Late holds".
 ///
-/// Overruns: an interval longer than the longest_hold of the scene is booked with its measured length and flagged, and
-/// the limiter adapts (HoldBound). If it is longer than the watchdog of the device, or if a position is missing, the
-/// worst motion is booked. (If longest_hold is the watchdog time, there is no condition, but K_op → 2b / T_max.)
+/// Overruns: if an interval is longer than the longest_hold of the scene, its measured length is used, the step is
+/// flagged, and the limiter adapts (HoldBound). If it is longer than the watchdog of the device, or if a position is
+/// missing, the worst motion is booked. (If longest_hold is the watchdog time, there is no condition, but K_op → 2b /
+/// T_max.)
 ///
 /// A fault is latched: the force is zero (through the slew limit while positions are measured) until `rearm`. `disarm`
-/// is for the operator. The force is then zero without a ramp until `rearm`. It does not clear a fault.
+/// is for the operator. This sets the force to zero without a ramp until `rearm` is called. It does not clear a fault.
 /// Thread-safe: no. Realtime-safe: yes.
 class HapticController {
  public:
@@ -110,20 +111,22 @@ class HapticController {
     kNone,
     kPositionNotFinite,  ///< the device measured NaN or infinity
     kDeviceSilent,       ///< max_missed readings in a row failed
-    kPositionJumped,     ///< a position was too far from the last one for max_speed
+    kPositionJumped,     ///< the distance to the last position was too large for max_speed
   };
 
   struct Config {
     LimiterConfig limiter;
-    /// Friction by place, for a limiter with adaptive_friction. limiter.friction applies until the first step.
+    /// Friction that depends on the position, for a limiter with adaptive_friction. Until the first step,
+    /// limiter.friction is used.
     std::optional<FrictionMap::Config> friction_map{};
     /// For a device with motors that rotate the handle. Cannot be combined with admittance.
     std::optional<RotationLimits> rotation{};
     std::optional<GripLimits> grip{};  ///< for a device with a motorized gripper
     /// For a device with a force sensor. Without it the device is of impedance type.
     std::optional<AdmittanceLoop<3>::Config> admittance{};
-    /// Couples the handle to that of a peer. The limiter has a shared_account if the coupling has an energy tank. A
-    /// coupled orientation must be measured in every step; a torque requires `rotation`, and a coupled gripper `grip`.
+    /// Couples the handle to that of a peer. The limiter has a shared_account if the coupling has an energy tank. If
+    /// the orientation is coupled, it must be measured in every step. Torques require `rotation`, and a coupled gripper
+    /// requires `grip`.
     std::optional<Coupling::Config> coupling{};
     /// For a follower with several leaders: one `coupling` per leader (Couplings). Empty: one leader.
     std::vector<CoupledLeader> leaders{};
@@ -135,9 +138,9 @@ class HapticController {
     HeldForce::Config hold;
     /// One rule per channel of remote forces. Each channel has its own HeldForce.
     std::vector<ChannelRule> channels = {ChannelRule::kSum};
-    std::uint32_t max_missed = 20;  ///< the number of failed readings before a fault: 20 ms at 1 kHz, as in libfranka
-    /// m/s; > 0. A faster motion is due to an encoder that has wrapped or lost counts. This is a fault and is not
-    /// booked, because 0.2 m in a millisecond would earn 32 J at 0.8 N·s/m. Empty: no check.
+    std::uint32_t max_missed = 20;  ///< number of failed readings that cause a fault; 20 ms at 1 kHz, as in libfranka
+    /// m/s; > 0. If the motion is faster, an encoder has wrapped or lost counts. This is a fault and is not booked,
+    /// because 0.2 m in a millisecond would earn 32 J at 0.8 N·s/m. Empty: no check.
     std::optional<double> max_speed{};
   };
 
@@ -153,8 +156,8 @@ class HapticController {
   }
 
   /// Performs one haptic step. `applied` is the force that the device has really held since the previous step.
-  /// `hand_force` (N, of the hand on the handle) is the reading of its force sensor; with `admittance` a step without
-  /// it gives zero force. `handle` must contain the orientation for `rotation`, and the opening for `grip`.
+  /// `hand_force` (N, of the hand on the handle) is the reading of its force sensor. If this is empty and `admittance`
+  /// is set, the force is zero. `handle` must contain the orientation for `rotation`, and the opening for `grip`.
   Step step(const Motion& hand, const Vec3& applied, const std::optional<Vec3>& hand_force = {},
             const HandleSample* handle = nullptr) noexcept {
     Step fresh;

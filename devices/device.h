@@ -22,7 +22,7 @@ struct DeviceInfo {
   double angular_resolution = 0;  ///< rad, encoder count; 0 = exact
   struct Gripper {
     double open = 0;       ///< rad, fully open
-    double arm = 0;        ///< m/rad, travel between the fingers
+    double arm = 0;        ///< m/rad, travel between the fingers per angle
     double max_force = 0;  ///< N, on the fingers; 0 = no motor
     bool operator==(const Gripper&) const = default;
   };
@@ -47,8 +47,8 @@ struct PositionSample {
 
 /// A device that measures the position of a handle and renders a force. Devices of admittance type also measure the
 /// force of the hand. In SI units; counts and USB transfers are internal to drivers.
-/// Thread-safe: no; used by the haptic thread. Realtime-safe: `read` and `apply` must not allocate, lock or log, and
-/// must not block longer than a transfer of the device.
+/// Thread-safe: no. It must only be used by the haptic thread. Realtime-safe: `read` and `apply` must not allocate,
+/// lock or log, and must not block longer than a transfer of the device.
 class Device {
  public:
   /// Positions are only valid in `kHomed`.
@@ -67,7 +67,8 @@ class Device {
   /// May be called from any thread. Always kHomed if the device does not need opening or homing.
   virtual State state() const noexcept { return State::kHomed; }
 
-  /// The operator requests forces, also after a fault. SafeDevice grants this later; others are ready when homed.
+  /// Called if the operator requests forces, also after a fault. SafeDevice grants this later; others are ready when
+  /// homed.
   virtual void arm() noexcept {}
   /// Prevents forces until `arm`. Only for safety layers (SafeDevice); without one, use HapticController::disarm.
   virtual void disarm() noexcept {}
@@ -82,14 +83,15 @@ class Device {
   virtual Joints joints(const Motion& /*hand*/) const noexcept { return {}; }
 
   /// Commands `force` (N, on the hand) and returns the force that was actually written after clamping and rounding,
-  /// which is counted by the energy ledger. The device keeps it until the next `apply` or until its watchdog expires.
+  /// which is counted by the energy ledger. The device applies this force until the next `apply` is called or its
+  /// watchdog expires.
   virtual Vec3 apply(const Vec3& force) noexcept = 0;
 
   /// Called instead of `apply` if `info` has a torque or a gripper with a motor. Returns what was actually written.
   virtual Effort apply_all(const Effort& effort) noexcept { return {.force = apply(effort.force)}; }
 
-  /// Sets a lamp or starts a vibration pulse. An unknown output, or a setting of the wrong kind, has no effect. Outputs
-  /// do not move the handle, so the energy ledger does not contain them.
+  /// Sets a lamp or starts a vibration pulse. This does nothing if the output is unknown or if the setting is of the
+  /// wrong kind. Outputs do not move the handle, so the energy ledger does not contain them.
   virtual void set_output(LocalTime now, std::uint32_t output, const OutputSetting& setting) noexcept;
 };
 

@@ -18,8 +18,8 @@ namespace tendon {
 /// Describes one kind of device. Used by scenes, `tendond devices`, the server and the udev rules. Each kind has its
 /// own configuration X, and these overloads are selected by std::visit:
 ///
-///     const Driver& driver(const X&)                        this row
-///     SimulatedDevice::Config stand_in(const X&)            simulates it where the cost of a step is measured
+///     const Driver& driver(const X&)                        the description of this kind
+///     SimulatedDevice::Config stand_in(const X&)            a simulation, used to measure the cost of a step
 ///     std::unique_ptr<Device> make(const X&, FromOutside)   the device itself
 struct Driver {
   std::string_view kind;                    ///< [device] kind in a scene

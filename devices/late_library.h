@@ -5,14 +5,14 @@
 
 namespace tendon {
 
-/// Loads a shared library and never unloads it. This saves the memory of libraries that most scenes do not need.
+/// Loads a shared library, which is never unloaded. This saves the memory of libraries that most scenes do not need.
 ///
 ///     struct Libusb {
 ///       LateLibrary file{"libusb-1.0.so.0"};
 ///       decltype(&::libusb_init) init = file["libusb_init"];
 ///     };
 ///
-/// Preloaded libraries take precedence, as for linked libraries. Thread-safe: yes. Realtime-safe: no.
+/// Preloaded libraries are used instead, as for linked libraries. Thread-safe: yes. Realtime-safe: no.
 class LateLibrary {
  public:
   /// Converts to any function pointer without checking the type. Use the types in the header of the library.

@@ -111,8 +111,8 @@ struct Mailboxes {
   SolverPaths ways;
   SpscRing<DatagramRecord> datagrams;
   std::atomic<std::uint64_t> datagrams_lost{0};            ///< because the queue was full
-  std::atomic<std::uint64_t> unauthenticated_left_out{0};  ///< of unauthenticated senders, beyond the sample
-  std::atomic<std::uint64_t> datagrams_over_budget{0};     ///< beyond the bytes per second
+  std::atomic<std::uint64_t> unauthenticated_left_out{0};  ///< from unauthenticated senders, not included in the sample
+  std::atomic<std::uint64_t> datagrams_over_budget{0};     ///< not recorded because of the limit in bytes per second
 };
 
 }  // namespace tendon

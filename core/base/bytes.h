@@ -15,7 +15,7 @@ namespace tendon {
 template <std::unsigned_integral T>
 constexpr void put_little_endian(T value, std::byte* to) noexcept {
   if (!std::is_constant_evaluated() && std::endian::native == std::endian::little) {
-    std::memcpy(to, &value, sizeof value);  // a single store, which compilers do not generate from the loop
+    std::memcpy(to, &value, sizeof value);  // this is a single store, which is not generated for the loop
     return;
   }
   for (std::size_t i = 0; i < sizeof(T); ++i) to[i] = static_cast<std::byte>(value >> (8 * i) & 0xFFU);

@@ -11,10 +11,10 @@
 
 namespace tendon {
 
-/// Coordinate frames of devices, and of programs that draw or compute with their positions.
+/// The coordinate frames that are used by devices and by programs that use their positions.
 ///
-/// The **operator frame** is that of the person at the handle, and of OpenXR and WebXR: x to the right, y up, z towards
-/// the user; right-handed; metres. Positions on the wire are in the device base frame:
+/// The **operator frame** is used for the person at the handle, as in OpenXR and WebXR. It is right-handed, in metres,
+/// with x to the right, y up and z towards the user. Positions on the wire are in the device base frame:
 ///     p_operator = R p_device        the same R for velocities, forces and torques
 
 /// Returns R for the axes of a device, such as "right=-y up=z user=-x": the axes of the device base frame that point to
@@ -25,7 +25,7 @@ Mat3 operator_from_device(std::string_view axes);
 /// Returns R in this form, or an empty string if R does not map axes to axes.
 std::string axes_in_words(const Mat3& rotation);
 
-/// `rotation` must be orthonormal with determinant 1. `q` can have any length but 0.
+/// `rotation` must be orthonormal with determinant 1. The length of `q` can be any value except 0.
 Quat quaternion_of(const Mat3& rotation);
 Mat3 matrix_of(const Quat& q);
 
@@ -33,7 +33,7 @@ Mat3 matrix_of(const Quat& q);
 ///     position, velocity:  v = per_metre M v_operator       v_operator = Mᵀ v / per_metre
 ///     force:               f = M f_operator                 f_operator = Mᵀ f
 ///     orientation:         R = M R_operator Mᵀ              R_operator = Mᵀ R M
-/// M is orthonormal. The equations also hold for a left-handed frame, which has the determinant −1. Never convert an
+/// M is orthonormal. The equations can also be used for a left-handed frame, whose determinant is −1. Never convert an
 /// orientation by changing signs of a quaternion. A torque is axial: τ = det(M) M τ_operator.
 struct Frame {
   std::string_view name;    ///< lower case, for options, such as "ros"

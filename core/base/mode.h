@@ -10,9 +10,9 @@ enum class Mode : std::uint8_t {
   kIdle = 1,      ///< no force has arrived yet
   kActive = 2,    ///< a fresh force is rendered
   kHolding = 3,   ///< the force has expired and is still held
-  kDecaying = 4,  ///< the force fades out after it was held
-  kSafeStop = 5,  ///< the force is zero until a fresh one is ramped in
-  kFault = 6,     ///< the force is zero until an explicit re-arm
+  kDecaying = 4,  ///< the expired force is fading out
+  kSafeStop = 5,  ///< the force is zero until a new force is ramped in
+  kFault = 6,     ///< no force until the device is explicitly rearmed
 };
 
 }  // namespace tendon

@@ -39,7 +39,7 @@ struct Grip {
 
 struct Joints {
   static constexpr std::size_t kMost = 8;
-  std::size_t count = 0;                 ///< at most kMost; all other elements are 0
+  std::size_t count = 0;                 ///< at most kMost; the remaining elements are 0
   std::array<double, kMost> angle{};     ///< rad
   std::array<double, kMost> velocity{};  ///< rad/s, an estimate
 

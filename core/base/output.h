@@ -25,7 +25,7 @@ struct OutputDescription {
 };
 
 struct LampColour {
-  std::uint32_t rgb = 0;  ///< 0xRRGGBB; 0: off, or the color that the device selects
+  std::uint32_t rgb = 0;  ///< 0xRRGGBB, or 0 if the device controls the lamp
 
   bool operator==(const LampColour&) const = default;
 };

@@ -27,7 +27,7 @@ constexpr double polynomial(double x, const std::array<double, N>& coefficients)
   return sum;
 }
 
-/// 1/first! · −1/(first + 2)! …: Taylor's series of sine (from 3) and cosine (from 4) in x².
+/// 1/first! · −1/(first + 2)! …: the Taylor series of sine (if first is 3) and cosine (if it is 4) in x².
 template <std::size_t N>
 constexpr std::array<double, N> alternating(int first, double sign) {
   std::array<double, N> series{};
@@ -41,7 +41,7 @@ constexpr std::array<double, N> alternating(int first, double sign) {
   }
   return series;
 }
-constexpr auto kSine = alternating<8>(3, -1);   // to x¹⁷: the remainder is below 1e-19
+constexpr auto kSine = alternating<8>(3, -1);   // up to x¹⁷, with a remainder below 1e-19
 constexpr auto kCosine = alternating<8>(4, 1);  // to x¹⁸
 
 /// x = k ln 2 + rest, where |rest| is at most slightly above ½ ln 2.

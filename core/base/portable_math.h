@@ -12,7 +12,7 @@
 /// in a fixed order. Compile with -ffp-contract=off (as in CMakeLists.txt), because a fused multiply-add rounds only
 /// once.
 ///
-/// Unless noted otherwise, the error is at most 1e-16 or 2e-16 of the result, whichever is larger. NaN gives NaN.
+/// Unless noted otherwise, the error is less than the maximum of 1e-16 and 2e-16 of the result. NaN gives NaN.
 /// Realtime-safe: yes.
 namespace tendon::portable {
 
@@ -22,10 +22,10 @@ std::int64_t round(double x) noexcept;
 /// Natural logarithm. x must be positive, normal and finite.
 double log(double x) noexcept;
 
-/// eˣ. The relative error is below 1e-15 for x in −700 … 700. Returns 0 below −700 and ∞ above 709.
+/// eˣ. If x is in −700 … 700, the relative error is less than 1e-15. Returns 0 below −700 and ∞ above 709.
 double exp(double x) noexcept;
 
-/// eˣ − 1, with full precision near zero.
+/// Returns eˣ − 1 without losing precision near zero.
 double expm1(double x) noexcept;
 
 /// Returns exactly ±1 for |x| ≥ 20, including ±∞.

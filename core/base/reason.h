@@ -6,7 +6,8 @@
 
 namespace tendon {
 
-/// Why a force is different from the demand. The values are part of the wire format and recordings: never renumber.
+/// The reasons for a difference between the force and the demand. The values are part of the wire format and
+/// recordings: never renumber.
 enum class Reason : std::uint32_t {
   kNone = 0,
   kEnergy = 1U << 0,         ///< output limiter: a larger force could break passivity
@@ -15,16 +16,16 @@ enum class Reason : std::uint32_t {
   kRampIn = 1U << 3,         ///< ramp after (re-)engaging
   kHeld = 1U << 4,           ///< the remote force has expired and is still held
   kDecaying = 1U << 5,       ///< the remote force is fading out
-  kSafeStop = 1U << 6,       ///< the remote force is zero until a fresh one arrives
+  kSafeStop = 1U << 6,       ///< no remote force until a new one arrives
   kNotFinite = 1U << 7,      ///< NaN or infinity in the demand or a measurement
   kFault = 1U << 8,          ///< the force is zero until the fault is cleared
   kDeviceClamp = 1U << 9,    ///< the device applied less than the commanded force
-  kOverrun = 1U << 10,       ///< not a limit: the last interval was longer than the longest_hold of the scene
-  kWatchdog = 1U << 11,      ///< not a limit: the last interval was longer than the watchdog of the device
+  kOverrun = 1U << 10,       ///< the last interval was longer than longest_hold (this does not limit the force)
+  kWatchdog = 1U << 11,      ///< the last interval was longer than the watchdog (this does not limit the force)
   kUnseen = 1U << 12,        ///< no position was measured, so the force is zero
-  kDisarmed = 1U << 13,      ///< the operator has disarmed the device
+  kDisarmed = 1U << 13,      ///< the device was disarmed by the operator
   kDamped = 1U << 14,        ///< damper of the output limiter: the hand vibrates in contact
-  kAcceleration = 1U << 15,  ///< not a limit: the hand exceeded bounded_acceleration, so the plain bound applies
+  kAcceleration = 1U << 15,  ///< the hand exceeded bounded_acceleration, so this step uses the plain bound
 };
 
 class Reasons {

@@ -47,7 +47,7 @@ Vec3 rotation_vector(const Quat& q) noexcept {
   const double sign = q.w < 0 ? -1.0 : 1.0;
   const Vec3 v = sign * axis_part(q);
   const double sine = v.norm();
-  // a/sin(a/2), with the same threshold.
+  // a/sin(a/2). This uses the same threshold.
   const double share = sine > 1e-8 ? 2 * portable::atan2(sine, sign * q.w) / sine : 2.0;
   return v * share;
 }

@@ -25,15 +25,15 @@ Quat rotation_by(const Vec3& vector) noexcept;
 /// Returns the rotation vector of q, of length π at most: rotation_by(rotation_vector(q)) is q.
 Vec3 rotation_vector(const Quat& q) noexcept;
 
-/// Returns the rotation vector θ from `from` to `to` in base frame axes: to = rotation_by(θ) · from. If the handle
-/// turns about one axis, a constant torque does the work τ·θ, and the ledger books −τ·θ.
+/// Returns the rotation vector θ from `from` to `to` in base frame axes: to = rotation_by(θ) · from. If the handle is
+/// rotated about one axis, the work of a constant torque is τ·θ, and −τ·θ is booked in the ledger.
 Vec3 turn_between(const Quat& from, const Quat& to) noexcept;
 
 /// Returns R v.
 Vec3 rotated(const Quat& q, const Vec3& v) noexcept;
 
-/// Returns whether the rotation from `rest` to `q` is at most 150°. A spring must not be used beyond this, because its
-/// torque decreases and has no direction at 180°.
+/// Returns whether the rotation from `rest` to `q` is at most 150°. A spring must not be used for larger angles,
+/// because its torque decreases and is undefined at 180°.
 bool is_within_reach(const Quat& rest, const Quat& q) noexcept;
 
 /// The torque of a spring of stiffness K (N·m/rad, symmetric, base frame) from `rest` to `q`. With (w, v) = q · rest⁻¹:

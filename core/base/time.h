@@ -32,7 +32,7 @@ using PeerTime = PeerClock::time_point;
 
 constexpr double seconds(Duration d) noexcept { return std::chrono::duration<double>(d).count(); }
 
-/// Rounds down to whole nanoseconds. `s` must be finite and within ±292 years.
+/// Rounds down to whole nanoseconds. `s` must be finite, and its magnitude must not exceed 292 years.
 constexpr Duration from_seconds(double s) noexcept {
   return std::chrono::floor<Duration>(std::chrono::duration<double, std::nano>(s * 1e9));
 }

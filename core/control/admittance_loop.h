@@ -5,7 +5,8 @@
 
 namespace tendon {
 
-/// Admittance control: makes a heavy device with a force sensor feel like a tool of another mass.
+/// Implements admittance control, which makes a heavy device with a force sensor feel like a tool with a different
+/// mass.
 ///     M dv_d/dt = F_hand + F_env − D v_d − S x_d,   dx_d/dt = v_d        (the tool; v_d(0) = x_d(0) = 0)
 ///     F_wanted  = K_p (v_d − v) + K_i Σ (v_d T − Δx)                      (PI loop on the velocity)
 /// F_hand is the measured force of the hand on the handle, F_env the force of the remote environment on the tool, and
@@ -27,7 +28,7 @@ namespace tendon {
 /// T)₊² would not be passive (admittance_loop_test.cc contains a counterexample).
 ///
 /// If a measurement is not finite, the tool and the integral are reset to rest, the demand is not finite, and the law
-/// returns zero force with the reason. An interval is ignored if it is not finite or not positive.
+/// returns zero force with this reason. An interval is ignored if it is not finite or not positive.
 ///
 /// Source: Lee & Lee, IEEE TCST 17(4), 2009, section II-A; core/PROOFS.md, "Admittance loop".
 /// Thread-safe: no. Realtime-safe: yes, except the constructor.
@@ -37,27 +38,27 @@ class AdmittanceLoop {
   struct Config {
     Vec<N> mass;                        ///< M, kg (kg·m² for angles); > 0
     Vec<N> damping = Vec<N>::Zero();    ///< D, N·s/m; ≥ 0
-    Vec<N> stiffness = Vec<N>::Zero();  ///< S, N/m, towards the start position of the tool; ≥ 0
+    Vec<N> stiffness = Vec<N>::Zero();  ///< S, N/m, ≥ 0; pulls the tool to its start position
     Vec<N> proportional;                ///< K_p, N·s/m; ≥ 0
     Vec<N> integral = Vec<N>::Zero();   ///< K_i, N/m; ≥ 0
   };
 
   struct Measured {
-    Vec<N> hand_force;   ///< N, of the hand on the handle
-    Vec<N> environment;  ///< N, of the remote environment on the tool
+    Vec<N> hand_force;   ///< N, applied by the hand to the handle
+    Vec<N> environment;  ///< N, applied by the remote environment to the tool
     Vec<N> velocity;     ///< m/s, of the handle
   };
 
   /// Throws std::invalid_argument with the field, its value and the expected range.
   explicit AdmittanceLoop(const Config& config);
 
-  /// Updates the integral with the last interval. Not called in the first step.
+  /// Updates the integral with the last interval. Must not be called in the first step.
   void observe(const Interval<N>& interval) noexcept;
 
   /// Replaces `observe` if the motion was not measured. Tool and integral do not advance.
   void observe_unseen() noexcept;
 
-  /// Returns the force that makes the handle follow the tool, for the stability controller.
+  /// Returns the force that is used to make the handle follow the tool. It must be passed to the stability controller.
   Demand<N> command(const Measured& measured) noexcept;
 
   const Vec<N>& tool_velocity() const noexcept { return velocity_; }  ///< v_d, m/s
@@ -70,7 +71,7 @@ class AdmittanceLoop {
   Vec<N> step_ = Vec<N>::Zero();          ///< N, last step of the integral, which the next `observe` adds
   Vec<N> commanded_ = Vec<N>::Zero();     ///< N
   Vec<N> dx_ = Vec<N>::Zero();            ///< m, of the interval that `command` uses
-  double held_ = 0;                       ///< s, its length; 0: none
+  double held_ = 0;                       ///< s, length of this interval, if any
 };
 
 }  // namespace tendon

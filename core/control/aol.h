@@ -10,9 +10,9 @@
 
 namespace tendon {
 
-/// The Adjusting Output-Limiter with one ledger. It keeps the direction of the force. The N = Blocks · Size coordinates
-/// form `Blocks` groups of `Size` coordinates each. The friction of a group is isotropic and has the lower bounds f_c,i
-/// and b_i. All groups share one account:
+/// The Adjusting Output-Limiter with one ledger. It does not change the direction of the force. The N = Blocks · Size
+/// coordinates form `Blocks` groups of `Size` coordinates each. The friction of a group is isotropic and has the lower
+/// bounds f_c,i and b_i. All groups share one account:
 ///     E(n) = Σₖ [ −F(k−1)·Δx(k) + Σ_i ( f_c,i ‖Δx_i‖ + b_i ‖Δx_i‖²/T(k) ) ]
 ///     F    = γ F_wanted,  γ ≤ 1 the largest with  Σ_i T_max (γ‖F_wanted,i‖ − f_c,i)₊²/(4 b_i) ≤ max(E, 0)
 ///
@@ -22,7 +22,7 @@ namespace tendon {
 ///                   torques, not Cartesian forces, are held between two steps
 ///     Aol<2, 3>     a wrench: force and torque, each with its own friction
 ///
-/// If each force is held for at most T_max, the port is passive for every demand.
+/// The port is passive for every demand if each force is held for at most T_max.
 /// Source: Lee & Lee, IEEE TCST 17(4), 2009, eqs (1)–(9), Table I; core/PROOFS.md, "Output bound" and "Several
 /// coordinates".
 /// Thread-safe: no. Realtime-safe: yes, except the constructor.
@@ -49,7 +49,7 @@ class Aol {
   double payable() const noexcept { return energy(); }
   double worst_loss(const Vec<kSize>& force) const noexcept;
 
-  /// Takes effect with the next `limit`. T_max must be positive.
+  /// Sets T_max, which must be positive. This is used by the next call of `limit`.
   void hold_at_most(Duration longest_hold) noexcept;
 
  private:
@@ -80,7 +80,7 @@ class PerAxisAol {
   LimitedForce<N> limit(const Demand<N>& wanted) noexcept;
   double energy() const noexcept;  ///< the smallest of the accounts, J
 
-  /// Takes effect with the next `limit`. T_max must be positive.
+  /// Sets T_max, which must be positive. This is used by the next call of `limit`.
   void hold_at_most(Duration longest_hold) noexcept;
 
  private:

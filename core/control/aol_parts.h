@@ -14,7 +14,7 @@ using PointAolPlus = AolPlus<1, 3>;
 
 template <class Config>
 struct AolPart {
-  std::string_view name;                               ///< of its table in a scene, under [limiter]
+  std::string_view name;                               ///< the name of its table under [limiter] in a scene
   std::string_view what;                               ///< its purpose in one line
   std::optional<Config> PointAolPlus::Parts::*config;  ///< member with its configuration
 };

@@ -72,10 +72,10 @@ struct LimiterConfig {
   std::optional<HoldBound::Follow> follow_holds = HoldBound::Follow{};
   AolPlus<1, 3>::Parts parts{};                   ///< of kAolPlus
   double max_force = 0;                           ///< N, of kClamp
-  std::optional<double> environment_stiffness{};  ///< N/m, for demands without a stiffness
-  Duration environment_delay{};                   ///< t_d of kPassiveSynthesis, the delay of the environment
-  /// N·s/m, the largest damping of the passivity controllers and kReferenceEnergy. It must be far below 2m/T, because a
-  /// digital damper becomes unstable there. For 75 g and 1 kHz, 20 is an eighth of this limit.
+  std::optional<double> environment_stiffness{};  ///< N/m, used if a demand has no stiffness
+  Duration environment_delay{};                   ///< the delay t_d of the environment, for kPassiveSynthesis
+  /// N·s/m, the largest damping of the passivity controllers and kReferenceEnergy. It must be much smaller than 2m/T,
+  /// because a digital damper becomes unstable at this value. For 75 g and 1 kHz, 20 is an eighth of this limit.
   double max_damping = 20;
   /// Other ports can credit the account and draw on it (EnergyTank). Refused for laws that cannot share.
   bool shared_account = false;
@@ -83,12 +83,12 @@ struct LimiterConfig {
 
 namespace catalogue {
 
-inline constexpr double kMostMobility = 1;  ///< m/(N·s): 1 N yields by at most 1 mm per period at 1 kHz
+inline constexpr double kMostMobility = 1;  ///< m/(N·s), which allows 1 mm per period for a force of 1 N at 1 kHz
 
 template <class Make>
 struct LawRow {
   LawInfo info;
-  Make make;  ///< LimiterConfig -> the law; throws what its constructor throws
+  Make make;  ///< creates the law from a LimiterConfig; throws the same exceptions as its constructor
 };
 template <class Make>
 LawRow(LawInfo, Make) -> LawRow<Make>;

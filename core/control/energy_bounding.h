@@ -15,9 +15,9 @@ namespace tendon {
 /// with c₂ ≤ c₁ ≤ b/T in N/m. If c₂ > c₁, the conditions can contradict each other. The law displays at most about c₁,
 /// with c₂ ≤ c₁ ≤ b/T in N/m. If c₂ > c₁, the conditions can contradict each other. The law can display a stiffness of
 /// at most about c₁, which is half of what force bounding and the AOL can display with the same friction.
-/// The port is passive because E(n) ≥ ‖f(n)‖²/(2c₂), even if the device reduces the force. The proof requires that no
-/// hold is longer than `longest_hold`. After an interval that is not finite or was not measured, the law restarts from
-/// zero force.
+/// The port is passive because E(n) ≥ ‖f(n)‖²/(2c₂), even if the device reduces the force. The proof assumes that holds
+/// are not longer than `longest_hold`. If an interval is not finite or was not measured, the law is restarted with zero
+/// force.
 ///
 /// Source: Kim & Ryu, IROS 2004; Int. J. Robotics Research 29(6), 2010 (recalled; the exact published form of (ii) is
 /// unchecked). Proof: core/PROOFS.md, "Comparison laws". The vector form is ours: the intersection of a ball and a
@@ -31,8 +31,8 @@ class EnergyBounding {
   struct Config {
     Friction friction;           ///< f_c is only for the ledger; b > 0
     Duration longest_hold{};     ///< T, > 0
-    std::optional<double> c1{};  ///< N/m, in (0, b/T]; empty: b/T
-    std::optional<double> c2{};  ///< N/m, in (0, c1]; empty: c1
+    std::optional<double> c1{};  ///< N/m, in (0, b/T], or b/T if empty
+    std::optional<double> c2{};  ///< N/m, in (0, c1], or c1 if empty
   };
 
   /// Throws std::invalid_argument if a field is out of range.

@@ -32,7 +32,7 @@ class ForceBounding {
   LimitedForce<N> limit(const Demand<N>& demand) noexcept;
   double energy() const noexcept { return port_.energy(); }
 
-  /// Takes effect with the next `limit`. T_max must be positive.
+  /// Sets T_max, which must be positive. This is used by the next call of `limit`.
   void hold_at_most(Duration longest_hold) noexcept { viscous_per_hold_ = viscous_ / seconds(longest_hold); }
 
  private:
@@ -45,10 +45,11 @@ class ForceBounding {
 
 /// The more conservative force-bounding algorithm, which bounds a force by the previous force and the last motion only.
 ///     ‖F(n)‖ ≤ ‖F(n−1) − 2b Δx/T‖
-/// F is in N on the hand, F(n−1) is the applied force, and T the longest hold time. A wall feels like a spring of 2b/T.
-/// An unused bound is not saved, so a force only grows while the hand moves into the wall, and shrinks by 2b/T times
-/// the distance of the hand from its deepest point. The port is passive for every demand, because E(n) ≥ T ‖F(n)‖²/(4b)
-/// in every step. If a force was held longer than T, the viscous term is divided by the measured time.
+/// F is in N on the hand, F(n−1) is the applied force, and T the longest hold time. Walls feel like a spring with a
+/// stiffness of 2b/T. An unused bound is not saved, so a force only grows while the hand moves into the wall, and
+/// shrinks by 2b/T times the distance of the hand from its deepest point. The port is passive for every demand, because
+/// E(n) ≥ T ‖F(n)‖²/(4b) in every step. If a force was held longer than T, the viscous term is divided by the measured
+/// time.
 ///
 /// Source: Kim, Baek, Ryu, 2015, "more conservative" form with ξ = 1 (recalled; form as in published code);
 /// core/PROOFS.md, "Comparison laws".

@@ -14,17 +14,18 @@ struct Limited {
   Reasons reasons;
 };
 
-/// Bounds the norm of a force and keeps its direction: ‖F‖ ≤ max (N). Thread-safe, realtime-safe.
+/// Limits the norm of a force without changing its direction: ‖F‖ ≤ max (N). Thread-safe, realtime-safe.
 inline Limited saturate(const Vec3& wanted, double max) noexcept {
   const double size = wanted.norm();
   if (size <= max) return {wanted, {}};
   return {wanted * (max / size), Reason::kMaxForce};
 }
 
-/// Bounds the rate of change of a force, ‖F − F_before‖ ≤ rate · elapsed, and keeps the direction of the change. `rate`
-/// is in N/s and can be infinite. If `elapsed` is not positive, the force stays `before`. Thread-safe, realtime-safe.
+/// Limits the rate of change of a force, ‖F − F_before‖ ≤ rate · elapsed, without changing the direction of the change.
+/// `rate` is in N/s and can be infinite. If `elapsed` is not positive, the force stays `before`. Thread-safe,
+/// realtime-safe.
 inline Limited limit_slew(const Vec3& wanted, const Vec3& before, double rate, Duration elapsed) noexcept {
-  if (std::isinf(rate)) return {wanted, {}};  // ∞ · 0 s would not be a number
+  if (std::isinf(rate)) return {wanted, {}};  // the product ∞ · 0 s would be NaN
   const Vec3 change = wanted - before;
   const double size = change.norm();
   const double allowed = rate * std::max(0.0, seconds(elapsed));

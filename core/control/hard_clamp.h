@@ -6,7 +6,7 @@
 
 namespace tendon {
 
-/// Bounds the norm of a force and keeps its direction.
+/// Limits the norm of a force without changing its direction.
 ///     F(n) = F_wanted(n) · min(1, F_max / ‖F_wanted(n)‖)
 ///
 /// This is **not** passive: an unstable system has a limit cycle with the amplitude F_max.

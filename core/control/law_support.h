@@ -32,7 +32,7 @@ std::array<T, Count> each(const Make& make) {
   (std::make_index_sequence<Count>());
 }
 
-/// Whether the values and their squares are finite.
+/// Returns true if all values and their squares are finite.
 template <int N>
 bool finite(const Interval<N>& interval) noexcept {
   return std::isfinite(interval.applied.squaredNorm()) && std::isfinite(interval.dx.squaredNorm());
@@ -54,7 +54,7 @@ Vec<N> shortened(const Vec<N>& v, double length) noexcept {
   return size <= length ? v : Vec<N>(v * (length / size));
 }
 
-/// Limits the norm of the wanted force to `bound`. If the force was larger, `reason` is set.
+/// Reduces the wanted force if its norm is larger than `bound`. If the force was larger, `reason` is set.
 template <int N>
 LimitedForce<N> bounded(const Vec<N>& wanted, double bound, Reason reason) noexcept {
   if (wanted.stableNorm() <= bound) return {wanted, bound, {}};

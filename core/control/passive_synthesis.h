@@ -12,11 +12,11 @@ namespace tendon {
 /// delay generate.
 ///     F = γ F_wanted,    γ = min(1, b / (K_max (T/2 + t_d)))
 /// K_max (N/m) is the steepest slope of the field: the larger of `stiffness` and the spectral norm of the stiffest
-/// demand so far. Therefore, γ never increases. The force is zero while the slope is unknown. Soft parts of the field
+/// demand so far. Therefore, γ never increases. If the slope is unknown, the force is zero. Soft parts of the field
 /// become softer as well.
 ///
 /// The port is passive for a static field with a convex potential and slopes up to K_max, if it is sampled in every
-/// period, delivered t_d late (a multiple of the period), and applied unchanged. The field must not change with time.
+/// period, delivered t_d late (a multiple of the period), and applied unchanged. The field must be constant over time.
 ///
 /// Source: Mahvash & Hayward, IEEE Trans. Robotics 21(1), 2005 (recalled); proof: core/PROOFS.md, "Comparison laws".
 /// Learning K_max from the demands is ours; it only affects later forces.
@@ -27,8 +27,8 @@ class PassiveSynthesis {
   struct Config {
     Friction friction;                  ///< f_c is only for the ledger; b > 0
     Duration longest_hold{};            ///< T, > 0
-    Duration delay{};                   ///< t_d, ≥ 0: the delay of the environment
-    std::optional<double> stiffness{};  ///< N/m, > 0: lower limit of K_max; empty: learned from the demands
+    Duration delay{};                   ///< t_d, the delay of the environment, ≥ 0
+    std::optional<double> stiffness{};  ///< N/m, > 0, lower limit of K_max; if empty, this is learned from the demands
   };
 
   /// Throws std::invalid_argument if a field is out of range.
@@ -43,7 +43,7 @@ class PassiveSynthesis {
 
  private:
   double affordable_;  ///< N/m, b/(T/2 + t_d)
-  double steepest_;    ///< N/m, K_max; 0: unknown
+  double steepest_;    ///< N/m, K_max, or 0 if it is unknown
   EnergyLedger port_;
 };
 

@@ -42,7 +42,7 @@ class PassivityController {
   struct Config {
     Friction friction;  ///< only for the ledger
     PassivityObserver observer = PassivityObserver::kZohExact;
-    double max_damping = 0;   ///< N·s/m, > 0; infinite: no limit, as published
+    double max_damping = 0;   ///< N·s/m, > 0; can be infinite, as published
     double min_speed = 1e-4;  ///< m/s, ≥ 0: α is 0 for slower motion
   };
 
@@ -60,7 +60,7 @@ class PassivityController {
   Config config_;
   EnergyLedger port_;
   double observed_ = 0;
-  double dissipated_ = 0;  ///< J, by the damper in the previous interval (kSameSample)
+  double dissipated_ = 0;  ///< J, dissipated by the damper in the previous interval (only for kSameSample)
   Interval<N> last_{Vec<N>::Zero(), Vec<N>::Zero(), Duration::zero()};
 };
 
@@ -68,11 +68,11 @@ class PassivityController {
 /// when the observer finds that the environment generates energy.
 ///     1/α(n) = −E(n) / (T ‖f(n)‖²)  when E(n) < 0, within [0, max_mobility]
 ///     v₁ = v₂ + f/α           hand v₁, environment v₂ (m/s), f = −F (N)
-/// The environment is then at x − δ with δ = Σ T f/α. The force there follows from the stiffness of the demand: F =
-/// F_wanted + K δ. The controller has no effect if the demand has no stiffness. Hand and environment drift apart by δ,
-/// which is a known weakness. δ is reset when both the force and the stiffness of the demand are zero. The linear model
-/// can pull the hand although the true environment would release it. The port is not guaranteed to be passive. See
-/// PassivityController, also for the observers and sources.
+/// The environment is then at x − δ with δ = Σ T f/α. The force at this position is computed with the stiffness of the
+/// demand: F = F_wanted + K δ. The controller has no effect if the demand has no stiffness. Hand and environment drift
+/// apart by δ, which is a known weakness. δ is reset when both the force and the stiffness of the demand are zero. The
+/// linear model can pull the hand, even if the true environment would release it. The port is not guaranteed to be
+/// passive. See PassivityController, also for the observers and sources.
 /// Thread-safe: no. Realtime-safe: yes, except the constructor.
 template <int N>
 class ParallelPassivityController {
@@ -80,7 +80,7 @@ class ParallelPassivityController {
   struct Config {
     Friction friction;  ///< only for the ledger
     PassivityObserver observer = PassivityObserver::kZohExact;
-    double max_mobility = 0;  ///< 1/α, m/(N·s), > 0; infinite: no limit, as published
+    double max_mobility = 0;  ///< 1/α, m/(N·s), > 0; can be infinite, as published
     double min_force = 1e-3;  ///< N, ≥ 0: 1/α is 0 for smaller forces
   };
 
@@ -99,7 +99,7 @@ class ParallelPassivityController {
   Config config_;
   EnergyLedger port_;
   double observed_ = 0;
-  double dissipated_ = 0;            ///< J, in the previous interval (kSameSample)
+  double dissipated_ = 0;            ///< J, dissipated in the previous interval (only for kSameSample)
   Vec<N> slipped_ = Vec<N>::Zero();  ///< m, T f/α of the previous interval
   Vec<N> offset_ = Vec<N>::Zero();   ///< m
   Interval<N> last_{Vec<N>::Zero(), Vec<N>::Zero(), Duration::zero()};

@@ -29,7 +29,7 @@ class PortHamiltonian {
  public:
   struct Config {
     Friction friction;     ///< only for the ledger
-    double stiffness = 0;  ///< N/m, > 0: for demands without a stiffness
+    double stiffness = 0;  ///< N/m, > 0, used if a demand has no stiffness
   };
 
   /// Throws std::invalid_argument if a field is out of range.

@@ -12,9 +12,10 @@ namespace tendon {
 ///     E_ref(n) = ½ F_wanted(n)ᵀ K⁻¹ F_wanted(n)        energy of a spring K at that force (J)
 ///     α(n)     = (E_ref − E − f_e·Δx)/(T ‖v‖²)  when E + f_e·Δx < E_ref, within [0, max_damping]
 ///     F(n)     = F_wanted(n) − α(n) v(n)               v = Δx/T, m/s
-/// K is the symmetric part of the stiffness of the demand, or `stiffness` if the demand has none. There is no energy in
-/// directions without stiffness. The law is quiet on stiff walls if the environment is this spring and its force is
-/// fresh in every period. Otherwise it can brake unnecessarily or too late. The port is not guaranteed to be passive.
+/// K is the symmetric part of the stiffness of the demand, or `stiffness` if the demand has none. If there is no
+/// stiffness in a direction, its energy is zero. The law is quiet on stiff walls if the environment is this spring and
+/// its force is fresh in every period. Otherwise it can brake unnecessarily or too late. The port is not guaranteed to
+/// be passive.
 ///
 /// Source: Ryu, Preusche, Hannaford, Hirzinger, IEEE TCST 13(5), 2005 (recalled). The trigger uses the predicted
 /// energy, like PassivityObserver::kZohExact. core/PROOFS.md, "Comparison laws".
@@ -24,8 +25,8 @@ class ReferenceEnergyController {
  public:
   struct Config {
     Friction friction;        ///< only for the ledger
-    double stiffness = 0;     ///< N/m, > 0: for demands without a stiffness
-    double max_damping = 0;   ///< N·s/m, > 0; far below 2m/T
+    double stiffness = 0;     ///< N/m, > 0, used if a demand has no stiffness
+    double max_damping = 0;   ///< N·s/m, > 0, and much smaller than 2m/T
     double min_speed = 1e-4;  ///< m/s, ≥ 0: α is 0 for slower motion
   };
 

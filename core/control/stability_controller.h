@@ -11,13 +11,14 @@ namespace tendon {
 ///
 /// In each haptic period, first call `observe` with the last interval (not in the first period), and then `limit`,
 /// which returns the force to apply until the next period. If the motion in the last interval was not measured, call
-/// `observe_unseen` instead. This assumes that the force `applied` was held for at most `at_most` and then vanished.
+/// `observe_unseen` instead. This assumes that the force `applied` was held for at most `at_most`, and was then set to
+/// zero.
 ///
 /// N is 1, 3 (forces in N, displacements in m) or 6 (joint torques in N·m and angles in rad, or a wrench and a twist).
 ///
 /// `energy` is the account of the port in J: the ledger E of Lee & Lee 2009, eq. (5), or a lower bound of it. Laws that
-/// do not use it keep it as well, so that all laws can be compared. A demand that is not finite yields zero force with
-/// Reason::kNotFinite. A non-finite interval is not booked.
+/// do not use it keep it as well, so that all laws can be compared. If a demand is not finite, the force is zero and
+/// Reason::kNotFinite is set. A non-finite interval is not booked.
 /// Thread-safe: no. Realtime-safe: yes.
 template <class Law, int N>
 concept StabilityController = requires(Law law, const Interval<N>& interval, const Vec<N>& applied, Duration at_most,
@@ -51,7 +52,7 @@ concept SharesAccount = requires(Law law, const Law& same, const Vec<N>& force, 
   noexcept->std::same_as<double>;
 };
 
-/// A law with a bound that depends on the hold time. `hold_at_most` takes effect with the next `limit` (HoldBound).
+/// A law that uses the hold time in its bound. `hold_at_most` takes effect with the next `limit` (HoldBound).
 template <class Law>
 concept FollowsHolds = requires(Law law, Duration longest_hold) {
   { law.hold_at_most(longest_hold) }

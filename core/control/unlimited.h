@@ -6,7 +6,7 @@
 
 namespace tendon {
 
-/// Returns every finite force unchanged, and keeps the ledger. Use it only with simulated devices.
+/// Returns all finite forces unchanged, and updates the ledger. Use it only with simulated devices.
 template <int N>
 class Unlimited {
  public:

@@ -9,14 +9,14 @@ namespace tendon {
 /// A virtual coupling: a spring and a damper between the hand and a massless tool that touches the environment.
 ///     f(n) = K_c s(n) + B_c (s(n) − s(n−1))/T,     s = x − x_tool                   (f = −F, N;  s in m)
 ///     f(n) = f_e(n) − K s(n)                       the tool is in equilibrium: backward Euler, implicit
-/// f_e and K are the demand, linear about the hand (symmetric part of K; negative eigenvalues count as 0). In a spring
-/// K the hand feels K_c K/(K_c + K). If the demand has no stiffness, it is a constant force on the tool, which is
-/// returned unchanged without a guarantee.
+/// f_e and K are the demand, linear about the hand (symmetric part of K; negative eigenvalues count as 0). If the
+/// environment is a spring K, the hand feels K_c K/(K_c + K). If the demand has no stiffness, it is a constant force on
+/// the tool, which is returned unchanged without a guarantee.
 ///
 /// The port is passive if the returned force is applied, if the environment is static, convex, fresh in every period,
 /// and equally stiff at the tool and at the hand (a linear environment, or one wall at a time), and if
 ///     b ≥ K_c T/2 + B_c            (T: the longest hold time)
-/// This is the rule of Colgate (see colgate_coupling). The constructor does not check it.
+/// This is the rule of Colgate (see colgate_coupling). This is not checked by the constructor.
 ///
 /// Source: Colgate, Stanley, Brown, IROS 1995 (recalled). Proof for vectors and convex environments: core/PROOFS.md,
 /// "Comparison laws".
@@ -63,9 +63,10 @@ double colgate_coupling(double viscous, Duration longest_hold, double damping);
 ///     2 Re Z_d · Re(1/Z_c) / |ZOH| + cos(arg ZOH) ≥ 1   on the unit circle,   Z_c = B_c + K_c T z/(z − 1)
 /// With the Tustin model of the device Re Z_d = b for any mass. With ZOH = (1 + z⁻¹)/2, c = cos(ωT/2), κ = K_c T/2:
 ///     2b (B_c + κ) ≥ c (1 − c)(B_c + κ)² + κ² c³/(1 + c)   for 0 ≤ c ≤ 1
-/// For design only. It is about four times as large as colgate_coupling, because it assumes a discrete device and a
-/// hand that is passive in discrete time. Real devices can be unstable below it. Throws as colgate_coupling, and if B_c
-/// < 0. Source: Adams & Hannaford, IEEE Trans. Robotics & Automation 15(3), 1999 (recalled; algebra ours).
+/// For design only. The result is about four times larger than that of colgate_coupling, because this assumes a
+/// discrete device and a hand that is passive in discrete time. Real devices can be unstable below it. Throws as
+/// colgate_coupling, and if B_c < 0. Source: Adams & Hannaford, IEEE Trans. Robotics & Automation 15(3), 1999
+/// (recalled; algebra ours).
 double two_port_coupling(double viscous, Duration longest_hold, double damping);
 
 }  // namespace tendon

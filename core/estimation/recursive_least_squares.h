@@ -11,7 +11,7 @@ struct LeastSquaresConfig {
   /// After a reset, P is this value times the identity. It is the squared error of a parameter divided by the squared
   /// noise of y. Scale the regressor so that one value fits all parameters.
   double prior_variance = 1e8;
-  double dead_zone = 0;  ///< smaller errors are ignored; about the noise of y, or 0
+  double dead_zone = 0;  ///< smaller errors are ignored; this can be 0, or similar to the noise of y
 };
 
 /// Fits y = φᵀθ to a stream of samples. The covariance P stays positive definite, even in float32. θ minimizes

@@ -9,9 +9,9 @@
 
 namespace tendon {
 
-/// Estimates the velocity from positions that an encoder has rounded. The backward difference cannot be used at low
-/// speed: a count of 30 µm at 1 kHz is 30 mm/s. First-order adaptive windowing takes, per axis, the longest window in
-/// which the line between its ends passes within one count of every sample:
+/// Estimates the velocity using positions that were rounded by an encoder. The backward difference cannot be used at
+/// low speed, because the resolution is 30 mm/s for counts of 30 µm at 1 kHz. First-order adaptive windowing takes, per
+/// axis, the longest window in which the line between its ends passes within one count of every sample:
 ///     v = (x(k) − x(k−n)) · r(n),        r(n) = 1 / (t(k) − t(k−n)),
 ///     n = max { n ≤ window : |v − (x(k) − x(k−i)) · r(i)| ≤ resolution · r(i), 0 < i < n }
 /// The estimate is smooth at low speed and fast at high speed, without a cut-off frequency. With resolution 0 (exact
@@ -25,10 +25,12 @@ namespace tendon {
 template <int N>
 class VelocityEstimatorOf {
  public:
-  /// A longer window is smoother at low speed but slower to detect a reversal. For 30 µm at 1 kHz this resolves 2 mm/s.
+  /// If this is increased, the estimate is smoother at low speed, but a reversal is detected later. For 30 µm at 1 kHz
+  /// this resolves 2 mm/s.
   static constexpr std::size_t kWindow = 16;
 
-  /// `resolution`: one encoder count at the handle, m; 0 = exact. Throws std::invalid_argument unless ≥ 0 and finite.
+  /// `resolution`: one encoder count at the handle, m; 0 = exact. Throws std::invalid_argument if it is negative or not
+  /// finite.
   explicit VelocityEstimatorOf(double resolution);
 
   /// Returns the velocity in m/s. The sample is ignored if it is not finite or not newer.
@@ -42,11 +44,12 @@ class VelocityEstimatorOf {
   static constexpr std::size_t kSlots = 2 * kWindow;
 
   double resolution_;
-  /// The samples from `newest_` on, newest first. A new sample is inserted before them. If there is no room, the
-  /// samples of one window are moved to the end. (In a ring buffer, every access would have to wrap the index.)
+  /// The samples in the order from new to old, starting at `newest_`. New samples are inserted at the front. If there
+  /// is no room, the samples of one window are moved to the end. (In a ring buffer, every access would have to wrap the
+  /// index.)
   std::array<Sample, kSlots> samples_{};
   std::size_t newest_ = kSlots;
-  std::size_t count_ = 0;  ///< from `newest_` on, at most kWindow + 1
+  std::size_t count_ = 0;  ///< number of samples starting at `newest_`, up to kWindow + 1
   /// Per axis, the number of samples before the newest with the identical position.
   std::array<std::size_t, static_cast<std::size_t>(N)> same_{};
   Vec<N> velocity_ = Vec<N>::Zero();

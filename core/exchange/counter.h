@@ -6,8 +6,8 @@
 
 namespace tendon {
 
-/// A counter that one thread writes and any thread can read. Thread-safe: `value` from any thread, the rest from one.
-/// Realtime-safe.
+/// A counter that is written by one thread and can be read by any thread. Thread-safe: `value` can be called from any
+/// thread, and the other functions only from the writer. Realtime-safe.
 class Counter {
  public:
   /// An atomic read-modify-write is not needed, because there is only one writer.

@@ -11,10 +11,10 @@
 
 namespace tendon {
 
-/// Stores the last values of a loop that must not wait for a file. If a fault freezes it, another thread can read the
+/// Stores the last values of a loop that must not write to files. If a fault freezes it, another thread can read the
 /// values before the fault. Only the constructor allocates memory.
-/// Thread-safe: one thread may record and freeze, and another may read and thaw while it is frozen. Realtime-safe if
-/// copying T is.
+/// Thread-safe: one thread can call `record` and `freeze`. While it is frozen, another thread can read it and call
+/// `thaw`. Realtime-safe if copying T is.
 template <typename T>
 class FlightRecorder {
  public:

@@ -10,7 +10,7 @@ namespace tendon {
 /// A wait-free slot that passes the newest value from one thread to another. A slow reader misses older values. Use it
 /// for values that are only useful while they are new, such as the remote force or the device state. There are three
 /// slots: one of the writer, one of the reader, and one that they exchange through an atomic byte.
-/// Thread-safe: one writer thread, one reader thread. Realtime-safe when copying T is.
+/// Thread-safe: can be used by one writer thread and one reader thread. Realtime-safe when copying T is.
 template <typename T>
 class Latest {
  public:
@@ -23,8 +23,8 @@ class Latest {
   T& back() { return slots_[back_]; }
   void put() { back_ = middle_.exchange(back_ | kFresh, std::memory_order_acq_rel) & kIndex; }
 
-  /// Reader only. Returns the newest value, or null if there is none since the last call. It is valid until the next
-  /// call.
+  /// Reader only. Returns the newest value, or null if there is none since the last call. The result can be used until
+  /// the next call.
   const T* take() {
     if ((middle_.load(std::memory_order_relaxed) & kFresh) == 0) return nullptr;
     front_ = middle_.exchange(front_, std::memory_order_acq_rel) & kIndex;

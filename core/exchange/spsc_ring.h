@@ -13,7 +13,7 @@ namespace tendon {
 
 /// A wait-free queue from one thread to another, for values whose loss must be detected, such as the recording or
 /// commands. Only the constructor allocates memory.
-/// Thread-safe: one writer thread, one reader thread. Realtime-safe when copying T is.
+/// Thread-safe: can be used by one writer thread and one reader thread. Realtime-safe when copying T is.
 template <typename T>
 class SpscRing {
   static_assert(std::atomic<std::size_t>::is_always_lock_free);

@@ -153,7 +153,7 @@ LimitedWrench limit_slew(const Vec<6>& wanted, const Vec<6>& before, double forc
   const Vec<6> change = wanted - before;
   const double time = std::max(0.0, seconds(elapsed));
   const auto share_of = [time](double size, double rate) {
-    if (std::isinf(rate) || size <= rate * time) return 1.0;  // ∞ · 0 s would not be a number
+    if (std::isinf(rate) || size <= rate * time) return 1.0;  // the product ∞ · 0 s would be NaN
     return rate * time / size;
   };
   const double share =

@@ -13,9 +13,9 @@
 
 namespace tendon {
 
-/// The limiter of a port other than a point in space: the wrench of a handle that can turn, or its gripper. The law is
-/// AOL+ (AolPlus) with its parts, AOL (AOL+ without parts), or none, which does not limit the force. It keeps the
-/// guarantee of Limiter: E ≥ 0 through overruns, because its T follows the longest hold (HoldBound).
+/// The limiter for the wrench of a handle that can be rotated, or for its gripper. The law can be AOL+ (AolPlus) with
+/// its parts, AOL (AOL+ without parts), or none, in which case the force is not limited. It keeps the guarantee of
+/// Limiter: E ≥ 0 through overruns, because its T follows the longest hold (HoldBound).
 ///     HandlePort<2, 3>   a wrench: F (N) with Δx (m), τ (N·m) with Δθ (rad), friction of each, **one account**:
 ///                            E(n) = Σₖ [ −F·Δx − τ·Δθ + f_c ‖Δx‖ + b ‖Δx‖²/T + τ_c ‖Δθ‖ + b_r ‖Δθ‖²/T ]
 ///                        and one factor γ for force and torque, so the wrench keeps its direction
@@ -72,7 +72,7 @@ class HandlePort {
  private:
   void follow(Duration held) noexcept;
 
-  bool limits_;  ///< false: law none
+  bool limits_;  ///< false if the law is none
   Plus law_;
   Duration longest_hold_;  ///< T_max
   std::optional<HoldBound> holds_;
@@ -89,10 +89,10 @@ struct RotationLimits {
   Friction friction{};                        ///< τ_c, N·m, and b_r, N·m·s/rad: lower bounds
   double max_torque = 0;                      ///< N·m, > 0
   double max_slew = 50;                       ///< N·m/s, > 0; 1000 N/s at a lever of 5 cm
-  double encoder_step = 0;                    ///< rad, for robust_ledger; 0: exact
+  double encoder_step = 0;                    ///< rad, for robust_ledger, or 0 if exact
   std::optional<double> most_acceleration{};  ///< rad/s², for bounded_acceleration
   std::optional<double> shaping_stiffness{};  ///< N·m/rad, for shaping
-  double damping = 0;                         ///< N·m·s/rad, for damper; 0: no damping
+  double damping = 0;                         ///< N·m·s/rad, for damper, or 0 if not damped
   double contact = 0.005;                     ///< N·m, for damper; a larger torque is a contact
 };
 /// Throws std::invalid_argument if the point lists a part without a value for rotation.
@@ -104,12 +104,12 @@ struct GripLimits {
   double max_force = 0;                                       ///< N, > 0
   double max_slew = std::numeric_limits<double>::infinity();  ///< N/s, > 0
 };
-/// The parts energy_cap, fading_contact, knee and latency_reserve of `point` apply to the gripper as well; the others
-/// are specific to the position. The account is shared if that of `point` is, through a separate tank.
+/// Only the parts energy_cap, fading_contact, knee and latency_reserve of `point` are used for the gripper, because the
+/// others are specific to the position. The account is shared if that of `point` is, through a separate tank.
 GripPort::Config grip_config(const LimiterConfig& point, const GripLimits& grip);
 
-/// The result of a limit without memory on a wrench. `saturate` applies the first s to the wrench, and `limit_slew` the
-/// second s to its change. s ≤ 1 is the largest value with
+/// The result of applying a limit without memory to a wrench. `saturate` applies the first s to the wrench, and
+/// `limit_slew` the second s to its change. s ≤ 1 is the largest value with
 ///     ‖s F‖ ≤ max_force,   ‖s τ‖ ≤ max_torque
 ///     ‖s (F − F_before)‖ ≤ max_slew · T,   ‖s (τ − τ_before)‖ ≤ max_torque_slew · T
 struct LimitedWrench {

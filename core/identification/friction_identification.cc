@@ -50,14 +50,14 @@ std::string number(double value) { return rounded(value, 3); }
 
 struct KellyVerdict {
   Friction friction;
-  std::string flaw;  ///< empty: valid
+  std::string flaw;  ///< empty if valid
 };
 
-/// Validity of the runs of one direction at one place.
+/// Determines if the runs of one direction at one place are valid.
 KellyVerdict kelly_verdict(const Runs& runs) {
   const KellyFit& slow =
       (*std::ranges::min_element(runs, {}, [](const RunEstimate* run) { return run->kelly.rate; }))->kelly;
-  // Mean of several runs at that slope.
+  // Use the mean if there are several runs with this slope.
   KellyVerdict verdict;
   double count = 0;
   const KellyFit* fast = nullptr;

@@ -37,7 +37,7 @@ struct PlaceEstimate {
 enum class Trust {
   kIntegral,  ///< Kelly's validity test failed
   kBoth,      ///< the test passed and both agree, so the smaller value is published
-  kNeither,   ///< the test passed but they disagree, so neither is a bound; the mass may be wrong
+  kNeither,   ///< the test passed but they disagree, so none of them is a bound; the mass may be wrong
 };
 
 std::string_view to_string(Trust trust) noexcept;
@@ -46,11 +46,11 @@ struct Identification {
   std::vector<RunEstimate> runs;      ///< in the order given
   std::vector<PlaceEstimate> places;  ///< in the order of the first runs
   double force_noise = 0;             ///< N, one standard deviation of a sample, from all runs
-  double mass = 0;                    ///< kg, as given or the mean of the fitted masses
+  double mass = 0;                    ///< kg, the specified mass or the mean of the fitted masses
   Friction estimate;                  ///< minimum over the places: best estimate of the friction
   /// The bounds for a limiter are the minimum over all places of the integral estimate − 3 standard deviations and of
-  /// Kelly's estimate if it is valid, or 0 if that is negative. Unlike Kelly's b, that of the integral fit depends on
-  /// the mass: it is 9 % too large at 0.26 N·s/m if the mass is 30 % too small.
+  /// Kelly's estimate if it is valid, or 0 if that is negative. Unlike Kelly's b, the b of the integral fit depends on
+  /// the mass. For example, if the mass is 30 % too small, b is 9 % too large at 0.26 N·s/m.
   Friction lower_bound;
   Trust trust = Trust::kIntegral;
   std::string reason;                 ///< of `trust`, as a sentence
@@ -61,10 +61,10 @@ struct Identification {
 /// integral fit, and selects the method to trust.
 ///
 /// Kelly's fit is valid at a place if there are two ramps in each direction, the slowest and one that is at least 1.5
-/// times as fast. Both must slide for 4 m/b after break-away and give f_c > 0, and their b must agree within 10 %. (On
-/// 0.25 m of travel the difference is 1.5 % at b = 0.26 N·s/m, and 19 % or more where the fit is wrong.) The two
-/// methods agree if their b differ by at most 10 %. Friction that depends on the direction cannot be distinguished from
-/// a constant force without another experiment, and its mean is published as f_c.
+/// times as fast. In both, the handle must slide for 4 m/b after break-away and f_c must be positive. The values of b
+/// must agree within 10 %. (On 0.25 m of travel the difference is 1.5 % at b = 0.26 N·s/m, and 19 % or more where the
+/// fit is wrong.) The two methods agree if their b differ by at most 10 %. Friction that depends on the direction
+/// cannot be distinguished from a constant force without another experiment, and its mean is published as f_c.
 struct IdentificationConfig {
   std::optional<double> mass;  ///< kg, of the handle and the mechanism, or empty if it is fitted
   double encoder_step = 0;     ///< m, one count

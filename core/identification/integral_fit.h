@@ -18,20 +18,20 @@ namespace tendon {
 /// `unit_covariance` accounts for this. The errors from the textbook formula σ²(AᵀA)⁻¹ are 35 to 70 times too small.
 /// Source: core/PROOFS.md, "Friction identification".
 struct IntegralFit {
-  Friction friction;  ///< not a lower bound; can be negative
+  Friction friction;  ///< not a lower bound, and can be negative
   double mass = 0;    ///< kg, given or fitted
   /// Covariance of (b, f_c) per N² of force noise. Multiply it by the variance of the noise of one sample.
   Eigen::Matrix2d unit_covariance = Eigen::Matrix2d::Zero();
   double residual_squares = 0;  ///< Σ residual², (N·s²)²
-  double unit_residual = 0;     ///< the expected value of that per N² of force noise
+  double unit_residual = 0;     ///< expected value of residual_squares per N² of force noise
 
   /// Returns the standard deviation of the force noise that explains the residuals, N. Rough for a single run.
   double force_noise() const noexcept;
 };
 
-/// `mass`: kg, of handle and mechanism. If it is empty, the mass is fitted as well. This increases the errors, and the
-/// slide must be long enough to show the effects of both mass and friction. Throws std::invalid_argument if the mass is
-/// not a number > 0. Thread-safe: yes. Realtime-safe: no.
+/// `mass` is the mass of the handle and the mechanism in kg. If it is empty, the mass is fitted as well. This increases
+/// the errors, and the slide must be long enough to show the effects of both mass and friction. Throws
+/// std::invalid_argument if the mass is not a number > 0. Thread-safe: yes. Realtime-safe: no.
 IntegralFit integral_fit(const Slide& slide, std::optional<double> mass);
 
 }  // namespace tendon

@@ -6,8 +6,8 @@
 
 namespace tendon {
 
-/// The identification method of the paper. Under a force that rises as s·t, the speed approaches a line with slope μ,
-/// which intersects the time axis at t_i:
+/// The identification method of the paper. If the force increases as s·t, the speed approaches a line with slope μ that
+/// intersects the time axis at t_i:
 ///     (12)  b   = s/μ                  N·s/m
 ///     (11)  f_c = s t_i − m μ          N
 /// The fit uses the last 40 % of the slide. It fits a parabola to the positions, so it does not need a derivative.
@@ -20,9 +20,9 @@ namespace tendon {
 /// Source: Kelly, Llamas and Campa, IEEE TIM 49(4), 2000 (recalled); eqs (11), (12) of Lee & Lee 2009; core/PROOFS.md,
 /// "Friction identification".
 struct KellyFit {
-  Friction friction;         ///< not a lower bound; can be negative
+  Friction friction;         ///< not a lower bound, and can be negative
   double rate = 0;           ///< s, N/s
-  double slide_time = 0;     ///< s, from break-away to the end of the slide
+  double slide_time = 0;     ///< s, duration of the slide after break-away
   double time_constant = 0;  ///< m/b with the estimated b, s; infinite if b is not positive
 
   bool long_enough() const noexcept { return slide_time >= 4 * time_constant; }

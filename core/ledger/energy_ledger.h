@@ -34,8 +34,8 @@ class EnergyLedger {
   /// ended the hold or because a reading failed. A force of norm `applied` (N) was held for at most `at_most` and then
   /// vanished:
   ///     ΔE = −at_most · (‖F‖ − f_c)₊² / (4b)
-  /// If b is 0, there is no such bound for a force above f_c. Nothing is booked then, and the limiter keeps the force
-  /// at f_c.
+  /// If b is 0, there is no such bound for a force above f_c. In this case, nothing is booked, and the limiter reduces
+  /// the force to f_c.
   double observe_unseen(double applied, Duration at_most) noexcept;
 
   /// Adds energy (J) from the account of another port, or subtracts it if the value is negative. E is then a shared
@@ -45,7 +45,8 @@ class EnergyLedger {
   /// Sets the lower bounds of friction from the next interval on. Ignores values that are negative or not finite.
   void adapt(const Friction& friction) noexcept;
 
-  /// Returns E in J. Negative if there is no limiter, or after a longer hold than it expected (see OutputBound).
+  /// Returns E in J. This can be negative if there is no limiter or if a hold was longer than expected (see
+  /// OutputBound).
   double energy() const noexcept { return energy_.value(); }
 
  private:

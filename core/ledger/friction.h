@@ -5,9 +5,9 @@ namespace tendon {
 
 /// **Lower bounds** of the friction of a device, isotropic in its base frame. The energy ledger is only credited with
 /// the work of the hand and with this friction. If a value is larger than the true friction, the passivity theorem does
-/// not hold: with twice the true viscous friction, an adversarial motion extracts 7.6 mJ (core/PROOFS.md, "Energy
-/// ledger"). A value that is too small only makes contact softer. Subtract any compensation of friction or gravity by
-/// the driver.
+/// not hold: an adversarial motion can extract 7.6 mJ if the viscous friction is only half of this value
+/// (core/PROOFS.md, "Energy ledger"). If a value is too small, this only makes contacts softer. Subtract any
+/// compensation of friction or gravity by the driver.
 struct Friction {
   double coulomb = 0;  ///< f_c, N
   double viscous = 0;  ///< b, N·s/m

@@ -8,8 +8,8 @@
 
 namespace tendon {
 
-/// Lower bounds of friction that depend on the position, from an identification at several places. (A single bound
-/// would have to be the minimum over the whole workspace.) The bound at x is the minimum over the nearest place and all
+/// Lower bounds of friction that depend on the position, which was identified at several places. (A single bound would
+/// have to be the minimum over the whole workspace.) The bound at x is the minimum over the nearest place and all
 /// places within `reach` of x.
 /// Thread-safe: yes (immutable). Realtime-safe: `at`, which is linear in the number of places.
 class FrictionMap {
@@ -20,9 +20,9 @@ class FrictionMap {
   };
   struct Config {
     std::vector<Place> places;  ///< 1 to kMostPlaces
-    double reach = 0.05;        ///< m, ≥ 0: about the distance between neighbouring places
+    double reach = 0.05;        ///< m, ≥ 0; should be similar to the distance between neighboring places
   };
-  static constexpr std::size_t kMostPlaces = 64;  ///< four along each edge of a cube: about 0.2 µs per step
+  static constexpr std::size_t kMostPlaces = 64;  ///< four along each edge of a cube, using about 0.2 µs per step
 
   /// Throws std::invalid_argument with the name of the field if the number of places or a value is out of range.
   explicit FrictionMap(Config config);

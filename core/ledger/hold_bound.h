@@ -5,13 +5,13 @@
 
 namespace tendon {
 
-/// An upper bound T on the time for which the next force is held. It follows the measured times and is used by
+/// Computes an upper bound T for the duration of the next hold. It follows the measured times and is used by
 /// OutputBound.
 ///     T(0)   = T_max                                        from the scene
 ///     T(n+1) = min((1 + margin) · held, most · T_max)       if held > T(n); never below T(n)
 ///     T(n+1) = T(n) − max(1 ns, (T(n) − T_max) · held/memory), not below T_max            otherwise
-/// T rises immediately and falls slowly. If a machine is late again within `memory`, T is therefore already large
-/// enough. As long as no interval was longer than T_max, T is equal to T_max.
+/// T rises immediately and falls slowly. T is therefore large enough if the machine is late again within `memory`. If
+/// no interval was longer than T_max, T is equal to T_max.
 ///
 /// A force F that is held for T_act > T can take E below zero, but by no more than
 ///     (T_act − T)(‖F‖ − f_c)₊²/(4b)  ≤  (T_act/T − 1) · E
@@ -24,8 +24,8 @@ class HoldBound {
     double margin = 0.25;  ///< ≥ 0: the relative margin of T
     /// > 0. Time constant of the return to T_max. With ordinary kernels, overruns are minutes apart.
     Duration memory = std::chrono::seconds(60);
-    /// ≥ 1: the largest T as a multiple of T_max. A longer interval means that the machine was stopped and says nothing
-    /// about the jitter. With 4 T_max, the limiter still permits half of the force above f_c.
+    /// ≥ 1: the largest T as a multiple of T_max. Longer intervals are not used because they are not caused by jitter
+    /// but by a machine that was stopped. If T is 4 T_max, the limiter can still use half of the force above f_c.
     double most = 4;
   };
 

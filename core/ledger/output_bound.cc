@@ -43,7 +43,7 @@ double largest_scale(const std::array<OutputBound, Parts>& bounds, const std::ar
   std::array<double, Parts> starts;
   std::array<double, 2 * Parts> corners;
   std::size_t count = 0;
-  double ceiling = kInfinite;  // a larger scale has no finite ℓ
+  double ceiling = kInfinite;  // if the scale is larger, ℓ is not finite
   for (std::size_t i = 0; i < Parts; ++i) {
     const OutputBound& bound = bounds[i];
     starts[i] = kInfinite;
@@ -69,7 +69,7 @@ double largest_scale(const std::array<OutputBound, Parts>& bounds, const std::ar
   double from = corners[0];
   for (std::size_t k = 1; k < count && corners[k] <= ceiling && loss_at(corners[k]) <= budget; ++k) from = corners[k];
 
-  // Between two corners, the sum is ℓ₀ + ℓ₁ δ + ℓ₂ δ². Stop at the corner after which it exceeds the budget.
+  // The sum is equal to ℓ₀ + ℓ₁ δ + ℓ₂ δ² until the next corner, where it exceeds the budget.
   double slope = 0;
   double curvature = 0;
   for (std::size_t i = 0; i < Parts; ++i) {

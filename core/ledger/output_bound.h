@@ -11,8 +11,8 @@
 
 namespace tendon {
 
-/// A bound on the force. It ensures that no motion until the next step can make the energy ledger negative. While a
-/// force of norm f (N) is held, a motion can take at most this energy from the ledger:
+/// A bound on the force. It ensures that the energy ledger cannot become negative until the next step for any motion.
+/// While a force of norm f (N) is held, a motion can take at most this energy from the ledger:
 ///     ℓ(f) = max over 0 ≤ y ≤ L of  (f − f_c) y − b y²/T        J;  y is the travel along F, m
 ///          = T (f − f_c)₊² / (4b)              while the worst travel T (f − f_c)/(2b) ≤ L
 ///          = (f − f_c) L − b L²/T              beyond

@@ -9,7 +9,7 @@
 
 namespace tendon {
 
-// The port of a device is where energy flows between the hand and the device, as a force times a displacement.
+// The hand and the device exchange energy through a port. The energy is the product of a force and a displacement.
 
 template <int N>
 using Vec = Eigen::Matrix<double, N, 1>;
@@ -19,7 +19,7 @@ using Mat = Eigen::Matrix<double, N, N>;
 /// The measurements of the port in the last haptic period.
 template <int N>
 struct Interval {
-  Vec<N> applied;   ///< N, the force on the hand that was really applied
+  Vec<N> applied;   ///< N, the force that was actually applied to the hand
   Vec<N> dx;        ///< m, measured displacement
   Duration held{};  ///< T_act, measured length
 };
@@ -33,7 +33,7 @@ struct Demand {
   Duration age{};                     ///< age of the motion that `force` answers
 };
 
-/// Value of LimitedForce::permitted for a law without a bound.
+/// Used for LimitedForce::permitted if a law has no bound.
 inline constexpr double kNoBound = std::numeric_limits<double>::infinity();
 
 template <int N>

@@ -9,7 +9,7 @@
 namespace tendon {
 namespace {
 
-/// Reduces each component of the travel by `count`, which rounding may have added.
+/// Reduces each component of the travel by `count`, which may have been added by rounding.
 template <int N>
 Vec<N> beyond(double count, const Vec<N>& travel) noexcept {
   return (travel.array().abs() - count).max(0.0).matrix();
@@ -59,7 +59,7 @@ void RobustLedger<N>::observe(const Interval<N>& interval) noexcept {
     credited_ = travel;
     to_peak_ = from_turn_;
   } else if (const Vec<N> back = from_turn_ - to_peak_; beyond<N>(config_.encoder_step, back).squaredNorm() > 0) {
-    // The hand has moved back by more than one count, so a new path begins at the peak.
+    // If the hand has moved back by more than one count, a new path is started at the peak.
     from_turn_ = back;
     to_peak_ = back;
     least_coulomb_ = config_.friction.coulomb;

@@ -7,8 +7,9 @@
 
 namespace tendon {
 
-/// The energy ledger for positions from an encoder. It is a lower bound of the E that EnergyLedger would compute from
-/// the true positions. Positions are rounded to a count Δ, so the error of each component is at most Δ/2. Therefore:
+/// The energy ledger for positions from an encoder. The result is a lower bound of the E that would be computed by
+/// EnergyLedger using the true positions. Positions are rounded to a count Δ, so the error of each component is at most
+/// Δ/2. Therefore:
 ///     work       Σ f·dx measured ≤ Σ f·dx true + (Δ/2) Σ ‖f(k) − f(k−1)‖₁ + (Δ/2) ‖f(n)‖₁      (Abel summation);
 ///                the ledger subtracts the two terms
 ///     Coulomb    credits f_c times the net travel since the last turning point, each component reduced by Δ. The path
@@ -32,7 +33,7 @@ class RobustLedger {
   /// Throws std::invalid_argument with the name of the field if a value is out of range.
   explicit RobustLedger(const Config& config);
 
-  /// Ignores an interval that is not finite.
+  /// Ignores intervals that are not finite.
   void observe(const Interval<N>& interval) noexcept;
 
   /// As in EnergyLedger. The travel restarts at zero after `observe_unseen`, because the position is unknown.
@@ -56,9 +57,9 @@ class RobustLedger {
   Vec<N> last_applied_ = Vec<N>::Zero();  ///< N
 
   Vec<N> from_turn_ = Vec<N>::Zero();  ///< m, net travel since the last turning point
-  Vec<N> to_peak_ = Vec<N>::Zero();    ///< m, from_turn_ at the largest credited travel
+  Vec<N> to_peak_ = Vec<N>::Zero();    ///< m, value of from_turn_ when the credited travel was largest
   double credited_ = 0;                ///< m, travel since the turning point that has been credited
-  double least_coulomb_ = 0;           ///< N, minimum since the turning point
+  double least_coulomb_ = 0;           ///< N, the minimum value since the turning point
 
   Vec<N> in_window_ = Vec<N>::Zero();  ///< m, net travel
   Duration window_length_{};

@@ -16,7 +16,7 @@ namespace tendon {
 /// A new answer that differs by ΔF at the same x therefore adds ΔF · dt/period per step. A sudden change would generate
 /// |ΔF · dx| at the next motion. Blending spreads this energy over time, and the limiter accounts for it. If the
 /// environment has not changed, the old and the new model are the same line, and the prediction does not lag. The slow
-/// period is the time between the motions of the two answers, but at most `max_blend`. A force without a model is
+/// period is the time between the motions of the two answers, and is limited to `max_blend`. A force without a model is
 /// treated as a model with K = 0. The contact and the table of an answer are ignored, because they cannot be blended.
 ///
 /// Source: Barbagli et al., IJRR 24(9), 2005 (recalled). The loop is stable if share · K does not exceed the true
@@ -27,7 +27,7 @@ class AdaptiveLocalModel {
   struct Config {
     /// The share of the stiffness that is used, (0, 1]. Use less than 1 if the engine estimates its stiffness.
     double share = 1;
-    /// The longest time of a blend. With a slower engine, the new model is fully in use after this time.
+    /// Maximum duration of a blend. If the engine is slower, only the new model is used after this time.
     Duration max_blend = std::chrono::milliseconds(100);
   };
 
@@ -41,7 +41,7 @@ class AdaptiveLocalModel {
   std::optional<Prediction> predict(const Motion& hand) const noexcept;
 
  private:
-  /// F(x) = at_origin − model.stiffness · x′. A blend of two lines is a line where both are valid.
+  /// F(x) = at_origin − model.stiffness · x′. The result of blending two lines is also a line if both are valid.
   struct Line {
     Vec3 at_origin = Vec3::Zero();
     LocalModel model{};

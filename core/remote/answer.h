@@ -9,7 +9,7 @@
 
 namespace tendon {
 
-/// Returns whether every number is finite and in range, and every orientation is a rotation (remote_force.h).
+/// Returns true if all numbers are finite and in range, and if all orientations are rotations (remote_force.h).
 bool is_sound(const RemoteForce& answer) noexcept;
 
 /// Returns the part of a sound answer that the loop uses (core/PROOFS.md, "Local models"):
@@ -28,8 +28,8 @@ RemoteTorque believed(const RemoteTorque& torque, double max_angular_stiffness) 
 /// handle has turned by more than 150° since, and constant without a model.
 Vec3 reconstruct(const RemoteTorque& torque, const Quat& q) noexcept;
 
-/// Returns the position nearest to `position` for which the model is valid. The force is constant beyond the radius,
-/// because a jump to the answered force would be felt as a kick.
+/// Returns the position nearest to `position` for which the model is valid. The force is constant outside the radius,
+/// because a jump to the answered force would feel like a kick.
 Vec3 within(const LocalModel& model, const Vec3& position) noexcept;
 
 /// Returns the force of an answer at `position`. With x′ = within(model, x), the depth d = −n·(x − at) since the
@@ -40,12 +40,13 @@ Vec3 within(const LocalModel& model, const Vec3& position) noexcept;
 ///                                              max(0, gap): a surface does not pull, and ends at its own position
 ///     table       the same with N = table(d), which is also valid beyond the radius
 /// s = N / (n·force), clamped to [0, 1]: the tangential force fades with the normal force. The stiffness is −∂F/∂x for
-/// constant s. It is zero beyond the radius, at the ends of the table, and where the table decreases.
+/// constant s. The stiffness is zero outside the radius, outside the table, and in segments of the table that decrease.
 ///
-/// Source: a comparison with hold, extrapolation in time and secants. Below 50 answers per second the table was best,
-/// and above that the stiffness (tests/tools/lab/experiments/reconstruction_test.cc). Engines that send their model:
-/// James and Pai, "A unified treatment of elastostatic contact simulation for real-time haptics", Haptics-e 2(1), 2001;
-/// Mahvash and Hayward, IEEE CG&A 24(2), 2004 (curves of force against depth). Realtime-safe: yes.
+/// Source: this was compared with holding, with extrapolation in time and with secants. The table was best for less
+/// than 50 answers per second, and otherwise the stiffness (tests/tools/lab/experiments/reconstruction_test.cc).
+/// Engines that send their model: James and Pai, "A unified treatment of elastostatic contact simulation for real-time
+/// haptics", Haptics-e 2(1), 2001; Mahvash and Hayward, IEEE CG&A 24(2), 2004 (curves of force against depth).
+/// Realtime-safe: yes.
 Prediction reconstruct(const RemoteForce& answer, const Vec3& position) noexcept;
 
 }  // namespace tendon

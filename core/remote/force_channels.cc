@@ -52,7 +52,7 @@ void ForceChannels::shift_weights(LocalTime now) noexcept {
     if (ranked(channel)) others += channel.weight;
   }
   others -= winner->weight;
-  // A cross-fade requires another channel.
+  // If there is no other channel, the forces are not cross-faded.
   const double step = others <= 0 ? 1.0 : ramp_ > Duration::zero() ? seconds(now - last_) / seconds(ramp_) : 1.0;
   const double mine = std::min(1.0, winner->weight + std::max(0.0, step));
   const double share = others > 0 ? (1 - mine) / others : 0.0;

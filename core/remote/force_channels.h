@@ -46,7 +46,7 @@ class ForceChannels {
   /// Must be called once per haptic step.
   Wanted wanted(const Motion& hand, const Quat* orientation = nullptr) noexcept;
 
-  /// Returns the force that a channel holds. It is empty when idle.
+  /// Returns the force of a channel, or nothing if there is no force.
   const std::optional<RemoteForce>& newest(std::size_t channel) const noexcept {
     return channels_[channel].held.newest();
   }

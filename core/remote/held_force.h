@@ -32,9 +32,9 @@ struct HandleWanted {
 ///     adaptive_local_model   blends from one stiffness to the next              (AdaptiveLocalModel)
 ///     output_estimator       learns a model of the environment                  (OutputEstimator)
 ///     learned_model          learns how the force depends on the position, for answers without a model (LearnedModel)
-/// A torque follows its own model of rotation, and a grip force is constant. Both are held, faded and ramped in as
-/// the force is. Only the trusted part of an answer is used, and an answer that is not sound is refused (answer.h). The
-/// result must be bounded by a limiter.
+/// A torque follows its own model of rotation, and a grip force is constant. Both are held, faded out and ramped in at
+/// the same time as the force. Only the trusted part of an answer is used, and an answer that is not sound is refused
+/// (answer.h). The result must be bounded by a limiter.
 ///
 /// The first force, the first force after a safe stop, and the first force from another source are ramped in linearly
 /// over `ramp_in`, starting from the current force. A fresh force that arrives during the decay is ramped in over (1 −
@@ -44,14 +44,14 @@ class HeldForce {
  public:
   struct Config {
     Duration hold = std::chrono::milliseconds(20);  ///< covers two lost datagrams of a 100 Hz engine
-    /// Time constant. The force decreases by 90 % in 115 ms, which does not feel like a kick.
+    /// Time constant. The force is reduced by 90 % in 115 ms, so that this does not feel like a kick.
     Duration decay = std::chrono::milliseconds(50);
     /// Time from the end of validity to the safe stop. The force is then below 1 %.
     Duration safe_stop = std::chrono::milliseconds(250);
     Duration ramp_in = std::chrono::milliseconds(100);
     Duration max_valid_for = std::chrono::milliseconds(500);  ///< upper limit of valid_for
     double max_stiffness = 5000;                              ///< N/m, > 0; limits the stiffness between two forces
-    double max_angular_stiffness = 5;                         ///< N·m/rad, > 0; the same for rotation
+    double max_angular_stiffness = 5;                         ///< N·m/rad, > 0; used for rotation
     std::optional<AdaptiveLocalModel::Config> adaptive_local_model{};  ///< at most one of these three
     std::optional<OutputEstimator::Config> output_estimator{};
     std::optional<LearnedModel::Config> learned_model{};
@@ -59,11 +59,11 @@ class HeldForce {
 
   struct Wanted {
     Vec3 force = Vec3::Zero();      ///< N, on the hand
-    Mat3 stiffness = Mat3::Zero();  ///< −∂F/∂x, N/m; zero without a local model
+    Mat3 stiffness = Mat3::Zero();  ///< −∂F/∂x, N/m, or zero if there is no local model
     Mode mode = Mode::kIdle;
     Reasons reasons;
-    Duration age{};                        ///< time since it was received, or 0 when idle
-    Duration loop_age{};                   ///< time since the sample of the answered motion, or 0 when idle
+    Duration age{};                        ///< time since the force was received, or 0 if there is no force
+    Duration loop_age{};                   ///< time since the answered motion was sampled, or 0 if there is no force
     std::optional<HandleWanted> handle{};  ///< empty if there is no torque or grip force
   };
 
@@ -71,7 +71,7 @@ class HeldForce {
   /// positive, safe_stop is shorter than hold, a part is not valid, or there are several parts.
   explicit HeldForce(const Config& config);
 
-  /// Returns false, without an effect, if the force is not sound.
+  /// Returns false and does nothing if the force is not sound.
   bool observe(const RemoteForce& force) noexcept;
 
   /// Must be called when the remote environment `source` has disconnected. Its force expires at `now`.
@@ -89,7 +89,7 @@ class HeldForce {
   /// an estimator learns from it. If there is no orientation, the model of rotation is not used.
   Wanted wanted(const Motion& hand, const Quat* orientation = nullptr) noexcept;
 
-  /// Returns the trusted part of the held force, or nothing when idle.
+  /// Returns the part of the held force that is used, or nothing if there is no force.
   const std::optional<RemoteForce>& newest() const noexcept { return newest_; }
 
  private:

@@ -12,7 +12,7 @@ constexpr double kOtherSide = 3e-4;   // m: a zero force at this distance from t
 constexpr double kSameObject = 3e-3;  // m: if a force reverses within this distance, it belongs to the same object
 constexpr double kBeyond = 1.5;       // limit of predictions, in F_late
 constexpr double kOfLate = 1;         // s, time constant of F_late
-constexpr double kOfTheNewGap = 0.2;  // the weight of a new value in the mean time between answers
+constexpr double kOfTheNewGap = 0.2;  // weight of a new value when the mean time between answers is updated
 
 }  // namespace
 

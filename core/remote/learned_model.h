@@ -26,9 +26,9 @@ namespace tendon {
 /// answers, whichever is smaller. F_late is the largest recent answer (within 1 s). θ decreases if the force changes
 /// with time.
 ///
-/// One-sided contact: an answer of exactly zero, at least 0.3 mm away from the last force, means that the object only
-/// pushes. F then fades to zero along F_a without reversing, F_a = 0 predicts zero, and pairs with a zero are not used.
-/// This mode ends when a force reverses within 3 mm.
+/// One-sided contact: if an answer is exactly zero and at least 0.3 mm away from the last force, it is assumed that the
+/// object can only push. F then fades to zero along F_a without reversing, F_a = 0 predicts zero, and pairs with a zero
+/// are not used. This is no longer assumed if a force is reversed within 3 mm.
 ///
 /// The result must be bounded by a limiter. Use `reconstruct` for answers that have a model.
 ///
@@ -91,7 +91,7 @@ class LearnedModel {
   double came_ = 0;       ///< N of the trust θ
   double predicted_ = 0;  ///< D of the trust θ
   double trust_ = 0;
-  int lessons_ = 0;  ///< 0, 1, or 2 for more
+  int lessons_ = 0;  ///< 0, 1, or 2 (which means 2 or more)
   std::optional<Answered> teacher_;
   std::optional<Answered> pushed_;  ///< last nonzero answer, or the first zero one
   bool one_sided_ = false;

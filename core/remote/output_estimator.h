@@ -26,12 +26,12 @@ namespace tendon {
 ///     θ, P ← least squares with forgetting, capped, outside the dead zone
 ///     θ ← into its bounds: stiffness 0 … max_stiffness (other parameters either sign), |a| ≤ 0.9
 ///     re-anchor on the newest motion that was answered: off = −F − φᵀθ, or F(k) computed again since
-/// An axis does not learn while the hand has moved by less than three encoder counts since the last update. Before the
-/// first update, the prediction is the held force. The pole is bounded, because a pole that was fitted to 25 Hz data is
-/// often unstable at 1 kHz. The prediction is also bounded, because its error can be some newtons after a change of the
-/// environment. The result must be bounded by a limiter. The axes are independent: a wall at an angle to the axes is
-/// modelled by three springs that are only correct along the direction of the last press. Engines can send a LocalModel
-/// instead.
+/// An axis does not learn while the hand has moved by less than three encoder counts since the last update. Until the
+/// first update, the held force is used as the prediction. The pole is bounded, because a pole that was fitted to 25 Hz
+/// data is often unstable at 1 kHz. The prediction is also bounded, because its error can be some newtons after a
+/// change of the environment. The result must be bounded by a limiter. The axes are independent: a wall at an angle to
+/// the axes is modelled by three springs that are only correct along the direction of the last press. Engines can send
+/// a LocalModel instead.
 ///
 /// Source: Lee and Lee, "Multirate output estimation for real-time haptic rendering". Only the abstract is available,
 /// so the condition for resetting P is a guess. Cap, cooldown, bounds, freeze and re-anchoring are ours:
@@ -47,13 +47,13 @@ class OutputEstimator {
 
   struct Config {
     Model model = Model::kPolynomial;
-    Vec3 origin = Vec3::Zero();  ///< m, the rest position of the environment
-    double scale = 0.01;       ///< ℓ, m; should be about the travel, so that both parameters have the same magnitude
-    double forgetting = 0.95;  ///< per answer; 0.95 forgets half in 0.5 s at 25 Hz
-    double prior_variance = 1e8;  ///< (N/m)²/N²: errors of 500 N/m of a parameter and 0.05 N of a force
+    Vec3 origin = Vec3::Zero();   ///< m, the rest position of the environment
+    double scale = 0.01;          ///< ℓ, m; should be similar to the travel, so that both parameters are similar
+    double forgetting = 0.95;     ///< per answer; 0.95 forgets half in 0.5 s at 25 Hz
+    double prior_variance = 1e8;  ///< (N/m)²/N², for errors of 500 N/m for a parameter and 0.05 N for a force
     double dead_zone = 0;         ///< N; should be about the noise of the engine's force
-    double reset_error = 0.3;     ///< N; a larger error indicates another environment
-    int reset_cooldown = 3;       ///< answers between two resets; more than the number of parameters
+    double reset_error = 0.3;     ///< N; if the error is larger, the environment has changed
+    int reset_cooldown = 3;       ///< answers between two resets; should exceed the number of parameters
     double max_stiffness = 5000;  ///< N/m
     double max_force = 30;        ///< N, per axis
     double resolution = 0;        ///< m; one encoder count at the handle, 0 = exact
@@ -89,7 +89,7 @@ class OutputEstimator {
   struct Step {
     LocalTime at{};
     Vec3 position = Vec3::Zero();
-    Vec3 before = Vec3::Zero();  ///< −F of the step before; kOutputError only
+    Vec3 before = Vec3::Zero();  ///< −F in the previous step, only for kOutputError
     Vec3 output = Vec3::Zero();  ///< −F
     bool answered = false;
   };
@@ -116,7 +116,7 @@ class OutputEstimator {
 
   Config config_;
   std::array<Step, kSlots> steps_{};
-  std::uint64_t next_ = 0;  ///< number of the next step; the newest has next_ − 1
+  std::uint64_t next_ = 0;  ///< number of the next step, so that the newest step has the number next_ − 1
   std::array<Axis, 3> axes_;
   std::optional<Anchor> anchor_;
   Counts counts_;

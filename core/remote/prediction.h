@@ -5,7 +5,7 @@
 
 namespace tendon {
 
-/// The force that a model of the remote environment predicts at and near a position:
+/// The predicted force of a model of the remote environment near a position:
 ///     F(x + ξ) ≈ force − stiffness · ξ          N, on the hand; stiffness = −∂F/∂x, N/m
 struct Prediction {
   Vec3 force = Vec3::Zero();

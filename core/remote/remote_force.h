@@ -16,8 +16,8 @@ namespace tendon {
 /// beyond.
 struct ForceTable {
   static constexpr std::size_t kMinEntries = 2;
-  static constexpr std::size_t kMaxEntries = 16;  ///< 5 mm with 0.3 mm between entries; 128 bytes of a datagram
-  double first = 0;                               ///< m; negative: nearer to the hand
+  static constexpr std::size_t kMaxEntries = 16;  ///< 5 mm if the entries are spaced by 0.3 mm; uses 128 bytes
+  double first = 0;                               ///< m; if negative, the table starts closer to the hand
   double step = 0;                                ///< m, > 0
   std::uint32_t size = 0;                         ///< entries, kMinEntries … kMaxEntries
   std::array<double, kMaxEntries> force{};        ///< N
@@ -27,7 +27,7 @@ struct ForceTable {
 struct Contact {
   static constexpr double kUnitTolerance = 1e-3;  ///< for the length of the normal
   Vec3 normal = Vec3::UnitX();                    ///< unit vector from the body to the hand
-  double gap = 0;  ///< m, distance from the surface to the tool along the normal; negative: penetration
+  double gap = 0;  ///< m, distance from the surface to the tool along the normal, or negative if the tool is inside
   std::optional<ForceTable> table{};
 };
 
@@ -52,18 +52,19 @@ struct RotationModel {
   Mat3 stiffness = Mat3::Zero();  ///< N·m/rad, −∂τ/∂θ, base frame axes
 };
 
-/// The torque on the hand that a remote physics engine requests, in base frame axes, about the position of the handle.
+/// The torque on the hand that is requested by a remote physics engine, in base frame axes, about the position of the
+/// handle.
 struct RemoteTorque {
   Vec3 torque = Vec3::Zero();  ///< N·m
   std::optional<RotationModel> model{};
 };
 
-/// The force on the hand that a remote physics engine requests. **Sign, everywhere in Tendon:** a force is exerted by
-/// the device *on the hand*, so a wall that resists motion along +x sends −x. (Lee & Lee 2009 use f = −F.)
+/// The force on the hand that is requested by a remote physics engine. **Sign, everywhere in Tendon:** a force is
+/// exerted by the device *on the hand*, so a wall that resists motion along +x sends −x. (Lee & Lee 2009 use f = −F.)
 struct RemoteForce {
   std::uint64_t sequence = 0;      ///< increases strictly within a session; 0 if there is no force yet
   std::uint64_t answers_tick = 0;  ///< the haptic step with the answered motion
-  LocalTime answers{};             ///< sample time of that motion; now − answers is `loop_age`
+  LocalTime answers{};             ///< time when this motion was sampled, used to compute `loop_age`
   LocalTime received{};            ///< arrival time
   Vec3 force = Vec3::Zero();       ///< N, on the hand
   std::optional<LocalModel> model{};
@@ -71,8 +72,8 @@ struct RemoteForce {
   std::uint32_t source = 0;  ///< identifies the sender, because the first force of another engine is ramped in
   /// If true, the body was cut or torn since the previous answer, and the models of both answers are not valid.
   bool topology_changed = false;
-  std::uint8_t way = 0;           ///< number of the solver path in the engine; 0: unknown. For diagnostics only
-  std::optional<double> error{};  ///< N, ≥ 0; the error of `force` that the engine estimates
+  std::uint8_t way = 0;           ///< number of the solver path in the engine, or 0 if unknown (for diagnostics)
+  std::optional<double> error{};  ///< N, ≥ 0; error of `force`, as estimated by the engine
   std::optional<RemoteTorque> torque{};
   std::optional<double> grip_force{};  ///< N; opens the fingers of the gripper if positive
 };

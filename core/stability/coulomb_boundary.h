@@ -16,8 +16,8 @@ double abbott_okamura_stiffness(const SampledSpring& spring);
 enum class DiolaitiRegion {
   kPassive,          ///< always comes to rest
   kLimitCycle,       ///< slows down, but about one count of motion can remain
-  kLocallyStable,    ///< as kPassive below `speed_limit`, and unstable above
-  kLocalLimitCycle,  ///< as kLimitCycle below `speed_limit`, and unstable above
+  kLocallyStable,    ///< similar to kPassive below `speed_limit`, but unstable above this speed
+  kLocalLimitCycle,  ///< similar to kLimitCycle below `speed_limit`, but unstable above this speed
 };
 
 std::string_view to_string(DiolaitiRegion region) noexcept;
@@ -33,7 +33,7 @@ struct Diolaiti {
   double speed_limit = 0;
 };
 
-/// If β ≥ ½ + τ, the motion slows down from any speed. If σ ≥ ½, it comes to rest. Source: Diolaiti et al., IEEE T-RO
+/// If β ≥ ½ + τ, the motion is slowed down at any speed. If σ ≥ ½, it comes to rest. Source: Diolaiti et al., IEEE T-RO
 /// 22(2), 2006; σ as in Abbott and Okamura; v_lim: core/PROOFS.md, "Stability boundaries".
 Diolaiti diolaiti(const SampledSpring& spring);
 

@@ -23,13 +23,13 @@ struct SampledSpring {
   double encoder_step = 0;  ///< Δ, m, one count; 0 = exact
 };
 
-/// Limits the size of the eigenvalue problem. The laws are of no use for longer delays.
+/// Limits the size of the eigenvalue problem. The laws are not useful if the delay is longer.
 inline constexpr int kMaxDelaySamples = 200;
 
 /// Returns the mean age of the held force, T/2 + d T, in s. Most boundaries compare friction with stiffness × this age.
 double mean_age(const SampledSpring& spring);
 
-/// Throws unless all fields are finite, all but B are not negative, T > 0 and 0 ≤ d ≤ kMaxDelaySamples.
+/// Throws if a field is not finite, if a field other than B is negative, if T = 0, or if d > kMaxDelaySamples.
 void check(const SampledSpring& spring);
 
 /// For laws without a virtual damper. Throws if B ≠ 0.

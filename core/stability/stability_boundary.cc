@@ -29,7 +29,7 @@ double spectral_radius(const SampledSpring& spring) {
   const double h = u < 1e-8 ? 1 - u / 2 : -std::expm1(-u) / u;
   const double g = u < 1e-3 ? 0.5 - u / 6 + u * u / 24 : (1 - h) / u;
 
-  // State: x, v, previous x, and the forces under way, oldest first.
+  // The state consists of x, v, the previous x, and the forces in transit in the order from old to new.
   const Eigen::Index d = spring.delay_samples;
   const Eigen::Index n = 3 + d;
   Eigen::RowVectorXd computed = Eigen::RowVectorXd::Zero(n);
@@ -83,7 +83,7 @@ double jury_stiffness(const SampledSpring& spring) {
   const double b = spring.viscous;
   const double t = seconds(spring.period);
   const double u = b * t / spring.mass;
-  if (u < 1e-4) return 2 * b / t * (1 + u / 6);  // the next term is below 1e-9
+  if (u < 1e-4) return 2 * b / t * (1 + u / 6);  // the next term is smaller than 1e-9
   const double lost = -std::expm1(-u);
   return b / t * lost / (lost / u - std::exp(-u));
 }

@@ -25,7 +25,7 @@ PositionPosition<3>::Config spring_of(const CouplingConfig& config, const Mapped
   const bool both = config.method == CouplingMethod::kPositionPosition || config.method == CouplingMethod::kSetPosition;
   // The leader of a position–force coupling has no spring, so the follower's spring is not in a loop with the delay.
   if (!both) spring.adapt_to_delay = false;
-  if (config.method == CouplingMethod::kSetPosition) spring.damping = 0;  // the method does not use velocities
+  if (config.method == CouplingMethod::kSetPosition) spring.damping = 0;  // this method does not use velocities
   for (double* const value : {&spring.stiffness, &spring.damping, &spring.own_damping}) {
     *value = frame.stiffness(*value);
   }
@@ -37,7 +37,8 @@ std::optional<EnergyTank> tank_of(const CouplingConfig& config, const MappedEnd&
   EnergyTank::Config tank = *config.tank;
   tank.peers = 1;
   tank.joule[0] = frame.joule();
-  // `start` must have the same value at both ends. Otherwise, it is too small where a joule is worth less.
+  // The value of `start` must be the same at both ends. Otherwise, it would be too small at the end with the smaller
+  // value of a joule.
   tank.start = frame.worth(tank.start);
   tank.epoch = config.spring.epoch;
   return EnergyTank(tank);
@@ -45,7 +46,8 @@ std::optional<EnergyTank> tank_of(const CouplingConfig& config, const MappedEnd&
 
 std::optional<TurnCoupling> turn_of(const CouplingConfig& config, const MappedEnd& frame) {
   if (!config.turn) return std::nullopt;
-  // The other methods have no spring at the leader, so the follower's is in no loop with the delay.
+  // For the other methods, there is no spring at the leader, so the spring of the follower is not part of a loop with
+  // the delay.
   const bool springs = config.method == CouplingMethod::kPositionPosition || config.method == CouplingMethod::kWaves;
   return TurnCoupling(*config.turn,
                       TurnCoupling::End{.role = config.role,

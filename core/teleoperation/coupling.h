@@ -17,8 +17,9 @@
 
 namespace tendon {
 
-/// Implements one end of a coupling between two devices: engaging, clutch, loss of the peer, position mapping, control
-/// law, and exchange of energy. The haptic loop of each device owns one object. The network only transfers PortStates.
+/// Implements one end of a coupling between two devices. This includes engaging, the clutch, loss of the peer, position
+/// mapping, the control law, and the exchange of energy. The haptic loop of each device owns one object. The network
+/// only transfers PortStates.
 ///
 /// **In each period**, in this order:
 ///     coupling.receive(state of the peer)            any number of states, possibly late or duplicated
@@ -30,19 +31,19 @@ namespace tendon {
 ///     coupling.conclude(applied, contact)            the end of the period
 ///     send(coupling.message())
 ///
-/// **Displacements.** Each end has an offset p₀ and sends u = p − p₀ in its own axes. While an end is not *live*, its u
-/// is constant and p₀ moves with the handle. The leader is live if it is engaged and the follower has answered this
-/// engagement. The follower is live if it is engaged. It then starts with the mapped u of the leader, so that the
-/// initial force of the law is 0. The u of the leader starts at 0 in each engagement. After the clutch, it continues
-/// from its last value, so the other end does not move.
+/// **Displacements.** Each end has an offset p₀ and sends u = p − p₀ in its own axes. If an end is not *live*, u is
+/// constant and p₀ is updated with the position of the handle. The leader is live if it is engaged and the follower has
+/// answered this engagement. The follower is live if it is engaged. It then starts with the mapped u of the leader, so
+/// that the initial force of the law is 0. The u of the leader is 0 at the start of each engagement. When the clutch is
+/// released, it continues from its last value, so that the other end does not move.
 ///
 /// **Phases** (the table is in phase_machine.h). The device is ready if it is connected, armed, and has no fault. The
 /// leader engages if its operator calls engage() or presses the button, the leader is ready, and the peer is fresh and
 /// in the phase coupled, engaged, or clutched. This starts a new *act*, an engagement with a number. The follower
 /// engages if it receives an act that is newer than all previous acts and belongs to the current epoch of the follower.
 /// An act ends if the peer has restarted or is no longer engaged in it. The leader also ends the act if the peer knows
-/// the act and is not engaged, if the peer is not ready, or if there is no answer within kAnswerWithin. While the
-/// leader is clutched, the follower stays engaged and holds its position.
+/// the act and is not engaged, if the peer is not ready, or if there is no answer within kAnswerWithin. If the leader
+/// is clutched, the follower is still engaged and holds its position.
 ///
 /// The force increases within `ramp` and decreases within ForceRamp::kFade, so there are no steps. A fault sets the
 /// force to 0 immediately. If there is no position in a period, the gain decreases at the same rate.
@@ -64,10 +65,10 @@ namespace tendon {
 /// **Laws.** The folder methods/ contains one law per method. K, D, and B are the values of the leader, and the values
 /// of the follower are smaller by s_f s_x. The norm of all forces is at most max_force.
 ///
-/// **Energy tank.** If Config::tank is set, the port exchanges energy with its peer (EnergyTank). It only gives energy
-/// if it is live and the peer is engaged and not silent. A pair with an energy tank is only passive if the method is
-/// position-position, set-position, or passivity. Without an energy tank, the limiter makes each end passive by itself,
-/// so the follower cannot move. This is also true for the other methods except for waves.
+/// **Energy tank.** If Config::tank is set, the port exchanges energy with its peer (EnergyTank). Energy is only given
+/// if this end is live and the peer is engaged and not silent. A pair with an energy tank is only passive if the method
+/// is position-position, set-position, or passivity. If there is no energy tank, each end is passive because of its own
+/// limiter, but the follower cannot move. This is also true for the other methods except for waves.
 ///
 /// **The rest of a handle.** Config::turn couples the orientations (TurnCoupling), and Config::grip the grippers
 /// (GripCoupling), with the same phases and ramp. The force and the torque share one account, which `settle` changes.
@@ -77,7 +78,8 @@ namespace tendon {
 /// it answers a state that was never sent, if `energy_in` has decreased within the epoch, or if the tank refuses it.
 /// Older states and duplicates are ignored. If the position or the velocity of the hand is not finite or larger than
 /// 10¹², the demand is not finite and the limiter sets the force to 0. The same is true for the orientation and the
-/// opening if they are coupled. A measured force that is not finite becomes 0; a contact force counts as not measured.
+/// opening if they are coupled. If a measured force is not finite, 0 is used instead. If a contact force is not finite,
+/// it is treated as not measured.
 ///
 /// **Share.** If a follower has several leaders (Couplings), K, D, B, max_force, and the contact force of each pair are
 /// multiplied by its share α at both ends. If the follower does not send α (PortState::share), it is 1. The rate of α
@@ -102,7 +104,7 @@ class Coupling {
   /// Starts an act; must be called at the leader. Returns true if the coupling is engaging or was engaged before.
   /// Returns false and does nothing if the phase is alone, lost or fault, or if the peer is not ready.
   bool engage() noexcept;
-  void disengage() noexcept;  ///< ends the act; can be called at either end
+  void disengage() noexcept;  ///< ends the act; this can be called at both ends
 
   void renew() noexcept;  ///< must be called if the peer has been replaced or has restarted
 
@@ -127,7 +129,8 @@ class Coupling {
   /// Must be called instead of `command` if there is no position. This only updates the phase. The force is 0.
   void command_unseen(LocalTime now, bool ready) noexcept;
 
-  /// Returns the changes of the account, 0 without a tank or waves. Must be called between `command` and the limiter.
+  /// Returns the changes of the account, which are 0 if neither a tank nor waves are used. Must be called between
+  /// `command` and the limiter.
   EnergyTank::Settlement settle(double payable, double loss, Duration elapsed) noexcept;
 
   /// Returns the same for the account of the gripper. Both values are 0 if the grippers are not coupled.
@@ -194,11 +197,11 @@ class Coupling {
   PortPhase phase_ = PortPhase::kAlone;
   std::uint64_t sequence_ = 0;    ///< number of periods
   std::uint64_t engagement_ = 0;  ///< of the newest act that was started (leader) or followed (follower)
-  std::uint64_t seen_ = 0;        ///< at the follower, acts up to this one are ignored
+  std::uint64_t seen_ = 0;        ///< the newest act that must be ignored by the follower
   bool answered_ = false;         ///< leader: the follower is engaged in this act
   bool ready_ = false;
   std::uint64_t act_sequence_ = 0;   ///< the first state that contains the act
-  std::uint64_t lost_sequence_ = 0;  ///< the first state that contains the loss; 0: no loss, or the peer knows about it
+  std::uint64_t lost_sequence_ = 0;  ///< the first state that contains the loss, or 0 if the peer knows about it
   LocalTime acted_at_{};
   Clutch clutch_;
   Alignment alignment_;
@@ -206,7 +209,7 @@ class Coupling {
   LocalTime now_{};
   Duration elapsed_{};
 
-  PortState newest_;  ///< newest state of the peer; there is none if its sequence is 0
+  PortState newest_;  ///< newest state of the peer, if its sequence is not 0
   LossStages loss_stages_;
   LossStages::Stage loss_stage_;
   bool peer_anew_ = false;  ///< the epoch has changed in this period
@@ -224,7 +227,7 @@ class Coupling {
   double share_ = 1;    ///< α
   double others_ = 0;   ///< the gain of another leader, only at the follower
   double taken_ = 0;    ///< J; received from waves or acts since the last `settle`
-  double given_ = 0;    ///< J, the energy that waves have sent since the last `settle`
+  double given_ = 0;    ///< J, energy that was sent by waves since the last `settle`
   double payable_ = 0;  ///< J, after the newest interval
   double loss_ = 0;     ///< J; the reserve of the limiter for the last force
 

@@ -31,7 +31,7 @@ struct CouplingConfig {
   PortRole role = PortRole::kLeader;
   CouplingMethod method = CouplingMethod::kPositionPosition;
   PoseMap::Config map{};
-  /// `stiffness`, `damping`, and `own_damping` are the values of the leader. The other fields are for this end.
+  /// `stiffness`, `damping`, and `own_damping` are the values of the leader. The other fields are used for this end.
   PositionPosition<3>::Config spring{};
   /// `start` is in joules of the leader, `max_power` and `max_account` in joules of this end. The constructor sets the
   /// rest.
@@ -44,14 +44,14 @@ struct CouplingConfig {
   std::optional<CouplingButton> clutch{};               ///< leader only
   std::optional<std::uint32_t> engage_by{};             ///< the bit of a button that calls engage(), only at the leader
   Duration ramp = std::chrono::milliseconds(300);       ///< > 0
-  Duration peer_period = std::chrono::milliseconds(1);  ///< > 0, the time between the states of the peer
-  double encoder_step = 0;                              ///< m, ≥ 0; of the device; used by waves; 0: exact
+  Duration peer_period = std::chrono::milliseconds(1);  ///< > 0, time between two states of the peer
+  double encoder_step = 0;                              ///< m, ≥ 0, or 0 if exact; used if the method is waves
   bool holds_place = false;                             ///< the device of the follower is a robot
   std::optional<double> share{};         ///< initial α (0 to 1) if the follower has several leaders (can_be_shared)
   double drift_rate = 100;               ///< λ, 1/s, ≥ 0; used if the method is passivity
   std::optional<RateControl> rate{};     ///< required if the method is rate
   double centring = 0;                   ///< K_c, N/m, ≥ 0; used by the leader if the method is rate
-  Duration max_delay = Duration::max();  ///< > 0; the longest delay of a usable link
+  Duration max_delay = Duration::max();  ///< > 0; links with a longer delay are not used
   std::optional<TurnCoupling::Config> turn{};  ///< couples the orientations
   std::optional<GripCoupling::Config> grip{};  ///< couples the grippers
 };

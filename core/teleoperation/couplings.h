@@ -17,7 +17,8 @@ struct CoupledLeader {
   double share = 1;           ///< initial α
 };
 
-/// The couplings of one device: a single one, or one per leader of a follower with 2 to 4 leaders.
+/// Contains the couplings of one device. This is a single coupling, or one for each leader if this is a follower with 2
+/// to 4 leaders.
 ///     F = Σ α_i (K (y_i − u_i) + D (ẏ_i − u̇_i) − B u̇_i)       at the follower
 ///     F_i = α_i (K (u_i − y_i) + D (u̇_i − ẏ_i) − B ẏ_i)        at leader i
 /// In free motion x_f = Σ α_i x_i over the engaged leaders, where the α_i are divided by their sum. Each pair is a
@@ -26,18 +27,18 @@ struct CoupledLeader {
 /// the contact force (core/PROOFS.md, "Coupling springs").
 ///
 /// **Phases.** The phases, clutch, offsets and loss of the peer are separate for each coupling. A leader that is not
-/// engaged does not contribute, and the other shares do not change unless set_share is called. A robot (`holds_place`)
-/// holds its position with the unused part.
-/// **One account.** All couplings use the account of the device's limiter, one after the other, and each of them only
-/// sees the remaining energy. This satisfies the condition of the theorem in energy_tank.h: before the bound, coupling
-/// j gives ΔG_j ≤ max(A_j, 0) with A_j = A + Σ_{k≤j} R_k − Σ_{k<j} ΔG_k. Therefore Σ ΔG ≤ max(A + Σ R, 0), and only R
-/// increases A. The limiter is called once, after all couplings. If α changes while a spring is stretched, the work ½
-/// ΔK δ² is charged to the account, and the limiter reduces the force if there is not enough energy.
+/// engaged does not contribute, and the other shares do not change unless set_share is called. The unused part is used
+/// by a robot (`holds_place`) to hold its position. **One account.** All couplings use the account of the device's
+/// limiter, one after the other, and each of them only sees the remaining energy. This satisfies the condition of the
+/// theorem in energy_tank.h: before the bound, coupling j gives ΔG_j ≤ max(A_j, 0) with A_j = A + Σ_{k≤j} R_k − Σ_{k<j}
+/// ΔG_k. Therefore Σ ΔG ≤ max(A + Σ R, 0), and only R increases A. The limiter is only called after all couplings. If α
+/// changes while a spring is stretched, the work ½ ΔK δ² is charged to the account, and the limiter reduces the force
+/// if there is not enough energy.
 ///
 /// **Messages.** Each leader receives its part of the account and of the need: α_i A and α_i n. The ratio A/n, which
 /// determines the payments, is the same for all leaders. If each leader received the entire need, each would send all
 /// of the missing energy. With 2 to 4 leaders that pushed together, this transferred 7 to 17 % more energy without a
-/// larger force. The guarantees do not depend on this.
+/// larger force. This does not affect the guarantees.
 ///
 /// **Trust.** Each peer has its own tank with max_power and max_account. If n peers are dishonest, this port still
 /// guarantees that L ≥ −n (max_account + max_power · t).
@@ -46,8 +47,8 @@ class Couplings {
  public:
   static constexpr std::size_t kMost = Shares::kMost;
 
-  /// `leaders` is empty for a single coupling. Otherwise, it contains 2 … kMost leaders, whose `config` must only
-  /// couple positions. Throws std::invalid_argument with the name of the field, its value and the expected value.
+  /// `leaders` is empty for a single coupling. Otherwise, it must contain 2 … kMost leaders, and each `config` must
+  /// only couple positions. Throws std::invalid_argument with the name of the field, its value and the expected value.
   explicit Couplings(const Coupling::Config& config, std::span<const CoupledLeader> leaders = {});
 
   std::size_t size() const noexcept { return all_.size(); }

@@ -39,7 +39,7 @@ void EnergyTank::receive(std::size_t peer, const EnergyTankMessage& message) noe
     return;
   }
   if (message.epoch < from.epoch || (message.epoch == from.epoch && message.sequence <= from.sequence)) return;
-  // The own sequence continues, because the peer may have messages that answered its previous epoch.
+  // The sequence of this port is not reset, because the peer may have messages that answered its previous epoch.
   if (message.epoch > from.epoch) from = {.epoch = message.epoch, .sent = from.sent};
   const bool ours = message.answers_epoch == config_.epoch;
   // The peer returns G itself, and a copy of a double is exact.
@@ -90,7 +90,7 @@ double EnergyTank::give(double account, double need) noexcept {
     there[j] = peer.account * config_.joule[j] + (peer.given - peer.arrived);
     needs[j] = peer.need * config_.joule[j];
   }
-  // All ports below the common ratio are raised to it. A port above the ratio is excluded.
+  // All ports below the common ratio are raised to it. Ports above this ratio are excluded.
   double ratio = 0;
   for (std::size_t round = 0; round < config_.peers; ++round) {
     double accounts = account;

@@ -11,16 +11,16 @@
 
 namespace tendon {
 
-/// The message that one port sends to another about its account. Messages may be rare, late, duplicated or reordered.
-/// All energies are in joules of the sender.
+/// The message that one port sends to another about its account. These messages can be rare, late, duplicated or
+/// reordered. All energies are in joules of the sender.
 struct EnergyTankMessage {
-  std::uint64_t epoch = 0;          ///< of the sender; 0: no message
-  std::uint64_t answers_epoch = 0;  ///< epoch of the receiver for `given` and `taken`; 0: not known
+  std::uint64_t epoch = 0;          ///< epoch of the sender, or 0 if there is no message
+  std::uint64_t answers_epoch = 0;  ///< epoch of the receiver for `given` and `taken`, or 0 if not known
   std::uint64_t sequence = 0;       ///< 1, 2, … within an epoch
   double account = 0;               ///< J, A after giving; ± kMostAccount
   double need = 0;                  ///< J, n; 0 … kMostAccount
-  double given = 0;  ///< J, G: total given to the receiver; does not decrease within the two epochs; ≤ kMostTotal
-  double taken = 0;  ///< J, R: the receiver's total as known by the sender, in joules of the receiver; ≤ kMostTotal
+  double given = 0;  ///< J, G, total given to the receiver; cannot decrease within the two epochs; ≤ kMostTotal
+  double taken = 0;  ///< J, R, total of the receiver as known by the sender, in joules of the receiver; ≤ kMostTotal
 
   static constexpr double kMostAccount = 1e3;
   static constexpr double kMostTotal = 1e6;
@@ -29,9 +29,10 @@ struct EnergyTankMessage {
 /// An energy tank (Franken et al.) for one of several coupled ports that exchange energy. The ports are passive
 /// together, although each of them may generate net energy.
 ///
-/// A limiter at each of two coupled devices makes each device passive **by itself**. But then the follower cannot move,
-/// because it must not do net work. Only the sum of all ports has to be passive. Therefore each port gives energy from
-/// its account to the others, and its limiter bounds the force by this account instead of its own ledger. Port i has
+/// If two coupled devices have a limiter each, each device is passive **by itself**, but the follower cannot move
+/// because it must not do net work. It is sufficient if the sum of all ports is passive. Therefore each port gives
+/// energy from its account to the others, and its limiter bounds the force by this account instead of its own ledger.
+/// Port i has
 ///     L_i       its ledger (EnergyLedger), with the applied force
 ///     G_ij      the total given to j;    R_ji the largest received G_ji
 ///     A_i = L_i − Σ_j G_ij + Σ_j R_ji − discarded_i          the account: Limiter::energy
@@ -43,8 +44,9 @@ struct EnergyTankMessage {
 /// work and R increase A_i (core/PROOFS.md, "Output bound"). Giving keeps A_i ≥ 0 and is done before the bound. R_ij ≤
 /// G_ij, because totals do not decrease and only the largest received one is used. So Σ L_i = Σ A_i + Σ (G_ij − R_ij) +
 /// Σ discarded_i ≥ 0, because each term is ≥ 0. ∎ The theorem requires no common clock, no acknowledgement and no
-/// retransmission. All holds must be at most T_max long; see OutputBound for longer holds. Several tanks may use one
-/// account one after the other, each with the remaining energy as `payable` (Couplings). This satisfies the condition.
+/// retransmission. It is assumed that all holds are at most T_max long (see OutputBound for longer holds). Several
+/// tanks can use the same account one after the other if `payable` is set to the remaining energy (Couplings). This
+/// satisfies the condition.
 ///
 /// **Amount.** The ports equalize the ratio of account to need, and count the energy in transit:
 ///     n_i = ℓ_i(F_wanted) + ε          ℓ: SharesAccount::worst_loss;  ε > 0, so that a port at rest can start to move
@@ -61,19 +63,20 @@ struct EnergyTankMessage {
 /// transit until the peer knows the new value. If (s_f/s_x) A has increased, the follower discards this increase. A
 /// change of the scales therefore never increases the sum of the accounts in joules of the leader.
 ///
-/// **Epochs.** A port that restarts loses its totals. Its new tank must have an epoch above all previous ones (a
+/// **Epochs.** The totals are lost if a port restarts. Its new tank must have an epoch above all previous ones (a
 /// persistent counter, or the time of day at the start; clocks of two machines are not compared). Totals belong to a
 /// pair of epochs. A higher epoch of the peer resets both totals. Messages of a lower epoch, and totals for another
 /// epoch of this port, are ignored. No total is therefore counted twice. Energy in transit is lost, which is safe.
 ///
-/// **Trust.** The sum is ≥ 0 if the peers keep their accounts correctly. Against other peers, this port alone keeps L ≥
-/// −(max_account + max_power · t): received energy is credited up to an allowance, which starts at max_account and
-/// increases by max_power and by the given energy up to max_account. The rest is discarded, and so is the part of an
-/// account above max_account. Discarding is always safe (core/PROOFS.md, "Discarded credit").
+/// **Trust.** The sum is ≥ 0 if the accounts of the peers are correct. If they are not, this port can still ensure that
+/// L ≥ −(max_account + max_power · t). Received energy is only credited up to an allowance, which is initially
+/// max_account and increases by max_power and by the given energy up to max_account. The remaining energy is discarded.
+/// If an account exceeds max_account, the excess is also discarded. Discarding is always safe (core/PROOFS.md,
+/// "Discarded credit").
 ///
 /// **Bad input.** A message is refused and counted in `refused` if a value is not finite or out of bounds, if `taken`
-/// exceeds the given total, or if a total decreases although its sequence increases. A message that is not newer is
-/// ignored. If a value of the period is not finite, nothing is given or credited.
+/// exceeds the given total, or if a total decreases although its sequence increases. Messages are ignored if they are
+/// not newer. If a value of the period is not finite, nothing is given or credited.
 ///
 /// Source: derived here; related to the two-layer tank (Franken et al. 2011) and energy-reflecting TDPA (Ryu et al.
 /// 2010).
@@ -102,15 +105,15 @@ class EnergyTank {
 
   /// Sets the value of a joule of the peer and ε. Energy received but not credited is lost, as its value is unknown.
   void revalue(std::size_t peer, double joule, double start) noexcept;
-  /// Discards received energy that the peer gave before it knew about the change.
+  /// Discards received energy that was given by the peer before it knew about the change.
   void forgo(std::size_t peer) noexcept;
 
   /// Once per period, after the interval was observed and before the force is limited.
   struct Period {
     double payable = 0;  ///< J, SharesAccount::payable
-    double loss = 0;     ///< J, ℓ of the requested force; +∞ is allowed
+    double loss = 0;     ///< J, ℓ of the requested force; can be +∞
     Duration elapsed{};  ///< length of the previous interval
-    bool giving = true;  ///< false: clutched or not engaged; received energy is still added
+    bool giving = true;  ///< false if clutched or not engaged; received energy is still added
   };
   /// J, ≥ 0. The limiter must apply `credit` first.
   struct Settlement {
@@ -134,7 +137,7 @@ class EnergyTank {
     std::uint64_t epoch = 0;
     std::uint64_t sequence = 0;
     double account = 0;   ///< J of the peer
-    double need = 0;      ///< J of the peer; 0: not known
+    double need = 0;      ///< J of the peer, or 0 if not known
     double heard = 0;     ///< R, J of the peer
     double credited = 0;  ///< part of R, J of the peer
     double given = 0;     ///< G, J of this port
@@ -154,7 +157,7 @@ class EnergyTank {
   std::uint64_t refused_ = 0;
 };
 
-/// Adds and gives energy, between `observe` and `limit`. `wanted` is the argument of `limit`.
+/// Adds and gives energy. This must be called between `observe` and `limit`. `wanted` is the argument of `limit`.
 template <int N, class Law>
 requires SharesAccount<Law, N>
 void share(EnergyTank& tank, Law& law, const Vec<N>& wanted, Duration elapsed, bool giving = true) noexcept {

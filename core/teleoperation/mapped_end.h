@@ -31,7 +31,7 @@ class MappedEnd {
   Vec3 coupled(const Vec3& vector) const noexcept {
     return leads() ? map_.coupled_at_leader(vector) : map_.coupled_at_follower(vector);
   }
-  /// Returns how many joules at this end are equal to one joule of the peer.
+  /// Returns the value of one joule of the peer in joules of this end.
   double joule() const noexcept { return leads() ? map_.leader_joule() : map_.follower_joule(); }
   /// Converts an energy in J from the leader to this end.
   double worth(double at_leader) const noexcept { return at_leader * (leads() ? 1 : map_.follower_joule()); }
@@ -58,7 +58,7 @@ class MappedEnd {
     const bool told = leader.position_scale > 0 && leader.force_scale > 0;
     rescale(told ? leader.position_scale : scene_.position_scale, told ? leader.force_scale : scene_.force_scale, told);
   }
-  /// Returns true if the state uses the same scales. A scale of 0 in a state is the scale of the scene.
+  /// Returns true if the state uses the same scales. If a scale in a state is 0, the scale of the scene is used.
   bool tells_ours(const PortState& peer) const noexcept {
     const auto same = [](double told, double scene, double used) { return (told > 0 ? told : scene) == used; };
     return same(peer.position_scale, scene_.position_scale, map_.position_scale()) &&

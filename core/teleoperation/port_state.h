@@ -15,12 +15,12 @@ namespace tendon {
 /// still.
 enum class PortPhase : std::uint8_t {
   kAlone = 1,  ///< no peer
-  kCoupled,    ///< receives states; waits for the operator to engage; no force
+  kCoupled,    ///< no force; states are received, and the operator can engage
   kAligning,   ///< absolute map: the leader is moved to the position of the follower
   kEngaged,    ///< the law computes the force
   kClutched,   ///< the leader moves freely and the follower holds its position
   kLost,       ///< the peer fell silent during an act; requires a new act
-  kFault,      ///< the device is not armed or has a fault; no force
+  kFault,      ///< no force, because the device is not armed or has a fault
 };
 
 /// Returns the name and what the phase waits for, such as "coupled: waiting for the leader to engage".
@@ -29,10 +29,10 @@ std::string_view to_string(PortPhase phase) noexcept;
 enum class PortRole : std::uint8_t { kLeader, kFollower };
 
 enum class CouplingMethod : std::uint8_t {
-  kPositionPosition = 1,  ///< springs and dampers at both ends, with an energy tank (PositionPosition)
+  kPositionPosition = 1,  ///< uses springs and dampers at both ends, with an energy tank (PositionPosition)
   kPositionForce,         ///< spring at the follower; the leader feels the measured contact force
   kWaves,                 ///< wave variables with playout (WavePort)
-  kSurface,               ///< as position-force, with a model of the surface at the leader
+  kSurface,               ///< similar to position-force, but uses a model of the surface at the leader
   kPassivity,             ///< velocity to the follower, force to the leader, with passivity control (PassivityLeader)
   kSetPosition,           ///< springs to delayed positions, stretched only as far as the account pays
   kRate,                  ///< the position of the leader sets the velocity of the follower
@@ -58,7 +58,7 @@ struct RateControl {
 struct PortSurface {
   Vec3 normal = Vec3::UnitX();  ///< out of the surface, norm 1 ± 0.001
   double offset = 0;            ///< m, the surface is at normal·u = offset
-  double stiffness = 0;         ///< N/m, ≥ 0; 0: no surface
+  double stiffness = 0;         ///< N/m, ≥ 0, or 0 if there is no surface
 };
 
 /// Returns true if positions of leader and follower correspond (Coupling::Absolute). The other methods use velocities.
@@ -102,35 +102,35 @@ struct PortGrip {
 };
 
 /// The state that one port of a coupling sends to the other in each period. States may be rare, late, duplicated or
-/// reordered: the highest `sequence` in the highest `epoch` is used. Vectors are in the base frame and scale of the
-/// SENDER; the receiver maps them (PoseMap).
+/// reordered: the highest `sequence` in the highest `epoch` is used. All vectors use the base frame and the scale of
+/// the SENDER, and must be mapped by the receiver (PoseMap).
 struct PortState {
   static constexpr Duration kMostRoundTrip = std::chrono::seconds(10);
 
   std::uint64_t epoch = 0;          ///< epoch of the sender, > 0; increases at each restart (EnergyTank)
   std::uint64_t sequence = 0;       ///< period of the sender in this epoch: 1, 2, …
-  std::uint64_t answers_epoch = 0;  ///< epoch of the receiver for `answers`, `given` and `taken`; 0: none
-  std::uint64_t answers = 0;        ///< sequence of the receiver's newest state in use; 0: none
-  Duration time{};                  ///< time of the sender; only differences are used; ± 2⁶⁰ ns
+  std::uint64_t answers_epoch = 0;  ///< epoch of the receiver for `answers`, `given` and `taken`, or 0 if there is none
+  std::uint64_t answers = 0;        ///< sequence of the receiver's newest state that was used, or 0 if there is none
+  Duration time{};                  ///< time of the sender, ± 2⁶⁰ ns; only used for differences
   Duration round_trip{};            ///< as measured by the sender, or 0; ≤ kMostRoundTrip
   PortPhase phase = PortPhase::kAlone;
-  std::uint64_t engagement = 0;          ///< number of the leader's act that the phase belongs to: 1, 2, …; 0: none
-  std::uint32_t buttons = 0;             ///< bit i: button i is pressed
+  std::uint64_t engagement = 0;          ///< number of the leader's act that the phase belongs to, or 0 if none
+  std::uint32_t buttons = 0;             ///< bit i is set if button i is pressed
   Vec3 position = Vec3::Zero();          ///< m, u: relative to the offset of the sender
   Vec3 velocity = Vec3::Zero();          ///< m/s, of u; zero if u is constant
   Vec3 force = Vec3::Zero();             ///< N, applied by the device to the hand
-  std::optional<Vec3> contact_force{};   ///< N, measured on the tool; empty: not measured
+  std::optional<Vec3> contact_force{};   ///< N, measured on the tool; empty if not measured
   double account = 0;                    ///< J, EnergyTankMessage::account
-  double need = 0;                       ///< J, EnergyTankMessage::need; 0: no tank
+  double need = 0;                       ///< J, EnergyTankMessage::need, or 0 if there is no tank
   double given = 0;                      ///< J, EnergyTankMessage::given
   double taken = 0;                      ///< J, EnergyTankMessage::taken
-  std::optional<PortSurface> surface{};  ///< last surface that the tool has touched; empty: none
+  std::optional<PortSurface> surface{};  ///< last surface that was touched by the tool, if any
   Vec3 wave_integral = Vec3::Zero();     ///< √W·s, WaveMessage::integral
   double wave_energy = 0;                ///< J, WaveMessage::energy; 0 … kMostTotal of EnergyTankMessage
-  std::optional<PortTurn> turn{};        ///< empty: orientations are not coupled
-  std::optional<PortGrip> grip{};        ///< empty: grippers are not coupled
+  std::optional<PortTurn> turn{};        ///< empty if orientations are not coupled
+  std::optional<PortGrip> grip{};        ///< empty if grippers are not coupled
   double energy_in = 0;                  ///< J, for passivity: total received in this epoch; bounds of wave_energy
-  std::optional<double> share{};         ///< 0 … 1, from a follower: share of this leader; empty: single leader
+  std::optional<double> share{};         ///< 0 … 1, share of this leader, from a follower; empty for one leader
   double position_scale = 0;  ///< 0.01 … 100, from a leader, for this and later states; 0 if it is that of the scene
   double force_scale = 0;
 };

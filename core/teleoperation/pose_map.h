@@ -10,15 +10,15 @@ namespace tendon {
 /// Maps values between the leader and the follower. For the displacement u of each handle from its offset:
 ///     u_f = s_x R u_l             F_l = s_f Rᵀ F_f
 ///     K_l = s_f s_x K_f           one joule of the leader is s_x/s_f joules of the follower
-/// `R` rotates the leader's base frame to the follower's. If an axis of the LEADER's frame is not coupled, its
+/// `R` rotates the leader's base frame to the follower's. If an axis of the frame of the LEADER is not coupled, its
 /// displacement is 0 at the other end and its force is 0 at the leader. The same is true for the corresponding column
 /// of R at the follower. Rotations and openings of grippers are not scaled. For the rotation r of each handle from its
 /// offset (TurnCoupling) and the opening g at the fingers (GripCoupling):
 ///     r_f = R r_l R⁻¹         ω_f = R ω_l       τ_l = (s_f/s_x) Rᵀ τ_f,  so K_l = (s_f/s_x) K_f for rotations
 ///     g_f = g_l                                 F_l = s_f F_f,           so K_l = s_f K_f for grippers
 /// With this scale of torques, τ·ω has the same factor s_x/s_f as F·ẋ, so force and torque can share an account.
-/// Grippers have their own account, in which one joule of the leader is 1/s_f joules of the follower. `axes`
-/// does not apply to rotations, which are coupled about all axes.
+/// Grippers have their own account, in which one joule of the leader is 1/s_f joules of the follower. For rotations,
+/// `axes` is not used because they are always coupled about all axes.
 /// Immutable. Thread-safe. Realtime-safe: yes, except the constructor.
 class PoseMap {
  public:
@@ -26,7 +26,7 @@ class PoseMap {
     double position_scale = 1;  ///< s_x, motion of the follower / motion of the leader; 0.01 … 100
     double force_scale = 1;     ///< s_f, force on the leader / force on the follower; 0.01 … 100
     Quat rotation{};            ///< R, a unit quaternion
-    std::array<bool, 3> axes = {true, true, true};  ///< axes of the leader's frame, at least one
+    std::array<bool, 3> axes = {true, true, true};  ///< axes of the leader's frame, at least one of them
   };
 
   /// Throws std::invalid_argument with the name of the field, its value and the expected value.
@@ -44,7 +44,7 @@ class PoseMap {
   /// √W, because half of the square of a wave is a power: √(s_x/s_f) R w_l and its inverse.
   Vec3 wave_to_follower(const Vec3& wave) const noexcept;
   Vec3 wave_to_leader(const Vec3& wave) const noexcept;
-  /// Returns the component along the coupled axes, in the frame of each end.
+  /// These functions return the component along the coupled axes, in the frame of the named end.
   Vec3 coupled_at_leader(const Vec3& vector) const noexcept;
   Vec3 coupled_at_follower(const Vec3& vector) const noexcept;
 

@@ -24,7 +24,7 @@ constexpr std::array kRunMode = {latency(1), divisor(2), k8N1, kNoFlowControl, f
 
 constexpr Duration kProbing = 300ms;   ///< firmware answers within 2 ms; libnifalcon tries about a hundred times
 constexpr Duration kGiveUpAfter = 2s;  ///< then reopens the device, because it may have been switched on
-/// 16 bytes in both directions take 0.2 ms at 1.5 Mbaud.
+/// Sending and receiving 16 bytes takes 0.2 ms at 1.5 Mbaud.
 constexpr usb::Dialogue::Patience kPatience{.most_under_way = 1, .answer = 5ms};
 
 /// Within 50 mm of the centre, 1 mm corresponds to at most 55 counts, so this is 3 m/s there and 5 m/s at the centre.
@@ -40,7 +40,7 @@ FalconDevice::FalconDevice(Config config, std::unique_ptr<usb::Pipe> pipe)
     : info_{.name = "Novint Falcon",
             .max_force = 8,  // from CHAI3D's device table; ±4096 counts are 16 N along z, 6 to 8 N across
             .position_resolution = 43e-6,
-            .force_resolution = 0.01,  // one count, within 50 mm of the centre
+            .force_resolution = 0.01,  // one count if the distance to the centre is less than 50 mm
             .joints = {"thigh 1", "thigh 2", "thigh 3"},
             .outputs = {{.name = "ring", .kind = OutputKind::kLamp}},
             .watchdog = Duration::zero()},

@@ -54,7 +54,7 @@ class FalconDevice final : public Device {
   Joints joints(const Motion& hand) const noexcept override;
   Vec3 apply(const Vec3& force) noexcept override;
   /// Output 0, "ring", consists of light-emitting diodes. Each of red, green and blue is on if its intensity is at
-  /// least half. The color is used while forces may be rendered. Pure red means not ready, so green replaces pure red
+  /// least half. The color is only used if forces can be rendered. Pure red means not ready, so green replaces pure red
   /// and off.
   void set_output(LocalTime now, std::uint32_t output, const OutputSetting& setting) noexcept override;
 
@@ -82,7 +82,7 @@ class FalconDevice final : public Device {
 
   falcon::ReplyParser parser_;
   std::optional<falcon::Reply> newest_{};
-  bool fresh_ = false;         ///< number of consecutive replies that are homed, or −number of those that are not
+  bool fresh_ = false;         ///< number of consecutive replies that are homed; negative if they are not homed
   int homed_replies_ = 0;      ///< consecutive replies, < 0 if not homed
   bool moved_origin_ = false;  ///< encoders have lost counts
   std::optional<falcon::Pose> pose_{};

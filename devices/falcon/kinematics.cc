@@ -41,7 +41,7 @@ const std::array<Mat3, 3> kLegs = {frame_of_leg((90 + 15) * kDegree), frame_of_l
 
 constexpr int kMostSteps = 25;
 constexpr int kMostHalvings = 12;
-constexpr double kLongestStep = 0.015;  // m; the linear model is poor for longer steps
+constexpr double kLongestStep = 0.015;  // m; if a step is longer, the linear model is not accurate
 constexpr double kClose = 1e-12;        // m; the last step
 
 }  // namespace

@@ -16,7 +16,7 @@ namespace tendon {
 /// Plays a recorded motion with its original positions and time stamps, so that engines and the whole loop can be run
 /// repeatedly with the same motion. There is no force: `apply` always returns zero.
 ///
-/// The first `read` returns the first sample. Sample i is due tᵢ − t₀ later and has this time. There is no
+/// The first `read` returns the first sample. Sample i is returned tᵢ − t₀ later, using this time. There is no
 /// interpolation: `read` returns a sample, or nullopt if no new sample is due. A sample that is due can be returned by
 /// this `read` or the next one. A loop as fast as the recording therefore returns all samples, even with jitter. A
 /// slower loop returns the newest sample that was already due in the previous `read`. The times always increase.
@@ -27,11 +27,12 @@ class ReplayDevice final : public Device {
     Duration at{};  ///< only differences matter
     Vec3 position = Vec3::Zero();
   };
-  /// kHold: keeps the last position. kRepeat: starts again one mean interval later, with a jump if the ends differ.
+  /// kHold: keeps the last position. kRepeat: starts again after the mean interval, and jumps if the ends are
+  /// different.
   using AtEnd = ScriptedMotion::Recorded::AtEnd;
 
   struct Config {
-    std::vector<Sample> samples{};  ///< 2 or more, strictly increasing, 10⁹ s at most
+    std::vector<Sample> samples{};  ///< at least 2, strictly increasing, up to 10⁹ s
     AtEnd at_end = AtEnd::kHold;
     double position_resolution = 0;  ///< m; 0 = exact
   };

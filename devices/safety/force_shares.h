@@ -7,10 +7,10 @@
 
 namespace tendon {
 
-// The parts of the safety layer that reduce a force. Each part returns a factor s, 0 ≤ s ≤ 1, for all components, so it
-// cannot increase or rotate a force. The force also stays within the bounds of the energy limiter, both on the norm and
-// on each axis. Torques have a separate limit and growth limit in N·m, and a grip force is used as a vector with one
-// component. `field` is used in error messages.
+// These parts of the safety layer are used to reduce a force. Each part returns a factor s, 0 ≤ s ≤ 1, for all
+// components, so that the force cannot be increased or rotated. This also ensures that the bounds of the energy limiter
+// are not exceeded, both for the norm and for each axis. Torques have a separate limit and growth limit in N·m, and a
+// grip force is used as a vector with one component. `field` is used in error messages.
 // Thread-safe: no. Realtime-safe: all except the constructors, which throw std::invalid_argument naming the field.
 
 /// Limits the norm of a force: s = max / ‖F‖. Clipping each component would rotate the force, and integer overflow
@@ -28,12 +28,12 @@ class ForceLimit {
   Config config_;
 };
 
-/// Limits how fast a force grows in its own direction:
+/// Limits the rate at which a force can be increased in its own direction:
 ///
 ///     ‖s F‖ ≤ (F_before · F/‖F‖)₊ + rate · T
-/// Forces may decrease at once, and reversed forces start at zero. If every change was limited, a force would continue
-/// after it is no longer requested. Source: HD_EXCEEDED_MAX_FORCE_IMPULSE (0x0202) of OpenHaptics.
-/// no longer requested. Source: HD_EXCEEDED_MAX_FORCE_IMPULSE (0x0202) of OpenHaptics.
+/// Forces may decrease at once, and reversed forces start at zero. If all changes were limited, the force would be
+/// applied even if it is no longer requested. Source: HD_EXCEEDED_MAX_FORCE_IMPULSE (0x0202) of OpenHaptics. no longer
+/// requested. Source: HD_EXCEEDED_MAX_FORCE_IMPULSE (0x0202) of OpenHaptics.
 class GrowthLimit {
  public:
   struct Config {
@@ -75,7 +75,7 @@ struct RampOut {
 /// rises again with the same time constant while θ < 0.5. For θ ≥ 1 it is `continuous` immediately, so θ never exceeds
 /// 1 + (T/τ)(peak/continuous)².
 ///
-/// There is one temperature for all motors, computed from the force at the handle. It is correct if the motors share
+/// A single temperature is computed for all motors, using the force at the handle. It is correct if the motors share
 /// the force evenly, and too low for a motor that carries more. The device must limit the torque of each joint itself.
 /// Source: PreventWarmMotors of OpenHaptics (0.7, 0.5, × 0.999 each ms). Touch: peak 3.3 N, continuous 0.88 N.
 class HeatLimit {
@@ -103,13 +103,13 @@ class HeatLimit {
 ///
 ///     s = 1 − (1 − w) (F·n/‖F‖)₊
 ///
-/// so a force that pulls the hand back is not reduced. Far out, devices are close to their stops and singularities,
-/// where a small position error causes a large force error.
+/// so that forces are not reduced if they pull the hand back. Far out, devices are close to their stops and
+/// singularities, where a small position error causes a large force error.
 ///
-/// The workspace itself neither pushes nor damps. The energy limiter would not see the force of such a wall, which is
-/// passive only while b > K T/2 + |B| (Colgate and Schenkel, J. Robotic Systems 14(1), 1997). With b = 1 N·s/m at 1
-/// kHz, that allows a wall of 2 N/mm without damping or a damper of 1 N·s/m without a spring, and the limiter could no
-/// longer rely on that b. An engine can render such a wall through the limiter.
+/// The workspace does not apply a force and does not add damping. The force of such a wall would not be visible to the
+/// energy limiter, and it would only be passive if b > K T/2 + |B| (Colgate and Schenkel, J. Robotic Systems 14(1),
+/// 1997). With b = 1 N·s/m at 1 kHz, that allows a wall of 2 N/mm without damping or a damper of 1 N·s/m without a
+/// spring, and the limiter could no longer rely on that b. An engine can render such a wall through the limiter.
 class Workspace {
  public:
   struct Sphere {

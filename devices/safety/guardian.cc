@@ -33,7 +33,7 @@ namespace {
 constexpr int kTries = 5;
 constexpr unsigned kTryTime_ms = 10;
 
-/// Sent by the server with a descriptor, or without one to unregister a device.
+/// Sent by the server with a file descriptor. If there is no descriptor, the device is unregistered.
 struct Order {
   std::size_t device;
   ZeroPacket zero;
@@ -170,7 +170,7 @@ constexpr char kStandsGuard = 'g';    ///< sent when the guardian is sure to rec
     if (signalfd_siginfo info{}; told[1].revents != 0 && read(parent.fd, &info, sizeof info) > 0) {
       while (take_order(socket, charges, MSG_DONTWAIT)) {
       }
-      // Other threads may still send a last command, so the packets are sent again when all are dead.
+      // The packets are sent again after all threads have ended, because they may still have sent a last command.
       end_forces(charges);
     } else if (told[0].revents != 0) {
       server_lives = take_order(socket, charges);

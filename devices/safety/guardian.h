@@ -49,8 +49,8 @@ class ZeroPacket {
 /// thread may have sent another command, and exits. It also does so after a clean exit, to test this.
 ///
 /// Every haptic step increments the Heartbeat of its device. If a force is applied and the heartbeat stops for
-/// Heartbeat::kStill, the guardian writes the zero packet twice, in case another thread has just sent a force. It
-/// checks every 2 ms, so the first packet is written 20 to 24 ms after the last step.
+/// Heartbeat::kStill, the guardian writes the zero packet twice, in case another thread has just sent a force. This is
+/// checked every 2 ms, so that the first packet is written 20 to 24 ms after the last step.
 ///
 /// The guardian blocks all signals and uses its own session, so signals to the process group of the server do not
 /// affect it. It is also killed by SIGKILL (sent by systemd to all processes of a unit after TimeoutStopSec) or a power
@@ -68,7 +68,7 @@ class Guardian {
   /// fork. It should set the priority, which is inherited by the guardian and determines its delay on a busy machine.
   /// Throws std::system_error on failure.
   explicit Guardian(const std::function<void()>& on_start = {});
-  ~Guardian();  ///< waits until the packets are written
+  ~Guardian();  ///< waits until the packets have been written
   Guardian(const Guardian&) = delete;
   Guardian& operator=(const Guardian&) = delete;
 
@@ -76,7 +76,7 @@ class Guardian {
   bool guard(std::size_t device, int fd, const ZeroPacket& zero) noexcept;
   bool forget(std::size_t device) noexcept;  ///< must be called when `device` is closed
 
-  /// For the thread that steps `device` (below kDevices).
+  /// Must only be used by the thread that steps `device` (less than kDevices).
   Heartbeat& heartbeat(std::size_t device) noexcept { return hearts_[device]; }
 
   pid_t pid() const noexcept { return pid_; }

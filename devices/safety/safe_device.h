@@ -68,7 +68,8 @@ std::string_view to_string(SafetyFault fault) noexcept;
 ///
 /// **Disarming** by the operator is not a fault either: the device returns to Homed, without a force, and a pending
 /// request is cancelled. It cannot be armed by `kStart` or the dead man's button until `arm` is called; the button must
-/// be pressed again after that. A fault remains a fault, and a watchdog that is ramping the force down becomes one.
+/// be pressed again after that. A fault is not cleared, and if a watchdog is ramping the force down, this becomes a
+/// fault.
 ///
 /// If the process hangs or dies, the guardian (guardian.h) or the device's watchdog ends the force. A guardian adds two
 /// faults, both set by the next `read`: kCommandSilent, if `apply` is not called for Heartbeat::kStill, and
@@ -192,7 +193,7 @@ class SafeDevice final : public Device {
   std::optional<LocalTime> now_;
   Duration passed_{};
   std::optional<PositionSample> last_;
-  /// When and where the handle stopped. Empty if it is not known to be at rest.
+  /// The time and the position when the handle was stopped. Empty if it is not known to be at rest.
   std::optional<PositionSample> rest_;
   LocalTime heard_at_{};
   LocalTime applied_at_{};

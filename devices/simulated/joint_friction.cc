@@ -46,8 +46,9 @@ Stiction sticking(const Turns& turns, const Mat3& coupling, const Vec3& free, co
   return stiction;
 }
 
-/// Returns the unique impulse with |impulseᵢ| ≤ mostᵢ that equals mostᵢ, opposite to the velocity, at all moving
-/// joints. Nonzero entries of `known` are given. Uses the best of 27 cases, because of rounding.
+/// Returns the unique impulse with |impulseᵢ| ≤ mostᵢ. If joint i moves, its impulse is opposite to the velocity and
+/// |impulseᵢ| = mostᵢ. The nonzero entries of `known` are used as given. Because of rounding, this selects the best of
+/// 27 cases.
 Stiction stiction_of(const Mat3& coupling, const Vec3& free, const Vec3& most, const Turns& known = {}) noexcept {
   Stiction best;
   const auto holds = [&](Turns turns) {

@@ -16,8 +16,8 @@ constexpr std::string_view kDiolaiti = "Diolaiti et al., IEEE T-RO 22(2), 2006, 
 constexpr std::string_view kPhantomSheet = "SensAble PHANToM Premium 1.0/1.5 data sheet";
 constexpr std::string_view kTouchSheet = "Geomagic/3D Systems Touch data sheet";
 
-/// Longer than the delays of a healthy loop (0.2 ms at p99 without realtime priority, periods of up to 2 ms in our own
-/// tests). A hand at 1 m/s moves 5 mm before the force is ended.
+/// This is longer than the delays in a loop that works (0.2 ms at p99 without realtime priority, periods of up to 2 ms
+/// in our own tests). If the hand moves at 1 m/s, the force is ended after 5 mm.
 constexpr KnownNumber kAssumedWatchdog = {0.005, kAssumed, "5 haptic periods at 1 kHz; not documented"};
 
 constexpr std::array kProfiles = {

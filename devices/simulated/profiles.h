@@ -11,10 +11,10 @@
 
 namespace tendon {
 
-/// How a number is known, starting with the most reliable.
+/// The source of a number, starting with the most reliable one.
 enum class Provenance {
   kMeasured,  ///< measured by us on a real device
-  kQuoted,    ///< read in the source, or computed from it
+  kQuoted,    ///< read in the specified source, or computed using its values
   kRecalled,  ///< quoted from memory; must be checked
   kAssumed,   ///< for the given reason
 };
@@ -59,7 +59,8 @@ struct KnownRange {
 };
 
 /// Parameters of a finger, hand or arm. They vary between people and increase with the grip force. A spring, a damper
-/// and a mass are the simplest model that differs from a wall. It is inaccurate above about 50 Hz and for a light grip.
+/// and a mass are used because this is the simplest model that is different from a wall. It is not accurate above about
+/// 50 Hz or if the grip is light.
 struct OperatorProfile {
   std::string_view name;
   KnownRange stiffness;  ///< N/m

@@ -27,8 +27,8 @@ class ScriptedMotion {
     Vec3 direction = Vec3::UnitX();  ///< normalized automatically
   };
 
-  /// Moves from `from` to `to` at constant speed and stays there. With `hold`, it waits at each end for this time and
-  /// moves back and forth. The velocity is discontinuous. If both points are equal, the hand does not move.
+  /// Moves to `to` at a constant speed, starting at `from`. If `hold` is set, the hand moves back and forth, and waits
+  /// for this time at each end. The velocity is discontinuous. If both points are equal, the hand does not move.
   struct RampHold {
     Vec3 from = Vec3::Zero();
     Vec3 to = Vec3::Zero();
@@ -46,8 +46,9 @@ class ScriptedMotion {
   };
 
   /// A recording: position = origin + direction · x(t), using cubic Hermite interpolation with Fritsch and Butland's
-  /// slopes (SIAM J. Sci. Stat. Comput. 5(2):300, 1984). The velocity is continuous, also when repeating, because the
-  /// slope at both ends is zero. Between two samples, x stays in their range, so quantized recordings do not overshoot.
+  /// slopes (SIAM J. Sci. Stat. Comput. 5(2):300, 1984). The velocity is continuous, even if the motion is repeated,
+  /// because the slope is zero at both ends. Between two samples, x does not leave the range of their values, so that
+  /// quantized recordings do not overshoot.
   struct Recorded {
     struct Sample {
       double t;  ///< s, strictly increasing
@@ -55,7 +56,7 @@ class ScriptedMotion {
     };
     enum class AtEnd {
       kHold,
-      kRepeat,  ///< the position jumps if the ends differ
+      kRepeat,  ///< the position jumps if the ends are different
     };
     std::vector<Sample> samples;  ///< 2 or more
     Vec3 origin = Vec3::Zero();

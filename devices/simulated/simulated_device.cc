@@ -253,7 +253,7 @@ void SimulatedDevice::live(Duration gap) noexcept {
   integrate(gap);
 }
 
-/// Ends the force if the watchdog expires, and returns the remaining time.
+/// Sets the force to zero if the watchdog expires. Returns the remaining time.
 Duration SimulatedDevice::live_with_watchdog(Duration gap) noexcept {
   if (gap <= *until_watchdog_) {
     *until_watchdog_ -= gap;

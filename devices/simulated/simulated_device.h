@@ -41,9 +41,9 @@ namespace tendon {
 /// decreases from about 2 m/T to 2 (m − m_h)/T, and further if the mode is close to the loop rate. The maximum
 /// stiffness of a stable sampled spring does not change, because the encoder and the motors are on the same side.
 ///
-/// **Time.** The first `read` defines time 0. Each later `read` integrates up to `now`, using the force of the last
-/// `apply`. Encoder and force change at the same time, that of the last `read`. If `now` decreases, it is ignored. In
-/// longer gaps, only kMaxGap is integrated.
+/// **Time.** Time 0 is defined by the first call of `read`. Each later `read` integrates up to `now`, using the force
+/// of the last `apply`. The encoder and the force are updated at the same time, when `read` is called. If `now`
+/// decreases, it is ignored. In longer gaps, only kMaxGap is integrated.
 ///
 /// **Transport delay.** With `sample_delay` d_s, `read(now)` returns the sample at now − d_s, and integrates (and
 /// updates `truth()`) up to this time only. With `force_delay` d_f, forces reach the motors later, and the initial
@@ -86,7 +86,7 @@ class SimulatedDevice final : public Device {
   struct Config {
     std::string name = "simulated";
     double mass = 0;                     ///< kg, apparent mass at the handle, > 0
-    std::optional<Vec3> start_position;  ///< m; default: that of the hand, or 0
+    std::optional<Vec3> start_position;  ///< m; default: the position of the hand, or 0
     Vec3 start_velocity = Vec3::Zero();  ///< m/s
 
     /// Optional effects. The energy balance remains valid unless noted otherwise.
@@ -118,7 +118,7 @@ class SimulatedDevice final : public Device {
     std::optional<OperatorHand::Config> hand;
     /// When the hand permanently releases the handle, relative to the first `read`. Its mass is also removed.
     std::optional<Duration> lets_go_after{};
-    std::optional<Duration> button_after;  ///< since the first `read`, for holding button 0
+    std::optional<Duration> button_after;  ///< button 0 is held from this time on, relative to the first `read`
     struct Press {
       std::uint32_t button = 0;  ///< bit in PositionSample::buttons, below 32
       Duration from{};           ///< since the first `read`, ≥ 0
@@ -151,10 +151,10 @@ class SimulatedDevice final : public Device {
     bool watchdog_fired = false;
   };
 
-  /// Longer than any pause of a working loop. Limits the cost of a `read` to 200 000 substeps, about 10 ms.
+  /// This is longer than the pauses of a loop that works. Limits the cost of a `read` to 200 000 substeps, about 10 ms.
   static constexpr Duration kMaxGap = std::chrono::seconds(10);
 
-  /// Fifty times the delay of a bus. Limits the number of forces that are stored.
+  /// This is fifty times the delay of a bus. It limits the number of forces that are stored.
   static constexpr Duration kMostDelay = std::chrono::milliseconds(100);
 
   /// Throws std::invalid_argument if a value is out of range, naming the field.

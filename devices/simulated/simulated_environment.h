@@ -54,7 +54,7 @@ class SimulatedEnvironment {
   /// Subtracts friction from the half-step momentum p (N·s) in the substep of `push`. Returns its mean force in N.
   Vec3 rub(Vec3& momentum, double h) noexcept;
 
-  void stop(Vec3& velocity) const noexcept;  ///< stops motion that is held by friction
+  void stop(Vec3& velocity) const noexcept;  ///< stops the motion if it is held by friction
 
  private:
   Config config_;

@@ -32,7 +32,7 @@ class SimulatedGripper {
     double open = 0;                           ///< rad, fully open, > 0
     double arm = 0;                            ///< m/rad, > 0
     double mass = 0;                           ///< kg, at the fingers, > 0
-    std::optional<double> start{};             ///< rad; default: that of the hand, or 0
+    std::optional<double> start{};             ///< rad; default: the opening of the hand, or 0
     std::optional<double> viscous_friction{};  ///< b, N·s/m, > 0
     std::optional<double> coulomb_friction{};  ///< f_c, N, > 0
     std::optional<double> max_force{};         ///< N, > 0; empty if there is no motor
@@ -44,7 +44,7 @@ class SimulatedGripper {
     double position = 0;        ///< m, x
     double velocity = 0;        ///< m/s
     double device_force = 0;    ///< N
-    double hand_force = 0;      ///< N, mean over the last substep
+    double hand_force = 0;      ///< N, mean during the last substep
     double hand_work = 0;       ///< J, ∫ F_hand dx since the start
     double kinetic_energy = 0;  ///< J
   };

@@ -21,9 +21,9 @@ namespace tendon {
 ///
 ///     τ_hand = K θ + c (ω_s − ω),      s = rotation_by(θ) · q,      |θ| ≤ π
 ///
-/// The spring is linear in θ, with the energy K θ²/2, so its stiffness is the same for all angles. It is discontinuous
-/// at 180°, which no hand reaches. The script is a rotation vector φ(t), with s = rotation_by(φ) and its angular
-/// velocity ω_s.
+/// The spring is linear in θ and has the energy K θ²/2, so that its stiffness does not depend on the angle. It is
+/// discontinuous at 180°, but a hand does not reach this angle. The script is a rotation vector φ(t), with s =
+/// rotation_by(φ) and its angular velocity ω_s.
 ///
 /// **Integration** as in SimulatedDevice. With the mean velocity ω̄ of a substep h, the following is satisfied exactly:
 ///
@@ -47,7 +47,7 @@ class SimulatedRotation {
 
   struct Config {
     double inertia = 0;                          ///< J, kg·m², > 0
-    std::optional<Vec3> start{};                 ///< rotation vector, rad; default: that of the hand, or 0
+    std::optional<Vec3> start{};                 ///< rotation vector, rad; default: the rotation of the hand, or 0
     Vec3 start_angular_velocity = Vec3::Zero();  ///< rad/s
     std::optional<double> viscous_friction{};    ///< b, N·m·s/rad, > 0
     std::optional<double> coulomb_friction{};    ///< τ_c, N·m, > 0

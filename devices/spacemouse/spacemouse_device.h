@@ -16,7 +16,8 @@
 
 namespace tendon {
 
-/// A 3Dconnexion SpaceMouse as a leader without force. Its cap only moves by millimetres, so it controls the velocity:
+/// A 3Dconnexion SpaceMouse as a leader without force. The cap is used to control the velocity because it can only be
+/// moved by some millimetres:
 ///
 ///     d = (X, −Z, Y) / 350, no longer than 1;     v = speed · (|d| − dead_band) / (1 − dead_band) · d/|d|, or 0
 ///     within; p ← p + v (now − before), each component within ±reach

@@ -42,7 +42,7 @@ bool Dialogue::may_send(bool exerts) const noexcept {
 
 bool Dialogue::send(std::span<const std::uint8_t> request, bool exerts) noexcept {
   if (!pipe_->write(request)) return false;
-  // Not counted while the device is starting.
+  // This is not counted if the device is still starting.
   if (late() && answered_) counters_.add(DeviceCount::kUnanswered);
   if (late() || under_way_ == 0) {
     asked_ = now_;

@@ -23,7 +23,8 @@ namespace tendon::usb {
 ///     may_send(…), send(…)             the next request
 ///
 /// **Requests.** Up to `Patience::most_under_way` requests can be pending, and an answer completes all of them. After
-/// `Patience::answer`, they are considered lost and another one can be sent. Requests that end a force never wait.
+/// `Patience::answer`, they are considered lost and another one can be sent. Requests are sent immediately if they end
+/// a force.
 ///
 /// **Force.** The device is assumed to render the last command until its own watchdog expires.
 /// Thread-safe: `counts` only. Realtime-safe: all except the constructor.
@@ -34,17 +35,17 @@ class Dialogue {
     Duration answer = std::chrono::milliseconds(5);
   };
 
-  /// Ten periods of 1 kHz without a plausible answer, after which the force is zero.
+  /// If there is no plausible answer for this time (ten periods of 1 kHz), the force is set to zero.
   static constexpr Duration kQuiet = std::chrono::milliseconds(10);
-  /// After this time without an answer, the device is considered unplugged; without a plausible answer, its encoders
-  /// have lost counts. If the loop itself was suspended, it first receives the pending answers.
+  /// If there is no answer for this time, the device is considered to be unplugged. If there is no plausible answer,
+  /// its encoders have lost counts. If the loop itself was suspended, it first receives the pending answers.
   static constexpr Duration kLost = std::chrono::milliseconds(100);
   static constexpr int kSure = 10;  ///< consecutive answers that it is homed; a single byte may be corrupted
 
   /// `watchdog` is the timeout of the device's own watchdog, or zero.
   explicit Dialogue(std::unique_ptr<Pipe> pipe, Duration watchdog = Duration::zero());
 
-  bool begin(LocalTime now) noexcept;  ///< of a turn; true if the connection has changed (see `connected`)
+  bool begin(LocalTime now) noexcept;  ///< starts a turn; returns true if the connection has changed (see `connected`)
   bool connected() const noexcept { return connection_ != 0; }
   LocalTime now() const noexcept { return now_; }
 

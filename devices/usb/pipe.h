@@ -25,9 +25,9 @@ inline constexpr std::size_t kPacketSize = 64;  ///< full-speed bulk and interru
 
 /// A USB device with one endpoint in each direction: libusb (`usb.h`) or a model. Drivers use it through `Dialogue`.
 ///
-/// If a transfer fails, for example because the device was unplugged, the connection is closed. When the device is
+/// If a transfer fails, for example because the device was unplugged, the connection is closed. If the device is
 /// plugged in again, a new connection is opened. There are no other errors.
-/// Thread-safe: no; used by one thread. Realtime-safe: every function. Never blocks.
+/// Thread-safe: no. It must be used by a single thread. Realtime-safe: every function. Never blocks.
 class Pipe {
  public:
   virtual ~Pipe() = default;

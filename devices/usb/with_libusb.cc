@@ -207,7 +207,7 @@ class LibusbPipe final : public Pipe {
 };
 
 LibusbPipe::LibusbPipe(const PipeConfig& config) : config_(config) {
-  // Works without /dev/bus/usb, because the node is opened elsewhere.
+  // This can be used without /dev/bus/usb because the node is opened elsewhere.
   if (config_.node) libusb().set_option(nullptr, LIBUSB_OPTION_NO_DEVICE_DISCOVERY);
   context_ = make_context();
   bell_ = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
@@ -300,7 +300,7 @@ void LibusbPipe::tell(const std::string& why) {
 
 int LibusbPipe::open_node() {
   if (config_.node) return config_.node();
-  // A new context for each attempt. Existing ones find new devices by udevd, which containers may lack.
+  // Use a new context for each attempt. Existing ones find new devices by udevd, which containers may lack.
   libusb_context* looking = nullptr;
   if (libusb().init(&looking) != LIBUSB_SUCCESS) return -1;
   const Context look(looking);

@@ -28,7 +28,7 @@
 /// All functions are thread-safe and realtime-safe.
 namespace tendon::woodenhaptics {
 
-using Counts = std::array<std::int32_t, 3>;  ///< of the encoders, without the overflow of 16 bits
+using Counts = std::array<std::int32_t, 3>;  ///< counts of the encoders, without the overflow of 16 bits
 
 using Currents = std::array<std::int16_t, 3>;  ///< mA, for each motor
 

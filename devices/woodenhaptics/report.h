@@ -19,7 +19,7 @@
 ///     to the host     counters a b c d e f, info
 ///         info        1 from when the calibrate button is pressed until command 1; otherwise 0
 ///
-/// The firmware ignores reports of another length.
+/// Reports with a different length are ignored by the firmware.
 namespace tendon::woodenhaptics {
 
 inline constexpr std::size_t kReportBytes = 14;
@@ -38,7 +38,8 @@ struct Report {
 /// Returns nullopt if the length or `info` is invalid. Thread-safe, realtime-safe.
 std::optional<Report> parse(std::span<const std::uint8_t> bytes) noexcept;
 
-/// The switch at the tip of some arms. The host library compares counter d with 5000; the firmware never sets it.
+/// The switch at the tip of some arms. The host library compares counter d with 5000, but it is never set by the
+/// firmware.
 inline bool switch_is_closed(const Report& report) noexcept { return report.counters[3] > 5000; }
 
 }  // namespace tendon::woodenhaptics

@@ -25,9 +25,9 @@ using woodenhaptics::Report;
 
 constexpr Currents kNoCurrent{};
 
-/// After power-on, the lamps flash for a second. The board then accepts one report, and a second one would time out.
+/// After power-on, the lamps flash for a second. The board only accepts one report then. A second one would time out.
 constexpr usb::Dialogue::Patience kWhileItStarts{.most_under_way = 1, .answer = 1500ms};
-/// An answer takes 2 ms, a frame in each direction.
+/// An answer takes 2 ms, because a frame is required for each direction.
 constexpr usb::Dialogue::Patience kPatience{.most_under_way = 2, .answer = 5ms};
 
 /// If the board still requests calibration, command 1 was replaced by a newer report.
@@ -143,7 +143,7 @@ bool WoodenHapticsDevice::plausible(const Counts& steps) const noexcept {
 }
 
 void WoodenHapticsDevice::believe(const Report& report) noexcept {
-  // Before the first request, reports may be old.
+  // The reports may be old if no request was sent yet.
   if (state() == State::kOpening && !dialogue_.awaits_answer()) return;
   const Counts steps = steps_to(report);
   const bool in_step = plausible(steps);

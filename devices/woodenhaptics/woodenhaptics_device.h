@@ -33,7 +33,7 @@ namespace tendon {
 /// nonzero in kHomed, while there are plausible reports (at least every 10 ms), which a hand could cause.
 ///
 /// **Watchdog.** The firmware disables the amplifiers 0.5 s after the last valid report, starting with the first one.
-/// `apply` assumes that older currents have ended.
+/// It is assumed by `apply` that older currents have ended.
 ///
 /// Positions are relative to the middle of the workspace, in the frame of kinematics.h. Samples use the time of `read`,
 /// but are about 1 ms older. Button 0 is the switch at the tip.

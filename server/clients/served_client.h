@@ -59,7 +59,7 @@ struct Slot {
   std::uint32_t device = 0;
   std::uint32_t channel = 0;
   Role role = Role::kObserver;
-  bool by_name = false;  ///< it can wait for the lease
+  bool by_name = false;  ///< claimed by its name, so that it can wait for the lease
 };
 
 struct Subscription {

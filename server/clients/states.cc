@@ -55,7 +55,7 @@ bool publish_state(ServedClient& client, Subscription& subscription, const Devic
   // The client uses these rounded values for its prediction.
   if (client.has<kFeatureStateColumns>() && fits_columns(told)) round_to_columns(told);
   if (subscription.deadband && !subscription.deadband->passes(told)) {
-    subscription.pressed = 0;  // do not hide the next release
+    subscription.pressed = 0;  // otherwise, the next release would not be visible
     return true;
   }
   subscription.last_state = state.tick;

@@ -13,11 +13,11 @@
 
 namespace tendon {
 
-/// Couples the grippers of two handles. The phases, ramp and fade are those of the Coupling that owns this object. A
-/// gripper is a separate port (PortGrip) with its own account and tank. There are springs at both ends for all methods,
-/// because both openings are measured.
+/// Couples the grippers of two handles. This uses the phases, the ramp and the fade of the Coupling that owns this
+/// object. A gripper is a separate port (PortGrip) with its own account and tank. There are springs at both ends for
+/// all methods, because both openings are measured.
 ///
-/// **Openings.** g = arm · opening, m at the fingers, > 0 open. Openings have no scale and no offset. The coupled
+/// **Openings.** g = arm · opening, m at the fingers, > 0 open. Openings are not scaled and have no offset. The coupled
 /// quantity is w, the opening that the leader requests and sends instead of g:
 ///     not engaged                  w = g_l
 ///     start of an act              w = g_f + F_f/K_f: the current target of the follower's gripper
@@ -51,7 +51,7 @@ class GripCoupling {
     double stiffness = 0;  ///< N/m at the fingers, > 0; the maximum of K at the leader
     double damping = 0;    ///< N·s/m, ≥ 0; B at the leader, which must not be 0 if `adapts`
     double speed = 0.05;   ///< m/s, > 0
-    double arm = 0;        ///< m/rad, > 0; the gripper at this end
+    double arm = 0;        ///< m/rad, > 0; for the gripper at this end
     double max_force = std::numeric_limits<double>::infinity();  ///< N, of this end; > 0
   };
   struct End {
@@ -105,7 +105,7 @@ class GripCoupling {
 
   PortGrip newest_;
   bool heard_ = false;
-  bool came_ = false;    ///< a state was received since the last period
+  bool came_ = false;    ///< true if a state was received since the last period
   bool begins_ = false;  ///< an act starts in this period
   double asked_ = 0;     ///< m, w or z
   bool joined_ = false;  ///< `asked_` has reached its target

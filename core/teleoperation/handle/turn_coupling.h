@@ -12,7 +12,7 @@
 
 namespace tendon {
 
-/// Couples the orientations of two handles. The phases, ramp, fade and account are those of the Coupling.
+/// Couples the orientations of two handles. This uses the phases, the ramp, the fade and the account of the Coupling.
 ///
 /// **Rotations.** Each end has an offset q₀ and sends its rotation r = q q₀⁻¹ in its base axes, which corresponds to u
 /// for positions. If an end is not live, its r is constant and q₀ follows the handle. When the follower becomes live,
@@ -25,11 +25,11 @@ namespace tendon {
 ///     τ = −2 K sgn(w) v − B ω,   ‖τ‖ ≤ max_torque                  N·m, on the hand at this end, base axes
 ///     K = min(stiffness, 2 B/T_loop)                              with `adapts` (QuietStiffness)
 /// The spring is the gradient of U = 4 K (1 − |w|), which is ½ K θ² for a small angle θ. Proof: a rotation dθ of the
-/// handle (base axes) changes w by −½ v·dθ, so dU = −4 K sgn(w) dw = 2 K sgn(w) v·dθ = −τ·dθ. U only depends on the
-/// orientation and is equal for q and −q, so a closed path in SO(3) generates no energy while y is constant. The norm
-/// of the torque is 2 K sin(θ/2), which increases up to 180° (that of 2 K vᵀv decreases beyond 90°). It would be
-/// discontinuous at 180°, so the coupling disengages at 150° (`within_reach`). y is extrapolated by ω e if the newest
-/// state is late by e, as in PositionPosition.
+/// handle (base axes) changes w by −½ v·dθ, so dU = −4 K sgn(w) dw = 2 K sgn(w) v·dθ = −τ·dθ. Since U only depends on
+/// the orientation and is the same for q and −q, closed paths in SO(3) do not generate energy if y is constant. The
+/// norm of the torque is 2 K sin(θ/2), which increases up to 180°. (For 2 K vᵀv, it would decrease for angles above
+/// 90°.) It would be discontinuous at 180°, so the coupling disengages at 150° (`within_reach`). y is extrapolated by ω
+/// e if the newest state is late by e, as in PositionPosition.
 ///
 /// **Account.** Force and torque share one account. With x_f = s_x x_l and θ_f = θ_l, one joule of the leader must be
 /// s_x/s_f joules of the follower for both, so
@@ -41,7 +41,7 @@ namespace tendon {
 /// are the same (waves do not transfer rotations). With all other methods the torque of the leader is −B ω, because the
 /// torque of the environment is not measured, and the K of the follower does not adapt.
 ///
-/// A robot that is not live holds its last orientation with the full K. If it is rotated by more than 150°, it holds
+/// If a robot is not live, it holds its last orientation using the full K. If it is rotated by more than 150°, it holds
 /// the new orientation. Quaternions must have the norm 1 ± 0.001.
 /// Thread-safe: no. Realtime-safe: yes, except the constructor.
 class TurnCoupling {

@@ -14,7 +14,7 @@ namespace tendon {
 /// The inputs of a law. The references are only valid during the call.
 struct LawPeriod {
   const MappedEnd& frame;
-  const PortState& peer;  ///< newest state; there is none if its sequence is 0
+  const PortState& peer;  ///< newest state, if its sequence is not 0
   Vec3 u;                 ///< m, displacement of this end
   bool live = false;
   bool clutched = false;
@@ -27,7 +27,7 @@ struct LawPeriod {
 /// The previous interval. All vectors are along the coupled axes.
 struct LawInterval {
   Interval<3> interval;
-  bool was_live = false;       ///< this end was live in the interval
+  bool was_live = false;       ///< true if this end was live in the interval
   Vec3 wanted = Vec3::Zero();  ///< N, as requested by the coupling
   double payable = 0;          ///< J, in the account
   double reserve = 0;          ///< J, the reserve of the limiter for this force

@@ -60,7 +60,7 @@ Vec<N> SurfaceEstimator<N>::find_normal() const noexcept {
     const Mat<N> cross = compliance * moments_.both;
     const Mat<N> surface = moments_.places + cross + cross.transpose() + compliance * compliance * moments_.forces;
     const Eigen::SelfAdjointEigenSolver<Mat<N>> axes(surface);
-    for (int i = 1; i < N; ++i) {  // the smallest one is the normal
+    for (int i = 1; i < N; ++i) {  // the axis with the smallest one is the normal
       const Vec<N> axis = axes.eigenvectors().col(i);
       const bool spread = axes.eigenvalues()[i] >= config_.least_spread * config_.least_spread;
       const double along = mean.dot(axis);

@@ -11,12 +11,12 @@ namespace tendon {
 ///     F(x) = K (d − n·x)₊ n       N, on a hand at x
 template <int N>
 struct SurfaceModel {
-  std::uint64_t sequence = 0;       ///< 1, 2, …; older messages and duplicates are ignored
+  std::uint64_t sequence = 0;       ///< 1, 2, …, used to ignore older messages and duplicates
   Vec<N> normal = Vec<N>::Unit(0);  ///< n, the unit normal vector of the surface
   double offset = 0;                ///< d, m; the surface is at n·x = d
-  double stiffness = 0;             ///< K, N/m; 0: no surface
+  double stiffness = 0;             ///< K, N/m, or 0 if there is no surface
 
-  double depth(const Vec<N>& x) const noexcept;   ///< m, inside of the surface; 0 outside
+  double depth(const Vec<N>& x) const noexcept;   ///< m, or 0 if x is outside of the surface
   double energy(const Vec<N>& x) const noexcept;  ///< ½ K depth², J
 };
 
@@ -32,7 +32,7 @@ struct SurfaceModel {
 /// if the contact starts at the last surface. After that it is limited to first_stiffness/10 … `max_stiffness`. d is
 /// chosen such that the force of the model at the newest sample is n·f.
 ///
-/// Without contact, the last surface is kept as a prediction of the next contact. If the tool is more than 2
+/// If there is no contact, the last surface is used to predict the next contact. If the tool is more than 2
 /// contact_force/K + position_noise deep in it without a force, K becomes 0 until the next contact. This removes energy
 /// from the model, so a SurfaceRenderer uses it immediately. (Moving d to the tool would not be enough: the hand is
 /// ahead of the tool by a round trip and would only be released gradually.) Samples are ignored if they are not finite.
@@ -50,7 +50,7 @@ class SurfaceEstimator {
     double least_travel = 0;     ///< m, standard deviation of n·x above which a slope is used; > 0
     double memory = 0;           ///< > 0; the weight of a sample decreases to 1/e after this number of samples
     double least_spread = 1e-3;  ///< m, standard deviation above which a direction is in the surface; > 0
-    double position_noise = 0;   ///< m, ≥ 0; a tool that is less deep inside a surface may be outside of it
+    double position_noise = 0;   ///< m, ≥ 0; if the depth is smaller than this, the tool may be outside
   };
 
   /// Throws std::invalid_argument with the name of the field, its value and the expected value.
@@ -87,7 +87,8 @@ class SurfaceEstimator {
   Moments moments_;
 };
 
-/// The leader's end: renders a surface at the full rate. Any energy from a change of the model must be paid for.
+/// The leader's end of model-mediated teleoperation, which renders a surface at the full rate. Any energy from a change
+/// of the model must be paid for.
 ///     F_wanted = K (d' − n·x)₊ n,     ½ K (d' − n·x)₊² ≤ ½ K_old (d'_old − n_old·x)₊² + budget
 /// In each period, the newest received surface is used. It is placed deeper (d' ≤ d) if its energy at the hand would
 /// exceed the energy of the previous one plus the budget. It then rises to its position as the hand retracts or as
@@ -99,7 +100,7 @@ class SurfaceEstimator {
 /// A message is ignored if a number is not finite, the stiffness is negative, or the normal is not a unit vector
 /// (1e-6). If `position` is not finite, the demand is not finite. If the budget is not positive, it is treated as 0.
 ///
-/// Source: as above; for the budget core/PROOFS.md, "Surfaces".
+/// Source: as above. For the budget, see core/PROOFS.md, "Surfaces".
 /// Thread-safe: no. Realtime-safe: yes.
 template <int N>
 class SurfaceRenderer {

@@ -10,8 +10,9 @@ namespace tendon {
 /// starts at u and moves with the velocity of PassivityFollower, where λ = drift_rate. The upper limit of α is B,
 /// because the viscous friction of a device is too small. The law adds B, because otherwise E_in is 0 and the pair
 /// cannot start to move. E_in is the energy of this coupling. The energy of the peer is counted from the first state of
-/// an epoch on, because the energy before that state may already have been used. The law generates some mJ, because
-/// tools have mass and the ends predict one period. The pair therefore needs limiters and an energy tank.
+/// an epoch on, because the energy before that state may already have been used. This law can generate some mJ because
+/// of the mass of the tool and because both ends predict one period. The pair therefore needs limiters and an energy
+/// tank.
 class PassivityLaw : public CouplingLaw {
  public:
   PassivityLaw(const CouplingConfig& config, const MappedEnd& frame);

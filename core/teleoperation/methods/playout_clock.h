@@ -11,8 +11,9 @@ namespace tendon {
 /// Computes the time of the sender to play out, late enough that the messages for that time have arrived:
 ///     τ = t − min delay − D,      D = p99 of (delay + wait for a gap) − min delay,   0 ≤ D ≤ max_playout
 /// t is the local time and τ the time of the sender. A delay is the local arrival time minus the sending time; the
-/// offset of the clocks cancels. Both statistics are over the last 256 to 512 messages, so a clock rate error of 200
-/// ppm shifts τ by less than 0.1 ms at 1000 messages/s. τ does not jump. Its rate is 1 + (lag / 250 ms), in [0, 2].
+/// offset of the clocks cancels. Both statistics use the last 256 to 512 messages, so that an error of the clock rate
+/// of 200 ppm shifts τ by less than 0.1 ms at 1000 messages/s. τ does not jump. Its rate is 1 + (lag / 250 ms), in [0,
+/// 2].
 ///
 /// τ does not pass the newest message. If messages arrive in a burst that is longer than D, τ stops until the burst
 /// arrives, and continues at the same place. Nothing is skipped, so that an integral and its energy remain consistent.
@@ -29,7 +30,7 @@ class PlayoutClock {
   /// additional delay of the playout due to missing previous messages (lost, reordered or not sent).
   void heard(Duration now, Duration time, Duration waited) noexcept;
 
-  /// Returns τ, or 0 before the first message. `now` must not decrease.
+  /// Returns τ, or 0 if no message was recorded yet. `now` must not decrease.
   Duration advance(Duration now) noexcept;
 
   Duration playout() const noexcept;  ///< current D

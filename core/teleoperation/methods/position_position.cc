@@ -15,7 +15,7 @@ namespace {
 /// s/s, faster than the drift between two clocks, so that the minimum adapts to a longer delay within seconds.
 constexpr double kFloorRise = 2e-3;
 
-/// 36 years; the difference of two such times does not overflow.
+/// 36 years, so that the difference of two times cannot overflow.
 constexpr Duration kMostMotionTime = std::chrono::nanoseconds(std::int64_t{1} << 60);
 
 }  // namespace

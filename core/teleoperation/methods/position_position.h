@@ -16,9 +16,9 @@ template <int N>
 struct PortMotion {
   std::uint64_t epoch = 1;           ///< epoch of the sender, > 0; increases at each restart (EnergyTank)
   std::uint64_t sequence = 0;        ///< period of the sender: 1, 2, …; older messages and duplicates are ignored
-  std::uint64_t answers_epoch = 0;   ///< epoch of the receiver for `answers`; 0: none
-  std::uint64_t answers = 0;         ///< sequence of the receiver's message that the sender used; 0: none
-  Duration time{};                   ///< time of the sender; only differences are used; ± 2⁶⁰ ns
+  std::uint64_t answers_epoch = 0;   ///< epoch of the receiver for `answers`, or 0 if there is none
+  std::uint64_t answers = 0;         ///< sequence of the receiver's message that was used, or 0 if there is none
+  Duration time{};                   ///< time of the sender, ± 2⁶⁰ ns; only used for differences
   Duration round_trip{};             ///< as measured by the sender; 0 if unknown
   Vec<N> position = Vec<N>::Zero();  ///< m
   Vec<N> velocity = Vec<N>::Zero();  ///< m/s
@@ -33,7 +33,7 @@ Vec<N> paid_stretch(const Vec<N>& stretch, double stiffness, double energy) noex
   return distance > farthest ? Vec<N>(stretch * (farthest / distance)) : stretch;
 }
 
-/// A coupling of two handles by a spring and a damper. Both ends use this class.
+/// Couples two handles with a spring and a damper. Both ends use this class.
 ///     F = K (y − x) + D (ẏ − v) − B v,   ‖F‖ ≤ max_force        N, on the hand at this end
 ///     K = min(stiffness, 2B/T_loop)                             with `adapt_to_delay`
 /// x, v are the position and velocity of this end, and y, ẏ those of the other end: the newest received values,
@@ -41,18 +41,18 @@ Vec<N> paid_stretch(const Vec<N>& stretch, double stiffness, double energy) noex
 /// constant and ẏ = 0). Without the extrapolation, a message that is 5 ms later than the previous one would cause an
 /// error of 1 mm in y at 0.2 m/s, which is a noise of 0.4 N at 400 N/m. The law is isotropic.
 ///
-/// **Dependence of K on the delay** (core/PROOFS.md, "Coupling springs"). A delayed spring generates energy. A damper
-/// of K·T_loop/2 at each end dissipates it. The coupling is quiet for K ≤ 2B/T_loop, where B is the reliable damping at
-/// one end. With a larger K, the pair is still passive because of the limiters and the tank, but it oscillates with
-/// 0.04 … 0.08 m/s in free motion for delays above 50 ms.
+/// **Dependence of K on the delay** (core/PROOFS.md, "Coupling springs"). A delayed spring generates energy. This
+/// energy can be dissipated by a damper of K·T_loop/2 at each end. The coupling is quiet for K ≤ 2B/T_loop, where B is
+/// the reliable damping at one end. With a larger K, the pair is still passive because of the limiters and the tank,
+/// but it oscillates with 0.04 … 0.08 m/s in free motion for delays above 50 ms.
 ///
 /// **T_loop** is measured without a common clock, by counting the periods since the sequence that a message answers.
 /// This includes delay, loss and waiting at the other end. Both ends use the larger of the two measurements, because
-/// the forces would differ if the ends used different values of K. T_loop increases immediately. It is the maximum over
-/// the last one to two intervals of `recovery`, so that a held force does not change. K has the time constant
-/// kSettling, because the ends do not measure a longer delay at the same time. Without messages T_loop increases and K
-/// decreases; the caller must detect this loss. If K changes while the spring is stretched by δ, the accounts pay ½ ΔK
-/// δ².
+/// the forces would differ if the ends used different values of K. T_loop increases immediately. It is set to the
+/// maximum during the last one to two intervals of `recovery`, so that a held force does not change. K is changed with
+/// the time constant kSettling, because an increase of the delay is not measured at the same time by both ends. Without
+/// messages T_loop increases and K decreases; the caller must detect this loss. If K changes while the spring is
+/// stretched by δ, the accounts pay ½ ΔK δ².
 ///
 /// **Felt damping** in free motion, for a sine with the peak speed v̂ and the friction b_f, f_c of the follower:
 ///     b_felt = K·T_loop + B_l + B_f + b_f + 4 f_c/(π v̂)
@@ -60,9 +60,9 @@ Vec<N> paid_stretch(const Vec<N>& stretch, double stiffness, double energy) noex
 /// ends must use the same K, D and B up to the scales: K_l = s_f s_x K_f, and the same for D and B. This law is not
 /// passive. There must be a limiter and an EnergyTank at both ends.
 ///
-/// Messages that are not finite or out of bounds are dropped and counted in `refused`. A higher epoch of the other end
-/// starts anew, and a lower one is ignored. If the position is not finite, the demand is not finite, and the limiter
-/// sets the force to 0. Before the first message, the force is −B v.
+/// Messages that are not finite or out of bounds are dropped and counted in `refused`. If the epoch of the other end
+/// increases, all values are reset. Messages of a lower epoch are ignored. If the position is not finite, the demand is
+/// not finite, and the limiter sets the force to 0. Before the first message, the force is −B v.
 ///
 /// Source: position–position coupling, Hannaford 1989 (recalled); the bound on K derived here and measured.
 /// Thread-safe: no. Realtime-safe: yes, except the constructor.
@@ -99,7 +99,7 @@ class PositionPosition {
   /// Returns the message to send in this period. Must be called after `command`.
   PortMotion<N> message() const noexcept;
 
-  /// Resets the other end and sets the own epoch (EnergyTank::renew).
+  /// Resets the values of the other end and sets the epoch of this end (EnergyTank::renew).
   void renew(std::uint64_t epoch) noexcept;
 
   /// Sets K, D and B, within the bounds of Config. K changes with the time constant kSettling.

@@ -11,9 +11,9 @@ namespace tendon {
 ///     v = gain (‖u_l‖ − dead_zone)₊ û_l,  ‖v‖ ≤ max_speed;     the follower's reference moves by s_x R v T per period
 /// The spring of the follower has the stiffness K_f and pulls the tool to the reference, which is at most max_force/K_f
 /// away. f cannot move the handle out of the dead zone, so a contact does not move the follower. The reference does not
-/// move if the handle is in the dead zone, if the leader is not live, or if its state is not fresh (LossStages). The
-/// hand does no work while it holds the handle, so a follower with a limiter only moves as long as its account pays for
-/// the friction that exceeds the lower bounds of the limiter.
+/// move if the handle is in the dead zone, if the leader is not live, or if its state is not fresh (LossStages). A hand
+/// that holds the handle does not do work. If the follower has a limiter, it can therefore only move as long as there
+/// is enough energy in its account for the friction that exceeds the lower bounds of the limiter.
 class RateLaw : public CouplingLaw {
  public:
   static constexpr bool kLeaderCentred = true;

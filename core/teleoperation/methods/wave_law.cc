@@ -48,7 +48,7 @@ std::optional<EnergyTank::Settlement> WaveLaw::observe(const LawInterval& ended)
   Interval<3> end{.applied = force_, .dx = Vec3::Zero(), .held = ended.interval.held};
   if (moves_) {
     end.dx = ended.interval.dx;
-    // The limiter and the motors make the end of the line softer. The ramp does not.
+    // The end of the line becomes softer because of the limiter and the motors, but not because of the ramp.
     end.applied = ended.interval.applied + force_ - ended.wanted;
   }
   sent_ = port_.observe(end, {.payable = ended.payable, .reserve = ended.reserve, .wanted = force_});
@@ -65,7 +65,7 @@ Demand<3> WaveLaw::command(const LawPeriod& period, const Vec3& speed, const Dem
 }
 
 void WaveLaw::skip(const LawPeriod& period, Duration elapsed) noexcept {
-  // The motion is not known in this interval and in the next one, so the account does not pay for the line.
+  // The motion is unknown in this interval and in the next one, so the account is not used for the line.
   port_.observe({.applied = force_, .dx = Vec3::Zero(), .held = elapsed},
                 {.payable = -std::numeric_limits<double>::max(), .wanted = force_});
   command(period, Vec3::Zero(), {});

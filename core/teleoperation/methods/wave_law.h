@@ -36,7 +36,7 @@ class WaveLaw : public CouplingLaw {
   double max_force_;
   WavePort<3> port_;
   WaveMessage<3> sent_;
-  Vec3 force_ = Vec3::Zero();  ///< N, of the line in this period
+  Vec3 force_ = Vec3::Zero();  ///< N, force of the line in this period
   bool moves_ = false;         ///< the line moves with the handle
   bool joined_ = false;        ///< the port has joined the epoch of the peer
 };

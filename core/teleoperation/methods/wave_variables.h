@@ -14,13 +14,13 @@ namespace tendon {
 /// The message that a wave port sends in each period. The sums since the start make up for lost messages.
 template <int N>
 struct WaveMessage {
-  std::uint64_t sequence = 0;        ///< period of the sender: 1, 2, …; duplicates are ignored
+  std::uint64_t sequence = 0;        ///< period of the sender: 1, 2, …, used to ignore duplicates
   Duration time{};                   ///< time of the sender since its start; increases with `sequence`
   Vec<N> integral = Vec<N>::Zero();  ///< √W·s, ∫ wave dt; half of the square of a wave is a power
   double energy = 0;  ///< J, ∫ ‖wave‖²/2 dt, does not decrease; upper bound of the energy of the waves
 };
 
-/// Implements one end of a bilateral connection, which is passive for any delay. It exchanges wave variables, which
+/// Implements one end of a bilateral connection that is passive for any delay. It exchanges wave variables, which
 /// contain their own energy, instead of velocity and force.
 ///     F_wanted = √(2B) r̂ − B v'           r̂: received wave
 ///     s        = mean of (B v̄ − F) / √(2B) over the last W        s: wave to send;  −F·v̄ = (s² − r²)/2 if W = T
@@ -33,20 +33,21 @@ struct WaveMessage {
 ///
 /// v' is the estimated velocity v, corrected so that its integral follows the measured displacement x:
 ///     v' = v + (x − ∫ v' dt − λ T v) / τ_x,      τ_x = max(B / (150 N/m), W)
-/// λ (0 … 1) minimizes the correction, so that an estimate that lags by up to one period is not corrected. Without the
-/// correction, the error of the estimator at encoder counts accumulates in the integral of s, and the two ends drift
-/// apart. v is 0 while the handle stays within 1.5 counts for 16 ms, because a handle on the edge of a count is not
-/// moving, and each change of the force costs a robust ledger half a count.
+/// λ (0 … 1) minimizes the correction, so that an estimate that lags by up to one period is not corrected. If it was
+/// not corrected, the errors of the estimator at encoder counts would accumulate in the integral of s, and the two ends
+/// would drift apart. If the handle does not move by more than 1.5 counts for 16 ms, v is set to 0, because a handle on
+/// the edge of a count is not moving, and because each change of the force reduces a robust ledger by half a count.
 ///
 /// **Playout.** The messages contain I = ∫ wave dt and E = ∫ wave²/2 dt. The receiver interpolates both linearly
 /// between messages at the time τ of PlayoutClock, and computes the mean Ī of I over the last W:
 ///     r̂ = ΔĪ / T + (Ī − ∫ r̂ dt) / 200 ms,      T r̂²/2 ≤ E(τ) − U + max(A − 1.5 reserve, 0)
 /// U is the energy used so far and A the account below. A wave with the same integral and less variation has less
 /// energy (Cauchy–Schwarz), so the bound is only active while τ catches up. The second term is 0 except after such a
-/// limitation or a period of another length. Energy is available at the time τ and not on arrival: otherwise, the
-/// energy of a burst is spent at once on a part of its integral, nothing is left for the rest, and the force collapses.
-/// Jitter, loss, reordering and bursts do not change the integral, so the positions of both ends return to their
-/// initial values up to (friction)/K, with K as below. If no more messages arrive, r̂ is 0 after W.
+/// limitation or a period of another length. Energy is made available at the time τ and not when it is received.
+/// Otherwise, the energy of a burst would be used immediately for a part of its integral, and no energy would be left
+/// for the force after that. Jitter, loss, reordering and bursts do not change the integral, so the positions of both
+/// ends return to their initial values up to (friction)/K, with K as below. If no more messages arrive, r̂ is 0 after
+/// W.
 ///
 /// **Passivity in sampled time** (core/PROOFS.md, "Wave variables"). The account A of the port (J) contains the energy
 ///     A += min(T r̂²/2, E(τ) − U) − T s²/2 − F·Δx
@@ -77,7 +78,7 @@ class WavePort {
     Duration max_playout = std::chrono::milliseconds(120);
     /// √W, limit of r̂, which bounds the received power (half of its square, in W). The remainder is used later.
     double max_wave = std::numeric_limits<double>::infinity();
-    double encoder_step = 0;  ///< m, ≥ 0; one count of the positions; 0: exact
+    double encoder_step = 0;  ///< m, ≥ 0; one count of the positions, or 0 if exact
   };
 
   /// Throws std::invalid_argument with the name of the field, its value and the expected value.
@@ -95,7 +96,7 @@ class WavePort {
 
   /// Values of the limiter of a port, whose account the line uses (SharesAccount).
   struct SharedAccount {
-    double payable = 0;              ///< J, after `observe` of the limiter; replaces A
+    double payable = 0;              ///< J, after `observe` of the limiter, used instead of A
     double reserve = 0;              ///< J, the reserve of the limiter for the requested force, ℓ
     Vec<N> wanted = Vec<N>::Zero();  ///< N, force that the line requested in the interval
   };
@@ -145,7 +146,7 @@ class WavePort {
   double tracking_;    ///< 1/s, 1/τ_x
   PlayoutClock clock_;
 
-  std::array<WaveMessage<N>, kMost> heard_{};  ///< ring buffer in order; the first one is before the time played out
+  std::array<WaveMessage<N>, kMost> heard_{};  ///< ordered ring buffer; the first one is before the time played out
   std::size_t begin_ = 0;
   std::size_t count_ = 1;               ///< includes the start of the sender
   bool joined_ = false;                 ///< a message was received
@@ -156,13 +157,13 @@ class WavePort {
   Vec<N> wave_ = Vec<N>::Zero();      ///< r̂ of this period
   Vec<N> velocity_ = Vec<N>::Zero();  ///< v' of this period
   Vec<N> ahead_ = Vec<N>::Zero();     ///< m, x − ∫ v' dt
-  Vec<N> wandered_ = Vec<N>::Zero();  ///< m, from the centre of the last rest, at most 1.5 counts
+  Vec<N> wandered_ = Vec<N>::Zero();  ///< m, distance to the center of the last rest, at most 1.5 counts
   Duration still_{};                  ///< time since the handle last moved farther
   Vec<N> used_integral_ = Vec<N>::Zero();
   double used_energy_ = 0;
   double played_energy_ = 0;  ///< E(τ)
   double account_ = 0;
-  double spare_ = 0;  ///< J, the part of A available for r̂
+  double spare_ = 0;  ///< J, part of A that can be used for r̂
   double taken_ = 0;
   double given_ = 0;
   WaveMessage<N> sent_;

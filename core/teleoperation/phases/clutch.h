@@ -5,7 +5,7 @@
 
 namespace tendon {
 
-/// Returns true if the button is held. `bit` is at most 31, also for is_pressed.
+/// Returns true if the button is held. For this function and is_pressed, `bit` must not exceed 31.
 constexpr bool is_held(std::uint32_t buttons, std::uint32_t bit) noexcept { return (buttons >> bit & 1U) != 0; }
 
 /// Returns true if the button is held and was not held in the previous period.
@@ -15,7 +15,7 @@ constexpr bool is_pressed(std::uint32_t buttons, std::uint32_t before, std::uint
 
 struct CouplingButton {
   std::uint32_t bit = 0;  ///< at most 31
-  bool toggles = false;   ///< false: the button must be held
+  bool toggles = false;   ///< false if the button must be held
 };
 
 /// The clutch of the leader. Thread-safe: no. Realtime-safe: yes.

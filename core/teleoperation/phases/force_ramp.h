@@ -15,8 +15,8 @@ class ForceRamp {
   static constexpr Duration kFade = std::chrono::milliseconds(50);
 
   struct Change {
-    bool turned = false;  ///< the source of the force has changed
-    bool ended = false;   ///< the previous source no longer exists
+    bool turned = false;  ///< true if the source of the force has changed
+    bool ended = false;   ///< true if the previous source no longer exists
   };
   /// `driven` is true if the law computes the force, and `new_act` is true if a new act has started.
   Change drive(bool driven, bool new_act, Duration elapsed, Duration ramp) noexcept;

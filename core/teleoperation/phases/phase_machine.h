@@ -11,7 +11,7 @@ namespace tendon {
 /// Inputs of the phase machine. In each period, the caller checks them in this order and calls `next` for each that is
 /// true.
 enum class PhaseInput : std::uint8_t {
-  kNotReady,  ///< The device is missing, disarmed, or has a fault.
+  kNotReady,  ///< The device is not connected, is disarmed, or has a fault.
   kReady,     ///< The device is ready.
   kGone,      ///< The link is lost (LossStages).
   kHeard,     ///< The peer is fresh and knows about the loss.
@@ -20,7 +20,7 @@ enum class PhaseInput : std::uint8_t {
   kClutch,    ///< The clutch of the leader is on.
   kRelease,   ///< The clutch of the leader is off.
   kEnd,       ///< The act ends: see Coupling.
-  kRenew,     ///< The channel has a new peer.
+  kRenew,     ///< The peer of the channel was replaced.
 };
 inline constexpr std::size_t kPhaseInputs = 10;
 
