@@ -53,8 +53,8 @@ class Server {
   Server& operator=(const Server&) = delete;
 
   /// Starts the threads. If the system refuses one, stops the others and throws std::runtime_error with a message for
-  /// the operator. With `run_for`, each haptic thread ends after this time and sets the force to zero, after run_for /
-  /// period steps, or fewer if there were delays.
+  /// the operator. If `run_for` is set, each haptic thread ends after this time and sets the force to zero. This is
+  /// after run_for / period steps, or fewer if there were delays.
   void start(std::optional<Duration> run_for = std::nullopt);
 
   /// Sets the function that is called if a session is opened or closed, even by stop(). The network threads call it,

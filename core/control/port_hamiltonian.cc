@@ -17,7 +17,7 @@ void PortHamiltonian<N>::observe(const Interval<N>& interval) noexcept {
   const double income = -interval.applied.dot(interval.dx);
   if (!law_support::finite(interval) || !std::isfinite(income)) return;
   stored_ += income;
-  if (stored_ < 0) {  // overdraft; no leap in the same interval
+  if (stored_ < 0) {  // overdraft (see the header); there is no leap in the same interval
     debt_ -= stored_;
     stored_ = 0;
     return;

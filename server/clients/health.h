@@ -30,7 +30,7 @@ struct Health {
 
   bool not_realtime = false;  ///< see enter_realtime
   bool recording_ended = false;
-  std::uint64_t steps_lost = 0;  ///< the log thread was too slow
+  std::uint64_t steps_lost = 0;  ///< lost because the log thread was too slow
   std::uint64_t unsent = 0;      ///< datagrams of the whole server that were refused by the system
 };
 

@@ -88,7 +88,7 @@ class Lateness {
     Duration usual_network{};
     Duration usual_engine{};
     std::uint64_t late() const noexcept { return late_ours + late_network + late_engine + late_unknown; }
-    /// Adds the counters, and takes the other values from the report with the longer `worst`.
+    /// Adds the counters. The other values are copied from the report with the longer `worst`.
     void add(const Report& other);
     /// For the operator, for example "forces were late 3 times, by up to 85 ms: the network (round trip 131 ms, usually
     /// 41 ms)". Empty if there are no problems. At most 128 bytes.
@@ -106,7 +106,7 @@ class Lateness {
   void took_state(LocalTime now) noexcept;
   void observe(const RoundTrip& trip) noexcept;
   void cut() noexcept { ++report_.cut; }
-  void refused(Cause cause, std::uint64_t count) noexcept;  ///< `cause`: one of the last four
+  void refused(Cause cause, std::uint64_t count) noexcept;  ///< `cause` must be one of the last four values
 
   Report report(LocalTime now);
 

@@ -11,7 +11,7 @@
 namespace tendon {
 namespace {
 
-constexpr Duration kAskAgain = std::chrono::milliseconds(500);  ///< before a busy channel or device is requested again
+constexpr Duration kAskAgain = std::chrono::milliseconds(500);  ///< until a busy channel or device is requested again
 constexpr Duration kCompareAgain = std::chrono::seconds(5);     ///< after a mismatch; a server may have been restarted
 
 }  // namespace

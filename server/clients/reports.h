@@ -15,7 +15,7 @@ namespace tendon {
 /// engine. Thread-safe: no. Realtime-safe: no.
 class Reports {
  public:
-  static constexpr Duration kPeriod = std::chrono::seconds(1);  ///< costs little compared to 1000 states
+  static constexpr Duration kPeriod = std::chrono::seconds(1);  ///< the cost is small compared to 1000 states
 
   struct Sums {
     std::uint64_t late_ours = 0;  ///< late or missing forces by cause

@@ -163,9 +163,9 @@ struct ServedDevice {
   std::vector<ServedChannel> channels{};
   std::optional<Couple> coupling{};      ///< our configuration; empty if the device cannot be coupled
   PortPhase phase = PortPhase::kAlone;   ///< the newest phase of any coupling
-  std::vector<std::uint32_t> leaders{};  ///< by coupling: the leader's channel; empty: one coupling, any channel
-  std::array<std::uint32_t, Shares::kMost> peers{};   ///< by coupling: the number of peers so far
-  std::array<PortFrame, Shares::kMost> peer_ports{};  ///< by coupling: the last port of the peer
+  std::vector<std::uint32_t> leaders{};  ///< channel of each leader; empty if there is one leader, on any channel
+  std::array<std::uint32_t, Shares::kMost> peers{};   ///< number of peers so far for each coupling
+  std::array<PortFrame, Shares::kMost> peer_ports{};  ///< last port of the peer for each coupling
   Outputs outputs{};
   std::optional<Health> told{};  ///< the last report to observers
   std::uint64_t reports = 0;

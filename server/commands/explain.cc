@@ -183,7 +183,7 @@ double operational_stiffness(const LimiterConfig& limiter) {
   return 2 * limiter.friction.viscous / seconds(limiter.longest_hold);
 }
 
-/// Assumes that both ends have the same configuration.
+/// This assumes that the configuration of both ends is the same.
 void put_coupling(const Coupling::Config& coupling, const LimiterConfig& limiter, std::ostream& text) {
   const bool leads = coupling.role == PortRole::kLeader;
   const bool waves = coupling.method == CouplingMethod::kWaves;

@@ -149,7 +149,8 @@ struct ScenePart {
 
 const std::vector<ScenePart>& scene_parts();
 
-/// Also removes what depends on the part. The device must be simulated. Returns false if there is no such part.
+/// Everything that depends on the part is also removed. The device must be simulated. Returns false if there is no such
+/// part.
 bool take_out(Scene& scene, std::string_view key);
 
 std::string scene_reference();
