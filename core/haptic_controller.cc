@@ -52,8 +52,7 @@ void HapticController::book_unseen(const Vec3& applied, const HandleSample* hand
   if (admittance_) admittance_->observe_unseen();
 }
 
-// The functions that are used in every step are inlined. If a device only has a position, the cost of the other parts
-// is one branch.
+// The functions of every step are inlined. If a device only has a position, the cost of the other parts is one branch.
 [[gnu::always_inline]] inline void HapticController::book_seen(const Motion& hand, const Vec3& applied,
                                                                const HandleSample* handle, Step& step) noexcept {
   const Vec3 dx = hand.position - last_->position;
@@ -111,7 +110,7 @@ void HapticController::follow_tool(Step& step) noexcept {
   }
 }
 
-/// Orientation and opening are required in every sample if their motors exist.
+/// The orientation and the opening are required in every sample if there are motors for them.
 bool HapticController::is_finite(const Motion& hand, const HandleSample* handle) const noexcept {
   if (!hand.position.allFinite()) return false;
   if (handle == nullptr) return !wrench_ && !grip_;
@@ -267,7 +266,7 @@ void HapticController::take(Step& step, const Motion& hand, const Vec3& applied,
   const LimitedForce<3> limited = limiter_.limit(
       {.force = slewed.force, .stiffness = as_wanted ? wanted.stiffness : Mat3(Mat3::Zero()), .age = wanted.loop_age});
   step.force = limited.force;
-  // The damper can add to the force. It is safe to reduce it again.
+  // The force may have been increased by the damper. It is safe to reduce it again.
   if (limited.reasons.has(Reason::kDamped)) step.force = saturate(step.force, config_.max_force).force;
   step.permitted = limited.permitted;
   step.reasons |= limited.reasons;

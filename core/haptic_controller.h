@@ -47,7 +47,7 @@ struct HandleStep {
 /// Every handle has a position.
 struct PositionStep {
   Motion hand;                       ///< measured motion; hand.at is the time of the step
-  Duration held{};                   ///< T_act, the length of the last interval, or 0 in the first step
+  Duration held{};                   ///< T_act, length of the last interval, or 0 if this is the first step
   Vec3 was_applied = Vec3::Zero();   ///< N, applied during the last interval
   std::optional<Vec3> hand_force{};  ///< N, measured force of the hand on the handle; empty if there is no sensor
   Vec3 wanted = Vec3::Zero();        ///< N, demand of the remote environment (HeldForce)
@@ -88,9 +88,9 @@ struct Step : PositionStep {
 ///     account ← energy received from the peers, less energy given           (Couplings::settle, with an energy tank)
 ///     F ← the bound of the account, e.g. ‖F‖ ≤ f_c + 2 √(b E / T_max)        (Limiter::limit)
 ///     F ← ‖F‖ ≤ max_force again, if the damper of the limiter has added to it
-/// If the device has motors for rotation, F is a wrench. Force and torque then share one account and are reduced by the
-/// same factor (WrenchPort). The gripper is a separate port (GripPort). The torque and the grip force of the coupling
-/// are added to those of the remote environment.
+/// If the device has motors for rotation, F is a wrench. In this case, force and torque share the same account and are
+/// reduced by the same factor (WrenchPort). The gripper is a separate port (GripPort). The torque and the grip force of
+/// the coupling are added to those of the remote environment.
 ///
 /// The limiter is the last step, so the force cannot exceed its bound, but it can fall faster than the slew limit
 /// allows. If each force is applied for at most the `longest_hold` of its step, it is guaranteed that E ≥ −1 nJ in all
@@ -99,8 +99,7 @@ struct Step : PositionStep {
 ///
 /// Overruns: if an interval is longer than the longest_hold of the scene, its measured length is used, the step is
 /// flagged, and the limiter adapts (HoldBound). If it is longer than the watchdog of the device, or if a position is
-/// missing, the worst motion is booked. (If longest_hold is the watchdog time, there is no condition, but K_op → 2b /
-/// T_max.)
+/// missing, the worst motion is booked. (If longest_hold is the watchdog time, this is not needed, but K_op is lower.)
 ///
 /// A fault is latched: the force is zero (through the slew limit while positions are measured) until `rearm`. `disarm`
 /// is for the operator. This sets the force to zero without a ramp until `rearm` is called. It does not clear a fault.
@@ -110,23 +109,21 @@ class HapticController {
   enum class Fault : std::uint8_t {
     kNone,
     kPositionNotFinite,  ///< the device measured NaN or infinity
-    kDeviceSilent,       ///< max_missed readings in a row failed
+    kDeviceSilent,       ///< max_missed consecutive readings have failed
     kPositionJumped,     ///< the distance to the last position was too large for max_speed
   };
 
   struct Config {
     LimiterConfig limiter;
-    /// Friction that depends on the position, for a limiter with adaptive_friction. Until the first step,
-    /// limiter.friction is used.
+    /// Friction at each position, for a limiter with adaptive_friction. Until the first step, limiter.friction is used.
     std::optional<FrictionMap::Config> friction_map{};
     /// For a device with motors that rotate the handle. Cannot be combined with admittance.
     std::optional<RotationLimits> rotation{};
     std::optional<GripLimits> grip{};  ///< for a device with a motorized gripper
     /// For a device with a force sensor. Without it the device is of impedance type.
     std::optional<AdmittanceLoop<3>::Config> admittance{};
-    /// Couples the handle to that of a peer. The limiter has a shared_account if the coupling has an energy tank. If
-    /// the orientation is coupled, it must be measured in every step. Torques require `rotation`, and a coupled gripper
-    /// requires `grip`.
+    /// Couples the handle to that of a peer. The limiter has a shared_account if the coupling has an energy tank. A
+    /// coupled orientation must be measured in every step. Torques require `rotation`, and a coupled gripper `grip`.
     std::optional<Coupling::Config> coupling{};
     /// For a follower with several leaders: one `coupling` per leader (Couplings). Empty: one leader.
     std::vector<CoupledLeader> leaders{};
@@ -136,7 +133,7 @@ class HapticController {
     /// force that changes its sign with each datagram.
     double max_slew = 1000;
     HeldForce::Config hold;
-    /// One rule per channel of remote forces. Each channel has its own HeldForce.
+    /// The rule for each channel of remote forces. There is a separate HeldForce for each channel.
     std::vector<ChannelRule> channels = {ChannelRule::kSum};
     std::uint32_t max_missed = 20;  ///< number of failed readings that cause a fault; 20 ms at 1 kHz, as in libfranka
     /// m/s; > 0. If the motion is faster, an encoder has wrapped or lost counts. This is a fault and is not booked,
@@ -174,7 +171,7 @@ class HapticController {
             const ForceChannels::Wanted& wanted, const HandleSample* handle = nullptr,
             const EnergyTank::Settlement& settled = {}, const EnergyTank::Settlement& grip_settled = {}) noexcept;
 
-  /// Performs a step without a position measurement. The force to apply is zero. The last orientation and grip are
+  /// Performs a step if the position was not measured. The force to apply is zero. The last orientation and grip are
   /// recorded from `handle`, and the held torque and grip force are booked.
   Step step_unseen(LocalTime now, const Vec3& applied, const HandleSample* handle = nullptr) noexcept;
 

@@ -67,8 +67,7 @@ class Device {
   /// May be called from any thread. Always kHomed if the device does not need opening or homing.
   virtual State state() const noexcept { return State::kHomed; }
 
-  /// Called if the operator requests forces, also after a fault. SafeDevice grants this later; others are ready when
-  /// homed.
+  /// Called if the operator requests forces, also after a fault. SafeDevice grants this later, others when homed.
   virtual void arm() noexcept {}
   /// Prevents forces until `arm`. Only for safety layers (SafeDevice); without one, use HapticController::disarm.
   virtual void disarm() noexcept {}
@@ -83,8 +82,7 @@ class Device {
   virtual Joints joints(const Motion& /*hand*/) const noexcept { return {}; }
 
   /// Commands `force` (N, on the hand) and returns the force that was actually written after clamping and rounding,
-  /// which is counted by the energy ledger. The device applies this force until the next `apply` is called or its
-  /// watchdog expires.
+  /// which is counted by the energy ledger. The force is applied until the next call or until the watchdog expires.
   virtual Vec3 apply(const Vec3& force) noexcept = 0;
 
   /// Called instead of `apply` if `info` has a torque or a gripper with a motor. Returns what was actually written.

@@ -8,8 +8,7 @@
 namespace tendon {
 
 LateLibrary::LateLibrary(const std::string& file) {
-  // RTLD_GLOBAL is used as if the library was linked. RTLD_NOW, because symbols must not be resolved by a realtime
-  // thread.
+  // RTLD_GLOBAL is used as if it was linked. RTLD_NOW, because symbols must not be resolved by a realtime thread.
   if (dlopen(file.c_str(), RTLD_NOW | RTLD_GLOBAL) != nullptr) return;
   const char* const why = dlerror();  // NOLINT(concurrency-mt-unsafe): the C library has one for each thread
   throw std::runtime_error(std::string(why) + "; is the package installed?");

@@ -205,9 +205,8 @@ std::size_t Assembly::first_device(std::size_t network) const noexcept {
   return shard.first_device(devices_.size());
 }
 
-/// Only the first network loop receives Hellos (UdpLink::several). It passes them to the others, which process them in
-/// their next turn. Each loop has a turn at least after each haptic step. If the queue is full, the client must repeat
-/// the Hello.
+/// Only the first network loop receives Hellos (UdpLink::several). It passes them to the others, which have a turn at
+/// least after each haptic step. If the queue is full, the client must repeat the Hello.
 LocalTime Assembly::turn_network(std::size_t number, LocalTime now) {
   Network& network = networks_.at(number);
   while (const HandedHello* const hello = network.hellos.front()) {

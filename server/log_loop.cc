@@ -226,8 +226,7 @@ void LogLoop::report_health(LocalTime now, std::uint64_t unsent, DeviceLog& devi
   device.of.mail.health.put(health);
 }
 
-/// Writes one line per thread, because the devices of a thread are late together. The number is the maximum of a
-/// device.
+/// Writes one line per thread, because its devices are late together. The number is the maximum of a device.
 void LogLoop::report_overruns(LocalTime now, ThreadLog& thread) {
   std::uint64_t most = 0;
   Duration longest{};

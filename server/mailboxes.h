@@ -62,8 +62,7 @@ struct HandedHello {
 /// what happens if it is full. The name of a solver path in `ways` is written before the first force with its number.
 /// The constructor allocates all memory, before the loops run.
 struct Mailboxes {
-  /// Numbers of elements, which must be powers of two. The defaults are used if the server records, and require about
-  /// 19 MB.
+  /// Numbers of elements, which must be powers of two. The defaults, for a server that records, require about 19 MB.
   struct Capacities {
     std::size_t steps = 16384;  ///< 16 s at 1 kHz, for slow disks
     std::size_t ports = 1;      ///< for each coupling

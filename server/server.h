@@ -61,8 +61,7 @@ class Server {
   /// but never concurrently. It should not block. Must be called before `start`.
   void on_sessions(std::function<void(const NetworkLoop::SessionChange&)> tell) { on_session_ = std::move(tell); }
 
-  /// Sets all forces to zero and blocks the haptic threads until `resume`. Returns after at most 100 ms. Safety layers
-  /// are disarmed.
+  /// Sets all forces to zero, disarms safety layers and blocks the haptic threads until `resume`. Takes at most 100 ms.
   void suspend();
   void resume();
 

@@ -6,8 +6,7 @@
 /// Rejects -ffast-math at compile time. Must be included where NaN is caught or rounding errors are corrected.
 
 // With -ffast-math, std::isfinite(NaN) is true, clamping NaN to ±5 N gives −5 N, and a compensated sum becomes a plain
-// sum. GCC reports every option that it implies through __GCC_IEC_559. Clang reports only -ffast-math and
-// -ffinite-math-only.
+// sum. GCC reports all of its options by __GCC_IEC_559, Clang only -ffast-math and -ffinite-math-only.
 #if defined(__FAST_MATH__) || (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__ != 0) || \
     (defined(__GCC_IEC_559) && __GCC_IEC_559 == 0)
 #error \
@@ -19,8 +18,8 @@ namespace tendon {
 /// If an object of this class exists, denormals (numbers below 2.2e-308) are treated as 0 by this thread, both as
 /// operands and as results. Otherwise, decaying forces and velocities become denormal, and arithmetic is then about a
 /// hundred times slower on x86-64. Create one in each step rather than one per thread, because a driver or a library
-/// that is loaded later can change the mode. The destructor restores the previous mode. Has no effect on processors
-/// other than x86-64 and AArch64. Realtime-safe: yes.
+/// that is loaded later can change the mode. The destructor restores the previous mode. x86-64 and AArch64; no effect
+/// elsewhere. Realtime-safe: yes.
 class [[nodiscard]] DenormalsOff {
  public:
   DenormalsOff() noexcept : before_(mode()) { set_mode(before_ | kFlush); }

@@ -9,7 +9,7 @@
 
 namespace tendon {
 
-/// Vectors are in the device base frame and in SI units: m, m/s, N.
+/// All vectors use the device base frame and SI units: m, m/s, N.
 using Vec3 = Eigen::Vector3d;
 using Mat3 = Eigen::Matrix3d;
 

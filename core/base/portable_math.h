@@ -9,8 +9,7 @@
 /// The functions of libm can differ: glibc uses other instructions on processors with FMA, and its versions can round
 /// the last bit differently. In a simulation with an encoder, a single different bit leads to a different run. These
 /// functions only use + − · ÷ √, rounding to integers and std::fmod, which are exact or correctly rounded in IEEE 754,
-/// in a fixed order. Compile with -ffp-contract=off (as in CMakeLists.txt), because a fused multiply-add rounds only
-/// once.
+/// in a fixed order. Compile with -ffp-contract=off (as in CMakeLists.txt), because fused multiply-add rounds once.
 ///
 /// Unless noted otherwise, the error is less than the maximum of 1e-16 and 2e-16 of the result. NaN gives NaN.
 /// Realtime-safe: yes.
@@ -31,8 +30,7 @@ double expm1(double x) noexcept;
 /// Returns exactly ±1 for |x| ≥ 20, including ±∞.
 double tanh(double x) noexcept;
 
-/// Sine and cosine of x rad. Beyond 2³⁰ rad, x is reduced by the double nearest to 2π, with an error that grows with x.
-/// ±∞ gives NaN.
+/// Sine and cosine of x rad. Beyond 2³⁰ rad, x is reduced by the double nearest to 2π. ±∞ gives NaN.
 double sin(double x) noexcept;
 double cos(double x) noexcept;
 

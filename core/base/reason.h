@@ -6,8 +6,7 @@
 
 namespace tendon {
 
-/// The reasons for a difference between the force and the demand. The values are part of the wire format and
-/// recordings: never renumber.
+/// The reasons why a force differs from the demand. Part of the wire format and recordings: never renumber.
 enum class Reason : std::uint32_t {
   kNone = 0,
   kEnergy = 1U << 0,         ///< output limiter: a larger force could break passivity

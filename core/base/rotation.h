@@ -42,7 +42,7 @@ bool is_within_reach(const Quat& rest, const Quat& q) noexcept;
 /// isotropic K, and jumps at 180°.)
 Vec3 spring_torque(const Mat3& stiffness, const Quat& rest, const Quat& q) noexcept;
 
-/// Returns U of that spring in J.
+/// Returns the energy U of this spring in J.
 double spring_energy(const Mat3& stiffness, const Quat& rest, const Quat& q) noexcept;
 
 }  // namespace tendon

@@ -5,8 +5,7 @@
 
 namespace tendon {
 
-/// Implements admittance control, which makes a heavy device with a force sensor feel like a tool with a different
-/// mass.
+/// Admittance control. It makes a heavy device with a force sensor feel like a tool with a different mass.
 ///     M dv_d/dt = F_hand + F_env − D v_d − S x_d,   dx_d/dt = v_d        (the tool; v_d(0) = x_d(0) = 0)
 ///     F_wanted  = K_p (v_d − v) + K_i Σ (v_d T − Δx)                      (PI loop on the velocity)
 /// F_hand is the measured force of the hand on the handle, F_env the force of the remote environment on the tool, and
@@ -55,7 +54,7 @@ class AdmittanceLoop {
   /// Updates the integral with the last interval. Must not be called in the first step.
   void observe(const Interval<N>& interval) noexcept;
 
-  /// Replaces `observe` if the motion was not measured. Tool and integral do not advance.
+  /// Replaces `observe` if the motion was not measured. The tool and the integral are not updated.
   void observe_unseen() noexcept;
 
   /// Returns the force that is used to make the handle follow the tool. It must be passed to the stability controller.

@@ -53,8 +53,8 @@ struct LawInfo {
   Law law;
   std::string_view name;  ///< in scenes, tables and command lines
   std::string_view what;  ///< one line
-  /// The ledger is provably never negative, **whatever** the remote environment requests. The other laws are passive in
-  /// some environments, or correct a deficit afterwards.
+  /// The ledger is provably never negative, **whatever** the remote environment requests. The other laws are only
+  /// passive in some environments, or correct a deficit afterwards.
   bool passive;
   bool needs_stiffness;  ///< for demands without a stiffness
 };

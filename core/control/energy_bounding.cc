@@ -49,8 +49,7 @@ LimitedForce<N> EnergyBounding<N>::limit(const Demand<N>& demand) noexcept {
 
   Vec<N> f = centre + law_support::shortened<N>(wanted - centre, radius);
   if (along.dot(f) > ceiling) {
-    // Use the nearest force in the half-space if it is also in the ball. Otherwise use the nearest force on the disc
-    // where they intersect.
+    // Use the nearest force in the half-space if it is in the ball, or else on the disc where they intersect.
     const double height = along.dot(wanted);
     const Vec<N> across = wanted - height * along;
     f = std::min(height, ceiling) * along + across;

@@ -16,14 +16,13 @@ namespace tendon {
 /// with c₂ ≤ c₁ ≤ b/T in N/m. If c₂ > c₁, the conditions can contradict each other. The law can display a stiffness of
 /// at most about c₁, which is half of what force bounding and the AOL can display with the same friction.
 /// The port is passive because E(n) ≥ ‖f(n)‖²/(2c₂), even if the device reduces the force. The proof assumes that holds
-/// are not longer than `longest_hold`. If an interval is not finite or was not measured, the law is restarted with zero
-/// force.
+/// are not longer than `longest_hold`. If an interval is not finite or not measured, the law restarts from zero force.
 ///
 /// Source: Kim & Ryu, IROS 2004; Int. J. Robotics Research 29(6), 2010 (recalled; the exact published form of (ii) is
-/// unchecked). Proof: core/PROOFS.md, "Comparison laws". The vector form is ours: the intersection of a ball and a
-/// half-space, in which the nearest force has a closed form. For N = 1 these are the two intervals of the paper, except
-/// that the paper keeps f(n−1) for Δx = 0. Here only (ii) applies, so an unwanted force can vanish while the hand is at
-/// rest. For N = 6 the same b must be valid for every component (similar joints).
+/// unchecked). Proof: core/PROOFS.md, "Comparison laws". The vector form is ours. It uses the intersection of a ball
+/// and a half-space, in which the nearest force has a closed form. For N = 1 these are the two intervals of the paper,
+/// except that the paper keeps f(n−1) for Δx = 0. Here only (ii) applies, so an unwanted force can vanish while the
+/// hand is at rest. For N = 6 the same b must be valid for every component (similar joints).
 /// Thread-safe: no. Realtime-safe: yes, except the constructor.
 template <int N>
 class EnergyBounding {

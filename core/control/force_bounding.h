@@ -46,10 +46,9 @@ class ForceBounding {
 /// The more conservative force-bounding algorithm, which bounds a force by the previous force and the last motion only.
 ///     ‖F(n)‖ ≤ ‖F(n−1) − 2b Δx/T‖
 /// F is in N on the hand, F(n−1) is the applied force, and T the longest hold time. Walls feel like a spring with a
-/// stiffness of 2b/T. An unused bound is not saved, so a force only grows while the hand moves into the wall, and
-/// shrinks by 2b/T times the distance of the hand from its deepest point. The port is passive for every demand, because
-/// E(n) ≥ T ‖F(n)‖²/(4b) in every step. If a force was held longer than T, the viscous term is divided by the measured
-/// time.
+/// stiffness of 2b/T. If a bound is not used, it is not saved. The force therefore only grows while the hand moves into
+/// the wall, and decreases by 2b/T times the distance of the hand to its deepest point. The port is passive for every
+/// demand, because E(n) ≥ T ‖F(n)‖²/(4b) in every step. If a hold was longer than T, the measured time is used.
 ///
 /// Source: Kim, Baek, Ryu, 2015, "more conservative" form with ξ = 1 (recalled; form as in published code);
 /// core/PROOFS.md, "Comparison laws".

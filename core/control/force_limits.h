@@ -21,9 +21,8 @@ inline Limited saturate(const Vec3& wanted, double max) noexcept {
   return {wanted * (max / size), Reason::kMaxForce};
 }
 
-/// Limits the rate of change of a force, ‖F − F_before‖ ≤ rate · elapsed, without changing the direction of the change.
-/// `rate` is in N/s and can be infinite. If `elapsed` is not positive, the force stays `before`. Thread-safe,
-/// realtime-safe.
+/// Limits the rate of change of a force, ‖F − F_before‖ ≤ rate · elapsed, without changing its direction. `rate` is in
+/// N/s and can be infinite. If `elapsed` is not positive, this returns `before`. Thread-safe, realtime-safe.
 inline Limited limit_slew(const Vec3& wanted, const Vec3& before, double rate, Duration elapsed) noexcept {
   if (std::isinf(rate)) return {wanted, {}};  // the product ∞ · 0 s would be NaN
   const Vec3 change = wanted - before;

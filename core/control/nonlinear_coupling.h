@@ -16,9 +16,8 @@ namespace tendon {
 /// in N, m and J, with P(0) = 0. The port is passive for every demand if
 ///     b ≥ K_max T/2
 /// because E(n) ≥ ‖f(n)‖²/(2 K_max) + P(n). A static field that starts at rest, with a convex potential and slopes in
-/// [0, K_max], passes unchanged. If a field is late or stiffer, it feels like a spring with a stiffness of K_max. The
-/// device may shorten the force. After an interval that was not measured or not finite, the law restarts from zero
-/// force with the current P.
+/// [0, K_max], passes unchanged. If a field is late or stiffer, it feels like a spring K_max. The device may reduce the
+/// force. If an interval was not measured or not finite, the law restarts from zero force and keeps P.
 ///
 /// Source: the slope condition is that of the nonlinear virtual coupling of Lee & Lee (ref. [17] of IEEE TCST 17(4),
 /// 2009), but its formula is not available to us. The law and the proofs are ours: core/PROOFS.md, "Comparison laws".

@@ -14,8 +14,7 @@ namespace tendon {
 ///     F(n)     = F_wanted(n) − α(n) v(n)               v = Δx/T, m/s
 /// K is the symmetric part of the stiffness of the demand, or `stiffness` if the demand has none. If there is no
 /// stiffness in a direction, its energy is zero. The law is quiet on stiff walls if the environment is this spring and
-/// its force is fresh in every period. Otherwise it can brake unnecessarily or too late. The port is not guaranteed to
-/// be passive.
+/// its force is fresh in every period. Otherwise it can brake too much or too late. Passivity is not guaranteed.
 ///
 /// Source: Ryu, Preusche, Hannaford, Hirzinger, IEEE TCST 13(5), 2005 (recalled). The trigger uses the predicted
 /// energy, like PassivityObserver::kZohExact. core/PROOFS.md, "Comparison laws".

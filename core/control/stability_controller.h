@@ -11,8 +11,7 @@ namespace tendon {
 ///
 /// In each haptic period, first call `observe` with the last interval (not in the first period), and then `limit`,
 /// which returns the force to apply until the next period. If the motion in the last interval was not measured, call
-/// `observe_unseen` instead. This assumes that the force `applied` was held for at most `at_most`, and was then set to
-/// zero.
+/// `observe_unseen` instead. The force `applied` was then held for at most `at_most` and set to zero.
 ///
 /// N is 1, 3 (forces in N, displacements in m) or 6 (joint torques in N·m and angles in rad, or a wrench and a twist).
 ///

@@ -63,10 +63,9 @@ double colgate_coupling(double viscous, Duration longest_hold, double damping);
 ///     2 Re Z_d · Re(1/Z_c) / |ZOH| + cos(arg ZOH) ≥ 1   on the unit circle,   Z_c = B_c + K_c T z/(z − 1)
 /// With the Tustin model of the device Re Z_d = b for any mass. With ZOH = (1 + z⁻¹)/2, c = cos(ωT/2), κ = K_c T/2:
 ///     2b (B_c + κ) ≥ c (1 − c)(B_c + κ)² + κ² c³/(1 + c)   for 0 ≤ c ≤ 1
-/// For design only. The result is about four times larger than that of colgate_coupling, because this assumes a
-/// discrete device and a hand that is passive in discrete time. Real devices can be unstable below it. Throws as
-/// colgate_coupling, and if B_c < 0. Source: Adams & Hannaford, IEEE Trans. Robotics & Automation 15(3), 1999
-/// (recalled; algebra ours).
+/// This is only for design. About four times larger than colgate_coupling, as it assumes a device and a passive hand in
+/// discrete time. Real devices can be unstable below it. Throws as colgate_coupling, and if B_c < 0. Source: Adams &
+/// Hannaford, IEEE Trans. Robotics & Automation 15(3), 1999 (recalled; algebra ours).
 double two_port_coupling(double viscous, Duration longest_hold, double damping);
 
 }  // namespace tendon

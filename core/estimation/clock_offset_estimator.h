@@ -18,17 +18,14 @@ struct ClockExchange {
   LocalTime answered_at;  ///< T4, answer received; ≥ T1
 };
 
-/// Estimates the offset and drift of the clock of the peer, and an error bound of the offset. It is assumed that
-/// one-way delays are unknown but not negative, and that the offset θ (peer − local) drifts by at most ρ. At the
-/// midpoint of an exchange
+/// Estimates the offset and drift of the clock of the peer, and an error bound of the offset. One-way delays are
+/// unknown but not negative, and the offset θ (peer − local) drifts by at most ρ. At the midpoint of an exchange
 ///     θᵢ = ((T2 − T1) + (T3 − T4)) / 2,   δᵢ = (T4 − T1) − (T3 − T2),   |θ(tᵢ) − θᵢ| ≤ (δᵢ + ρ (T4 − T1)) / 2 = eᵢ
-/// Time is divided into blocks. The exchange with the smallest e is used for each block. A line is fitted to these
-/// exchanges with the weights 1 / (δ₀ + 2 eᵢ − 2 e_min). The line is then moved into the range that all of them allow
-/// at time t:
+/// Time is divided into blocks. The exchange with the smallest e is used for each block. A line is fitted to these with
+/// the weights 1 / (δ₀ + 2 eᵢ − 2 e_min). The line is then moved into the range that all of them allow at time t:
 ///     maxᵢ (θᵢ − eᵢ − ρ|t − tᵢ|) ≤ θ(t) ≤ minᵢ (θᵢ + eᵢ + ρ|t − tᵢ|)
-/// The error bound is the distance to the farther end of this range. It is proved for a given ρ (core/PROOFS.md, "Clock
-/// offset"). If the range is empty, the clock of the peer was set: In this case, `steps` is increased and all previous
-/// exchanges are discarded.
+/// The error bound is the distance to the farther end of this range. Proof: core/PROOFS.md, "Clock offset". If the
+/// range is empty, the clock of the peer was set. In this case, `steps` is increased and all data is discarded.
 ///
 /// A block has at least 16 exchanges and 3.2 s. This was the best of six estimators in measurements at 5 Hz between
 /// three pairs of hosts, with eight blocks.
@@ -51,8 +48,8 @@ class ClockOffsetEstimator {
     LocalTime to_local(PeerTime theirs) const noexcept { return LocalTime(theirs.time_since_epoch() - offset); }
   };
 
-  /// `fastest_drift` is ρ in s/s. The default is larger than the drift of a quartz. Throws std::invalid_argument if not
-  /// in 0 … 0.01.
+  /// `fastest_drift` is ρ in s/s. The default exceeds the drift of a quartz. Throws std::invalid_argument if not in 0 …
+  /// 0.01.
   explicit ClockOffsetEstimator(double fastest_drift = 200e-6);
 
   /// Ignores T4 < T1, T3 < T2, and a negative round trip that exceeds the drift. `answered_at` should not decrease.

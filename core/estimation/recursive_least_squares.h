@@ -40,7 +40,7 @@ class UdLeastSquares {
 
   const Vector& estimate() const noexcept { return estimate_; }
 
-  /// Replaces θ, for example by its projection into bounds. P stays.
+  /// Sets θ, for example to its projection into bounds. P stays.
   void set_estimate(const Vector& estimate) noexcept { estimate_ = estimate; }
 
   void reset() noexcept;  ///< resets P to p0 · I, so that the next samples dominate. θ does not change.

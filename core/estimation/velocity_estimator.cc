@@ -45,8 +45,7 @@ Vec<N> VelocityEstimatorOf<N>::observe(LocalTime at, const Vec<N>& position) noe
   const auto rate_to = [&](const Sample& past) { return 1e9 / static_cast<double>((at - past.at).count()); };
 
   for (Eigen::Index axis = 0; axis < N; ++axis) {
-    // Samples at the same position have the slope 0. It is sufficient to check the oldest of them, because its r(i) is
-    // the smallest.
+    // Samples at the same position have the slope 0. Only the oldest one is checked, because its r(i) is the smallest.
     const std::size_t first = std::max<std::size_t>(same_[static_cast<std::size_t>(axis)], 1);
     if (first < count_) {
       for (; known < first; ++known) rate[known] = rate_to(now[known]);

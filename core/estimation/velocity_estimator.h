@@ -25,11 +25,11 @@ namespace tendon {
 template <int N>
 class VelocityEstimatorOf {
  public:
-  /// If this is increased, the estimate is smoother at low speed, but a reversal is detected later. For 30 µm at 1 kHz
-  /// this resolves 2 mm/s.
+  /// If this is increased, the estimate is smoother, but a reversal is detected later. Resolves 2 mm/s at 30 µm and 1
+  /// kHz.
   static constexpr std::size_t kWindow = 16;
 
-  /// `resolution`: one encoder count at the handle, m; 0 = exact. Throws std::invalid_argument if it is negative or not
+  /// `resolution`: an encoder count at the handle, m; 0 = exact. Throws std::invalid_argument if negative or not
   /// finite.
   explicit VelocityEstimatorOf(double resolution);
 
@@ -44,9 +44,8 @@ class VelocityEstimatorOf {
   static constexpr std::size_t kSlots = 2 * kWindow;
 
   double resolution_;
-  /// The samples in the order from new to old, starting at `newest_`. New samples are inserted at the front. If there
-  /// is no room, the samples of one window are moved to the end. (In a ring buffer, every access would have to wrap the
-  /// index.)
+  /// The samples from new to old, starting at `newest_`. New samples are inserted at the front. If there is no room,
+  /// the samples of one window are moved to the end. (In a ring buffer, each access would have to wrap.)
   std::array<Sample, kSlots> samples_{};
   std::size_t newest_ = kSlots;
   std::size_t count_ = 0;  ///< number of samples starting at `newest_`, up to kWindow + 1

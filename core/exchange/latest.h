@@ -23,8 +23,7 @@ class Latest {
   T& back() { return slots_[back_]; }
   void put() { back_ = middle_.exchange(back_ | kFresh, std::memory_order_acq_rel) & kIndex; }
 
-  /// Reader only. Returns the newest value, or null if there is none since the last call. The result can be used until
-  /// the next call.
+  /// Reader only. Returns the newest value, or null if there is none since the last call. Valid until the next call.
   const T* take() {
     if ((middle_.load(std::memory_order_relaxed) & kFresh) == 0) return nullptr;
     front_ = middle_.exchange(front_, std::memory_order_acq_rel) & kIndex;

@@ -24,8 +24,8 @@ class SpscRing {
     expect(std::has_single_bit(capacity), "capacity", static_cast<double>(capacity), "a power of two");
   }
 
-  /// Writer only. Returns the slot of the next value, or null if the ring is full. The slot contains an older value,
-  /// and is not visible to the reader before `push`. For large values that are written in place.
+  /// Writer only. Returns the slot of the next value, or null if the ring is full. The slot contains an older value. It
+  /// is not visible to the reader until `push` is called. For large values that are written in place.
   T* back() {
     const std::size_t head = head_.load(std::memory_order_relaxed);
     if (head - tail_.load(std::memory_order_acquire) > mask_) return nullptr;

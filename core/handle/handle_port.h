@@ -51,8 +51,8 @@ class HandlePort {
 
   double energy() const noexcept { return law_.energy(); }
 
-  /// SharesAccount, J; `force` is N, or a wrench. Force and torque of a wrench share one account. For law none,
-  /// `credit` and `withdraw` do nothing, `payable` is 0 and `worst_loss` is +∞.
+  /// SharesAccount, J; `force` is N, or a wrench. The force and the torque of a wrench share the same account. For law
+  /// none, `credit` and `withdraw` do nothing, `payable` is 0 and `worst_loss` is +∞.
   void credit(double energy) noexcept {
     if (limits_) law_.credit(energy);
   }
@@ -84,7 +84,7 @@ class HandlePort {
 using WrenchPort = HandlePort<2, 3>;
 using GripPort = HandlePort<1>;
 
-/// Limits of the rotation of a handle. wrench_config() takes the other values from `point`.
+/// Limits for the rotation of a handle. The other values are taken from `point` by wrench_config().
 struct RotationLimits {
   Friction friction{};                        ///< τ_c, N·m, and b_r, N·m·s/rad: lower bounds
   double max_torque = 0;                      ///< N·m, > 0

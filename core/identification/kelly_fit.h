@@ -6,16 +6,15 @@
 
 namespace tendon {
 
-/// The identification method of the paper. If the force increases as s·t, the speed approaches a line with slope μ that
-/// intersects the time axis at t_i:
+/// The method of the paper. If the force increases as s·t, the speed approaches a line with slope μ and time intercept
+/// t_i:
 ///     (12)  b   = s/μ                  N·s/m
 ///     (11)  f_c = s t_i − m μ          N
 /// The fit uses the last 40 % of the slide. It fits a parabola to the positions, so it does not need a derivative.
 ///
 /// **The line is only an asymptote.** It is valid some m/b after break-away. Before that, the handle still accelerates,
 /// so μ is too small and b is too large: with 0.25 m of travel, 0.005 N·s/m is estimated as 0.07 to 0.25. A single run
-/// can only be tested with `long_enough` and a positive f_c. Two slopes can only be compared with two runs
-/// (friction_identification.h).
+/// can only be tested by `long_enough` and f_c > 0. Comparing slopes requires two runs (friction_identification.h).
 ///
 /// Source: Kelly, Llamas and Campa, IEEE TIM 49(4), 2000 (recalled); eqs (11), (12) of Lee & Lee 2009; core/PROOFS.md,
 /// "Friction identification".

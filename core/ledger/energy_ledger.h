@@ -30,12 +30,10 @@ class EnergyLedger {
     return book(-applied.dot(dx), squared, held);
   }
 
-  /// Books the worst motion of an interval in which the position was not measured, because the watchdog of the device
-  /// ended the hold or because a reading failed. A force of norm `applied` (N) was held for at most `at_most` and then
-  /// vanished:
+  /// Books the worst motion of an interval if the position was not measured, because the watchdog ended the hold or a
+  /// reading failed. A force of norm `applied` (N) was held for at most `at_most` and then set to zero:
   ///     ΔE = −at_most · (‖F‖ − f_c)₊² / (4b)
-  /// If b is 0, there is no such bound for a force above f_c. In this case, nothing is booked, and the limiter reduces
-  /// the force to f_c.
+  /// If b is 0, there is no such bound above f_c. Nothing is booked then, and the limiter reduces the force to f_c.
   double observe_unseen(double applied, Duration at_most) noexcept;
 
   /// Adds energy (J) from the account of another port, or subtracts it if the value is negative. E is then a shared
@@ -45,8 +43,7 @@ class EnergyLedger {
   /// Sets the lower bounds of friction from the next interval on. Ignores values that are negative or not finite.
   void adapt(const Friction& friction) noexcept;
 
-  /// Returns E in J. This can be negative if there is no limiter or if a hold was longer than expected (see
-  /// OutputBound).
+  /// Returns E in J. It can be negative if there is no limiter or a hold was too long (see OutputBound).
   double energy() const noexcept { return energy_.value(); }
 
  private:

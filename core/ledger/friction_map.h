@@ -8,9 +8,8 @@
 
 namespace tendon {
 
-/// Lower bounds of friction that depend on the position, which was identified at several places. (A single bound would
-/// have to be the minimum over the whole workspace.) The bound at x is the minimum over the nearest place and all
-/// places within `reach` of x.
+/// Lower bounds of friction that depend on the position, which was identified at several places. The bound at x is the
+/// minimum over the nearest place and all places within `reach` of x.
 /// Thread-safe: yes (immutable). Realtime-safe: `at`, which is linear in the number of places.
 class FrictionMap {
  public:

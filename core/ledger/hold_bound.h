@@ -5,8 +5,7 @@
 
 namespace tendon {
 
-/// Computes an upper bound T for the duration of the next hold. It follows the measured times and is used by
-/// OutputBound.
+/// Computes an upper bound T for the duration of the next hold from the measured times, for OutputBound.
 ///     T(0)   = T_max                                        from the scene
 ///     T(n+1) = min((1 + margin) · held, most · T_max)       if held > T(n); never below T(n)
 ///     T(n+1) = T(n) − max(1 ns, (T(n) − T_max) · held/memory), not below T_max            otherwise

@@ -7,9 +7,8 @@
 
 namespace tendon {
 
-/// The energy ledger for positions from an encoder. The result is a lower bound of the E that would be computed by
-/// EnergyLedger using the true positions. Positions are rounded to a count Δ, so the error of each component is at most
-/// Δ/2. Therefore:
+/// The energy ledger for positions from an encoder. It is a lower bound of the E that EnergyLedger computes using the
+/// true positions. Positions are rounded to a count Δ, so the error of each component is at most Δ/2. Therefore:
 ///     work       Σ f·dx measured ≤ Σ f·dx true + (Δ/2) Σ ‖f(k) − f(k−1)‖₁ + (Δ/2) ‖f(n)‖₁      (Abel summation);
 ///                the ledger subtracts the two terms
 ///     Coulomb    credits f_c times the net travel since the last turning point, each component reduced by Δ. The path

@@ -13,9 +13,8 @@
 namespace tendon {
 
 /// Learns from the answers how the remote force depends on the position of the hand, and extrapolates the newest answer
-/// to the current position. This compensates for the delay and interpolates between answers. x_a is the position to
-/// which answer F_a belongs. (F_p, x_p) is the last pair that was used. At a new answer, with p = x_a − x_p, if ‖p‖ ≥
-/// ℓ:
+/// to the current position. This compensates for the delay and interpolates between answers. Answer F_a belongs to the
+/// position x_a. (F_p, x_p) is the last pair that was used. At a new answer, if p = x_a − x_p and ‖p‖ ≥ ℓ:
 ///     q = K p                                                              N, prediction of the model
 ///     N ← λ N − (F_a − F_p)·q,   D ← λ D + ‖q‖²,   θ = clamp(N/D, 0, 1)    trust; 0 before two lessons
 ///     K ← K + g (−(F_a − F_p) − q) pᵀ / (‖p‖² + ℓ²/10)                     N/m, 3 × 3
@@ -23,8 +22,7 @@ namespace tendon {
 /// and in every haptic step, with d = x − x_a:
 ///     F = F_a − θ K d + r,   ‖θ K d‖ ≤ max_stiffness ‖d‖,   ‖F − r‖ ≤ 1.5 F_late;   r ← r τ_r/(τ_r + T)
 /// r is chosen so that F does not jump at an answer. τ_r is `blend` or `blend_share` times the mean time between
-/// answers, whichever is smaller. F_late is the largest recent answer (within 1 s). θ decreases if the force changes
-/// with time.
+/// answers, whichever is smaller. F_late is the largest recent answer (within 1 s). θ decreases if the force varies.
 ///
 /// One-sided contact: if an answer is exactly zero and at least 0.3 mm away from the last force, it is assumed that the
 /// object can only push. F then fades to zero along F_a without reversing, F_a = 0 predicts zero, and pairs with a zero

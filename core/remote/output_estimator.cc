@@ -9,8 +9,7 @@
 namespace tendon {
 namespace {
 
-/// m/N. Scales the regressor F(k−1) so that pole and stiffness have the same prior. For p0 = 1e8 (N/m)², the prior
-/// error of the pole is 10.
+/// m/N. Scales F(k−1) so that pole and stiffness have the same prior. For p0 = 1e8 (N/m)², the error of the pole is 10.
 constexpr double kPoleScale = 1e-3;
 
 LeastSquaresConfig checked(const OutputEstimator::Config& config) {

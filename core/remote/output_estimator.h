@@ -30,8 +30,7 @@ namespace tendon {
 /// first update, the held force is used as the prediction. The pole is bounded, because a pole that was fitted to 25 Hz
 /// data is often unstable at 1 kHz. The prediction is also bounded, because its error can be some newtons after a
 /// change of the environment. The result must be bounded by a limiter. The axes are independent: a wall at an angle to
-/// the axes is modelled by three springs that are only correct along the direction of the last press. Engines can send
-/// a LocalModel instead.
+/// the axes is modelled by three springs that are only correct along the last press. Engines can use LocalModel.
 ///
 /// Source: Lee and Lee, "Multirate output estimation for real-time haptic rendering". Only the abstract is available,
 /// so the condition for resetting P is a guess. Cap, cooldown, bounds, freeze and re-anchoring are ours:

@@ -12,8 +12,7 @@
 namespace tendon {
 
 /// The force along the normal of a contact at several depths. force[i] is along +normal, for a tool that is `depth_i =
-/// first + i · step` deeper than at the answer, at the position `at − depth_i · normal`. Linear in between, constant
-/// beyond.
+/// first + i · step` deeper than at the answer, at `at − depth_i · normal`. Linear in between, constant beyond.
 struct ForceTable {
   static constexpr std::size_t kMinEntries = 2;
   static constexpr std::size_t kMaxEntries = 16;  ///< 5 mm if the entries are spaced by 0.3 mm; uses 128 bytes
@@ -52,8 +51,7 @@ struct RotationModel {
   Mat3 stiffness = Mat3::Zero();  ///< N·m/rad, −∂τ/∂θ, base frame axes
 };
 
-/// The torque on the hand that is requested by a remote physics engine, in base frame axes, about the position of the
-/// handle.
+/// The torque on the hand, requested by a remote physics engine, in base frame axes, about the position of the handle.
 struct RemoteTorque {
   Vec3 torque = Vec3::Zero();  ///< N·m
   std::optional<RotationModel> model{};

@@ -28,8 +28,8 @@ struct Diolaiti {
   double tau = 0;    ///< delay in periods: d
   DiolaitiRegion region = DiolaitiRegion::kPassive;
   /// m/s, v_lim = (4/π) f_c/(K (T/2 + dT) − b), or infinite if β ≥ ½ + τ. This is the velocity amplitude of the limit
-  /// cycle according to its describing function, for KT² ≪ m. In simulation, the motion decays at 0.94 v_lim and grows
-  /// at 1.18 v_lim.
+  /// cycle according to its describing function, for KT² ≪ m. Simulated motion decays at 0.94 v_lim and grows at 1.18
+  /// v_lim.
   double speed_limit = 0;
 };
 

@@ -37,8 +37,7 @@ std::optional<EnergyTank> tank_of(const CouplingConfig& config, const MappedEnd&
   EnergyTank::Config tank = *config.tank;
   tank.peers = 1;
   tank.joule[0] = frame.joule();
-  // The value of `start` must be the same at both ends. Otherwise, it would be too small at the end with the smaller
-  // value of a joule.
+  // The value of `start` must be equal at both ends, or it would be too small at the end with the smaller joule.
   tank.start = frame.worth(tank.start);
   tank.epoch = config.spring.epoch;
   return EnergyTank(tank);
@@ -46,8 +45,7 @@ std::optional<EnergyTank> tank_of(const CouplingConfig& config, const MappedEnd&
 
 std::optional<TurnCoupling> turn_of(const CouplingConfig& config, const MappedEnd& frame) {
   if (!config.turn) return std::nullopt;
-  // For the other methods, there is no spring at the leader, so the spring of the follower is not part of a loop with
-  // the delay.
+  // For the other methods, there is no spring at the leader, so the follower's spring is not in a loop with the delay.
   const bool springs = config.method == CouplingMethod::kPositionPosition || config.method == CouplingMethod::kWaves;
   return TurnCoupling(*config.turn,
                       TurnCoupling::End{.role = config.role,

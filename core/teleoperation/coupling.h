@@ -18,8 +18,7 @@
 namespace tendon {
 
 /// Implements one end of a coupling between two devices. This includes engaging, the clutch, loss of the peer, position
-/// mapping, the control law, and the exchange of energy. The haptic loop of each device owns one object. The network
-/// only transfers PortStates.
+/// mapping, the law, and the exchange of energy. The haptic loop of each device owns one object.
 ///
 /// **In each period**, in this order:
 ///     coupling.receive(state of the peer)            any number of states, possibly late or duplicated
@@ -78,8 +77,8 @@ namespace tendon {
 /// it answers a state that was never sent, if `energy_in` has decreased within the epoch, or if the tank refuses it.
 /// Older states and duplicates are ignored. If the position or the velocity of the hand is not finite or larger than
 /// 10¹², the demand is not finite and the limiter sets the force to 0. The same is true for the orientation and the
-/// opening if they are coupled. If a measured force is not finite, 0 is used instead. If a contact force is not finite,
-/// it is treated as not measured.
+/// opening if they are coupled. If a measured force is not finite, 0 is used instead. A contact force is ignored if it
+/// is not finite.
 ///
 /// **Share.** If a follower has several leaders (Couplings), K, D, B, max_force, and the contact force of each pair are
 /// multiplied by its share α at both ends. If the follower does not send α (PortState::share), it is 1. The rate of α
@@ -109,8 +108,7 @@ class Coupling {
   void renew() noexcept;  ///< must be called if the peer has been replaced or has restarted
 
   /// Sets the scales of the leader, 0.01 … 100. Returns false and does nothing if this end is the follower, if the
-  /// coupling is engaged or aligning, if the method or a gripper requires constant scales, or if a scale is out of
-  /// range.
+  /// coupling is engaged or aligning, if the method or a gripper needs constant scales, or if one is out of range.
   bool set_scale(double position_scale, double force_scale) noexcept;
   /// Sets the share α of a follower with Config::share for the next `command`. `others` is the gain of the ramp of
   /// another leader. A robot only holds its position with the remaining part.
@@ -129,15 +127,13 @@ class Coupling {
   /// Must be called instead of `command` if there is no position. This only updates the phase. The force is 0.
   void command_unseen(LocalTime now, bool ready) noexcept;
 
-  /// Returns the changes of the account, which are 0 if neither a tank nor waves are used. Must be called between
-  /// `command` and the limiter.
+  /// Returns the changes of the account, or 0 without a tank or waves. Must be called before the limiter.
   EnergyTank::Settlement settle(double payable, double loss, Duration elapsed) noexcept;
 
   /// Returns the same for the account of the gripper. Both values are 0 if the grippers are not coupled.
   EnergyTank::Settlement settle_grip(double payable, double loss, Duration elapsed) noexcept;
 
-  /// Ends the period. `applied` (N), `torque` (N·m), and `grip` (N) were applied by the device, `contact` (N) acts on
-  /// the tool.
+  /// Ends the period. `applied` (N), `torque` (N·m), and `grip` (N) are from the device, `contact` (N) is on the tool.
   void conclude(const Vec3& applied, const std::optional<Vec3>& contact, const Vec3& torque = Vec3::Zero(),
                 double grip = 0) noexcept;
   /// Returns the state to send in this period. Must be called after `conclude`.

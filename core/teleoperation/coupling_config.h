@@ -33,8 +33,7 @@ struct CouplingConfig {
   PoseMap::Config map{};
   /// `stiffness`, `damping`, and `own_damping` are the values of the leader. The other fields are used for this end.
   PositionPosition<3>::Config spring{};
-  /// `start` is in joules of the leader, `max_power` and `max_account` in joules of this end. The constructor sets the
-  /// rest.
+  /// `start` is in joules of the leader, `max_power` and `max_account` of this end. The constructor sets the rest.
   std::optional<EnergyTank::Config> tank{};
   /// Used by the follower if the method is `surface`, in the scale of the follower.
   SurfaceEstimator<3>::Config surface{

@@ -10,7 +10,6 @@
 
 namespace tendon {
 
-/// Returns true if the law computes the force.
 bool Coupling::driven() const noexcept {
   const bool holds = config_.holds_place && std::visit([](const auto& law) { return law.kHoldsSilent; }, law_);
   return live() && (!loss_stage_.silent || holds);
@@ -94,8 +93,7 @@ Demand<3> Coupling::law(const Vec3& velocity) noexcept {
   return demand;
 }
 
-/// Returns the gain g of the ramp times the law. If this is a robot, adds 1 − g times the force of the spring that
-/// holds its position.
+/// Returns the gain g of the ramp times the law. A robot adds 1 − g times the spring that holds its position.
 Demand<3> Coupling::blended(const Motion& hand) noexcept {
   Demand<3> demand = law(hand.velocity);
   const PositionPosition<3>::Config& spring = config_.spring;

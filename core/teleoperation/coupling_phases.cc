@@ -14,7 +14,6 @@ bool Coupling::heard_since(std::uint64_t sequence) const noexcept {
   return newest_.answers_epoch == config_.spring.epoch && newest_.answers >= sequence;
 }
 
-/// Returns true if the peer is engaged in the same act.
 bool Coupling::peer_serves() const noexcept {
   return newest_.answers_epoch == config_.spring.epoch && newest_.engagement == engagement_ &&
          (newest_.phase == PortPhase::kEngaged || (!leads() && newest_.phase == PortPhase::kClutched));
@@ -166,8 +165,7 @@ void Coupling::follow_scales() noexcept {
   if (tank_) tank_->revalue(0, frame_.joule(), frame_.worth(config_.tank->start));
 }
 
-/// Sets the scales of a follower to those of the leader. The energy between two states is only used if both states
-/// contain the current scales.
+/// Sets the scales of a follower to those of the leader. Energy is only used between two states with these scales.
 void Coupling::take_scales(const PortState& peer) noexcept {
   if (keeps_scales(config_.method) || grip_) return;
   const bool before = !heard() || frame_.tells_ours(newest_);

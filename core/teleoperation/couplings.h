@@ -17,8 +17,7 @@ struct CoupledLeader {
   double share = 1;           ///< initial α
 };
 
-/// Contains the couplings of one device. This is a single coupling, or one for each leader if this is a follower with 2
-/// to 4 leaders.
+/// Contains the couplings of one device: a single coupling, or one for each leader if a follower has 2 to 4 leaders.
 ///     F = Σ α_i (K (y_i − u_i) + D (ẏ_i − u̇_i) − B u̇_i)       at the follower
 ///     F_i = α_i (K (u_i − y_i) + D (u̇_i − ẏ_i) − B ẏ_i)        at leader i
 /// In free motion x_f = Σ α_i x_i over the engaged leaders, where the α_i are divided by their sum. Each pair is a
@@ -32,8 +31,7 @@ struct CoupledLeader {
 /// limiter, one after the other, and each of them only sees the remaining energy. This satisfies the condition of the
 /// theorem in energy_tank.h: before the bound, coupling j gives ΔG_j ≤ max(A_j, 0) with A_j = A + Σ_{k≤j} R_k − Σ_{k<j}
 /// ΔG_k. Therefore Σ ΔG ≤ max(A + Σ R, 0), and only R increases A. The limiter is only called after all couplings. If α
-/// changes while a spring is stretched, the work ½ ΔK δ² is charged to the account, and the limiter reduces the force
-/// if there is not enough energy.
+/// changes while a spring is stretched, the work ½ ΔK δ² is charged to the account.
 ///
 /// **Messages.** Each leader receives its part of the account and of the need: α_i A and α_i n. The ratio A/n, which
 /// determines the payments, is the same for all leaders. If each leader received the entire need, each would send all

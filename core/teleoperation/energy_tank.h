@@ -29,10 +29,9 @@ struct EnergyTankMessage {
 /// An energy tank (Franken et al.) for one of several coupled ports that exchange energy. The ports are passive
 /// together, although each of them may generate net energy.
 ///
-/// If two coupled devices have a limiter each, each device is passive **by itself**, but the follower cannot move
-/// because it must not do net work. It is sufficient if the sum of all ports is passive. Therefore each port gives
-/// energy from its account to the others, and its limiter bounds the force by this account instead of its own ledger.
-/// Port i has
+/// If two coupled devices have a limiter each, each is passive **by itself**, but the follower cannot move because it
+/// must not do net work. It is sufficient if the sum of all ports is passive. Each port therefore gives energy from its
+/// account to the others. Its limiter uses this account instead of its own ledger. Port i has
 ///     L_i       its ledger (EnergyLedger), with the applied force
 ///     G_ij      the total given to j;    R_ji the largest received G_ji
 ///     A_i = L_i − Σ_j G_ij + Σ_j R_ji − discarded_i          the account: Limiter::energy
@@ -45,8 +44,7 @@ struct EnergyTankMessage {
 /// G_ij, because totals do not decrease and only the largest received one is used. So Σ L_i = Σ A_i + Σ (G_ij − R_ij) +
 /// Σ discarded_i ≥ 0, because each term is ≥ 0. ∎ The theorem requires no common clock, no acknowledgement and no
 /// retransmission. It is assumed that all holds are at most T_max long (see OutputBound for longer holds). Several
-/// tanks can use the same account one after the other if `payable` is set to the remaining energy (Couplings). This
-/// satisfies the condition.
+/// tanks can use the same account one after the other if `payable` is the remaining energy (Couplings).
 ///
 /// **Amount.** The ports equalize the ratio of account to need, and count the energy in transit:
 ///     n_i = ℓ_i(F_wanted) + ε          ℓ: SharesAccount::worst_loss;  ε > 0, so that a port at rest can start to move
@@ -71,8 +69,7 @@ struct EnergyTankMessage {
 /// **Trust.** The sum is ≥ 0 if the accounts of the peers are correct. If they are not, this port can still ensure that
 /// L ≥ −(max_account + max_power · t). Received energy is only credited up to an allowance, which is initially
 /// max_account and increases by max_power and by the given energy up to max_account. The remaining energy is discarded.
-/// If an account exceeds max_account, the excess is also discarded. Discarding is always safe (core/PROOFS.md,
-/// "Discarded credit").
+/// The part of an account above max_account is also discarded. This is safe (core/PROOFS.md, "Discarded credit").
 ///
 /// **Bad input.** A message is refused and counted in `refused` if a value is not finite or out of bounds, if `taken`
 /// exceeds the given total, or if a total decreases although its sequence increases. Messages are ignored if they are

@@ -53,9 +53,8 @@ class FalconDevice final : public Device {
   std::optional<PositionSample> read(LocalTime now) noexcept override;
   Joints joints(const Motion& hand) const noexcept override;
   Vec3 apply(const Vec3& force) noexcept override;
-  /// Output 0, "ring", consists of light-emitting diodes. Each of red, green and blue is on if its intensity is at
-  /// least half. The color is only used if forces can be rendered. Pure red means not ready, so green replaces pure red
-  /// and off.
+  /// Output 0, "ring", consists of light-emitting diodes. Each of red, green and blue is on if it is at least half. The
+  /// color is only used if forces can be rendered. Pure red means not ready, so green replaces pure red and off.
   void set_output(LocalTime now, std::uint32_t output, const OutputSetting& setting) noexcept override;
 
  private:

@@ -15,8 +15,7 @@
 #include "devices/usb/pipe.h"
 
 /// The firmware of the Falcon must be loaded by the host whenever the device was switched on. It is not included in
-/// Tendon because redistribution is not allowed by Novint's license. It must be loaded from a file that was provided
-/// with the device.
+/// Tendon because Novint's license does not allow this. It must be loaded from a file that came with the device.
 namespace tendon::falcon {
 
 /// For files that look like firmware but are not known.

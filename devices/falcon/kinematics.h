@@ -37,8 +37,7 @@ struct Pose {
 std::optional<Pose> pose_at(const Vec3& position) noexcept;
 
 /// Uses Newton's method with steps of at most 15 mm, which are halved until there is a pose. The error is at most 1e-9
-/// m. A start at a distance of 0.2 mm requires about 4 of 25 steps. Returns nullopt if there is no pose, or none at
-/// `start`.
+/// m. A start at a distance of 0.2 mm requires about 4 of 25 steps. Nullopt if there is no pose, or none at `start`.
 std::optional<Pose> pose_with(const Vec3& angles, const Vec3& start) noexcept;
 
 /// The largest count known to work: ±0.41 N·m at the joint. libnifalcon's 300 000, sent in 16 bits, may reverse signs.

@@ -27,8 +27,7 @@ class ReplayDevice final : public Device {
     Duration at{};  ///< only differences matter
     Vec3 position = Vec3::Zero();
   };
-  /// kHold: keeps the last position. kRepeat: starts again after the mean interval, and jumps if the ends are
-  /// different.
+  /// kHold: keeps the last position. kRepeat: starts again after the mean interval, and jumps if the ends differ.
   using AtEnd = ScriptedMotion::Recorded::AtEnd;
 
   struct Config {

@@ -13,8 +13,7 @@ namespace tendon {
 /// Realtime-safe: yes. One thread calls `beat`; `last` may be called from any thread or process.
 class Heartbeat {
  public:
-  /// If there is no step for this time, the force is ended by the guardian and the device must be armed again
-  /// (SafeDevice).
+  /// If there is no step for this time, the guardian ends the force and the device must be armed again (SafeDevice).
   static constexpr Duration kStill = std::chrono::milliseconds(20);
 
   void beat(bool holds_force) noexcept {

@@ -82,8 +82,7 @@ class Watchdog {
   Config config_;
 };
 
-/// A button that must be held, similar to a teach pendant (ISO 10218-1: enabling device). It is released if the
-/// operator lets go of the handle.
+/// A button that must be held, as on a teach pendant (ISO 10218-1: enabling device). It is released with the handle.
 class DeadManSwitch {
  public:
   struct Config {

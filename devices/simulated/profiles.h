@@ -59,8 +59,7 @@ struct KnownRange {
 };
 
 /// Parameters of a finger, hand or arm. They vary between people and increase with the grip force. A spring, a damper
-/// and a mass are used because this is the simplest model that is different from a wall. It is not accurate above about
-/// 50 Hz or if the grip is light.
+/// and a mass are the simplest model that is different from a wall. Not accurate above about 50 Hz or for a light grip.
 struct OperatorProfile {
   std::string_view name;
   KnownRange stiffness;  ///< N/m

@@ -16,8 +16,7 @@
 
 namespace tendon {
 
-/// A 3Dconnexion SpaceMouse as a leader without force. The cap is used to control the velocity because it can only be
-/// moved by some millimetres:
+/// A 3Dconnexion SpaceMouse as a leader without force. The cap controls the velocity because its travel is too short:
 ///
 ///     d = (X, −Z, Y) / 350, no longer than 1;     v = speed · (|d| − dead_band) / (1 − dead_band) · d/|d|, or 0
 ///     within; p ← p + v (now − before), each component within ±reach

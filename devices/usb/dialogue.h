@@ -23,8 +23,7 @@ namespace tendon::usb {
 ///     may_send(…), send(…)             the next request
 ///
 /// **Requests.** Up to `Patience::most_under_way` requests can be pending, and an answer completes all of them. After
-/// `Patience::answer`, they are considered lost and another one can be sent. Requests are sent immediately if they end
-/// a force.
+/// `Patience::answer`, they are considered lost and another one can be sent. Requests that end a force do not wait.
 ///
 /// **Force.** The device is assumed to render the last command until its own watchdog expires.
 /// Thread-safe: `counts` only. Realtime-safe: all except the constructor.

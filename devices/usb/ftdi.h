@@ -10,8 +10,7 @@
 /// Vendor requests and packets of FTDI's serial chips (FT232R), from libftdi's `ftdi.h` and Linux' `ftdi_sio.h`.
 namespace tendon::usb::ftdi {
 
-/// The modem and line status, which is sent at the start of each IN packet. When idle, these are sent alone, once per
-/// latency period.
+/// The modem and line status at the start of each IN packet. When idle, it is sent alone, once per latency period.
 inline constexpr std::size_t kStatusBytes = 2;
 
 constexpr std::span<const std::uint8_t> payload(std::span<const std::uint8_t> packet) noexcept {

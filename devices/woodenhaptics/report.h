@@ -38,8 +38,7 @@ struct Report {
 /// Returns nullopt if the length or `info` is invalid. Thread-safe, realtime-safe.
 std::optional<Report> parse(std::span<const std::uint8_t> bytes) noexcept;
 
-/// The switch at the tip of some arms. The host library compares counter d with 5000, but it is never set by the
-/// firmware.
+/// The switch at the tip of some arms. The host library compares counter d with 5000, but the firmware never sets it.
 inline bool switch_is_closed(const Report& report) noexcept { return report.counters[3] > 5000; }
 
 }  // namespace tendon::woodenhaptics

@@ -23,8 +23,7 @@ class SampledSteps {
 
   SampledSteps() : steps_(kRemembered) {}
 
-  /// Interpolates skipped ticks, because a client can answer a predicted tick that was not received by the network
-  /// thread.
+  /// Interpolates skipped ticks, because a client can answer a predicted tick that the network thread did not receive.
   void observe(std::uint64_t tick, LocalTime at, LocalTime sent);
 
   std::optional<Step> find(std::uint64_t tick) const;  ///< nothing if unknown, or older than kRemembered steps

@@ -14,10 +14,9 @@ namespace tendon {
 
 /// The cost of each part of a scene in the haptic thread, measured as the processor time of HapticLoop::step. The
 /// scene's device is coupled to a spring of 500 N/m, which is updated in every tenth step. The cost of a part is the
-/// difference between the scene with and without this part. It can be negative if other parts have more work without
-/// it. The cost of the device is the difference to a playback of its first 2000 positions, so it does not exceed the
-/// cost of the step. Each cost is the minimum over 80 rounds of 200 steps, and is not significant if it is smaller than
-/// `resolution_ns`.
+/// difference between the scene with and without this part. It can be negative if other parts then have more work. The
+/// cost of the device is the difference to a playback of its first 2000 positions, so it does not exceed the cost of
+/// the step. Each cost is the minimum of 80 rounds of 200 steps. It is not significant below `resolution_ns`.
 struct Explanation {
   struct Part {
     std::string_view key;

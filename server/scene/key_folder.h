@@ -15,8 +15,7 @@ std::vector<ClientKey> read_key_folder(const std::filesystem::path& folder);
 /// The name of the key is the name of the file. Throws the same errors.
 ClientKey read_key(const std::filesystem::path& file);
 
-/// Creates a complete file that can only be read by its owner. Throws std::runtime_error on failure or if it already
-/// exists.
+/// Creates a complete file that only its owner can read. Throws std::runtime_error on failure or if it already exists.
 void write_key_file(const std::filesystem::path& file, const ClientKey& key);
 
 }  // namespace tendon

@@ -149,8 +149,7 @@ struct ScenePart {
 
 const std::vector<ScenePart>& scene_parts();
 
-/// Everything that depends on the part is also removed. The device must be simulated. Returns false if there is no such
-/// part.
+/// Everything that depends on it is also removed. The device must be simulated. Returns false if it does not exist.
 bool take_out(Scene& scene, std::string_view key);
 
 std::string scene_reference();

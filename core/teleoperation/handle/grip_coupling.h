@@ -35,13 +35,11 @@ namespace tendon {
 ///
 /// **Account.** One joule of the follower's gripper is s_f joules of the leader's, since openings are not scaled. The
 /// grippers have a separate tank, with the same messages (PortGrip) and limits, so the theorem of EnergyTank is also
-/// true for the pair of grippers. The energy for the motion of the follower's fingers comes from the motion of the
-/// leader's.
+/// true for the pair of grippers. The leader's fingers provide the energy for the motion of the follower's.
 ///
 /// **Robots.** A follower with `holds_place` that is not live holds the opening z_h with the full K_f, where z_h = g_f
 /// + F/K_f is chosen once such that the force does not change. An object is neither dropped nor squeezed harder. This
-/// is also true when the leader engages again, because w then starts at this opening. A fault ends the force. The grip
-/// of a hand fades.
+/// is also true when the leader engages again, because w then starts at this opening. A fault ends the force.
 ///
 /// **Bad input.** A state that the tank would refuse is refused entirely (`accepts`). Openings must be finite.
 /// Thread-safe: no. Realtime-safe: yes, except the constructor.

@@ -34,8 +34,7 @@ namespace tendon {
 /// **Account.** Force and torque share one account. With x_f = s_x x_l and θ_f = θ_l, one joule of the leader must be
 /// s_x/s_f joules of the follower for both, so
 ///     K_l = (s_f/s_x) K_f,  B_l = (s_f/s_x) B_f          τ_l = (s_f/s_x) Rᵀ τ_f          (PoseMap)
-/// K and B are set at the leader. The law is not passive if y is delayed; the limiter and the tank make the pair
-/// passive.
+/// K and B are set at the leader. If y is delayed, the pair is only passive because of the limiter and the tank.
 ///
 /// **Methods.** For position-position and waves, there is a spring at the leader, too, so that the torques at both ends
 /// are the same (waves do not transfer rotations). With all other methods the torque of the leader is −B ω, because the

@@ -11,8 +11,7 @@ namespace tendon {
 /// because the viscous friction of a device is too small. The law adds B, because otherwise E_in is 0 and the pair
 /// cannot start to move. E_in is the energy of this coupling. The energy of the peer is counted from the first state of
 /// an epoch on, because the energy before that state may already have been used. This law can generate some mJ because
-/// of the mass of the tool and because both ends predict one period. The pair therefore needs limiters and an energy
-/// tank.
+/// of the mass of the tool and because both ends predict one period. It needs limiters and an energy tank.
 class PassivityLaw : public CouplingLaw {
  public:
   PassivityLaw(const CouplingConfig& config, const MappedEnd& frame);

@@ -25,8 +25,7 @@ struct FollowerMessage {
 };
 
 /// The leader's end of two-channel time-domain passivity control. The velocity is sent to the follower, and the force
-/// is received. An end can only output energy that was received by the other end before. This does not depend on the
-/// network.
+/// is received. For any network, an end can only output energy that was received by the other end before.
 ///     E_in  = Σ (−F·Δx)₊      E_out = Σ (F·Δx)₊         with the force F applied to the hand
 ///     F_wanted = F_received − α v,   smallest α ≥ 0 with   T F_wanted·v ≤ E_in,follower(received) − E_out
 /// α (N·s/m) is a series damper with the limit `max_damping`, which also avoids the division by a small v. Since E_in

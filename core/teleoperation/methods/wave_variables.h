@@ -46,8 +46,7 @@ struct WaveMessage {
 /// limitation or a period of another length. Energy is made available at the time τ and not when it is received.
 /// Otherwise, the energy of a burst would be used immediately for a part of its integral, and no energy would be left
 /// for the force after that. Jitter, loss, reordering and bursts do not change the integral, so the positions of both
-/// ends return to their initial values up to (friction)/K, with K as below. If no more messages arrive, r̂ is 0 after
-/// W.
+/// ends return to their initial values up to (friction)/K, with K as below. Without messages, r̂ is 0 after W.
 ///
 /// **Passivity in sampled time** (core/PROOFS.md, "Wave variables"). The account A of the port (J) contains the energy
 ///     A += min(T r̂²/2, E(τ) − U) − T s²/2 − F·Δx

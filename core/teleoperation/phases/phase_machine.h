@@ -8,8 +8,7 @@
 
 namespace tendon {
 
-/// Inputs of the phase machine. In each period, the caller checks them in this order and calls `next` for each that is
-/// true.
+/// Inputs of the phase machine. In each period, the caller checks them in this order and calls `next` if one is true.
 enum class PhaseInput : std::uint8_t {
   kNotReady,  ///< The device is not connected, is disarmed, or has a fault.
   kReady,     ///< The device is ready.
