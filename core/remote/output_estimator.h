@@ -60,7 +60,7 @@ class OutputEstimator {
 
   struct Counts {
     std::uint64_t corrections = 0;  ///< answers used
-    std::uint64_t ignored = 0;      ///< answers that are not finite, or to unknown, too old or answered motions
+    std::uint64_t ignored = 0;      ///< answers that are not finite, or whose motion is unknown, too old or answered
     std::uint64_t resets = 0;       ///< of P, over all axes
     std::uint64_t frozen = 0;       ///< axes without enough motion to learn from an answer
   };

@@ -339,7 +339,7 @@ void SimulatedDevice::take_substeps(Duration::rep count, double h) noexcept {
   const double begin = seconds(lived_);
   double viscous = 0;
   if (config_.viscous_friction) viscous = h / 2 * *config_.viscous_friction;
-  Side handle{config_.mass, 0};  // all of the mass, or the side of the handle
+  Side handle{config_.mass, 0};  // the whole mass, or only the handle if there is a structural mode
   if constexpr (kMode) handle.mass = config_.structural_mode->handle_mass;
   if constexpr (kEffects.hand) handle.mass += hand_->mass();
   handle.resistance = handle.mass;

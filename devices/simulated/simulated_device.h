@@ -70,7 +70,7 @@ namespace tendon {
 /// If the velocity reaches or crosses zero and friction can hold the device, it stops: v₁ = 0. Sticking is exact,
 /// without a velocity threshold. This rule is stable for any hand. It does not add or remove energy, since m (v₁ −
 /// v₀)·v̄ is exactly the change of the kinetic energy. Numerical damping would make all limiters look better than they
-/// are: with semi-implicit Euler at 50 µs, springs are still stable that are 5 % too stiff for the real device. In a
+/// are: with semi-implicit Euler at 50 µs, springs that are 5 % too stiff for the real device are still stable. In a
 /// structural mode, the mean deflection is used for the spring, and both velocities are computed from a linear
 /// equation; its frequency is (2/h) atan(ω h/2), 0.03 % low at 200 Hz.
 ///
@@ -245,7 +245,7 @@ class SimulatedDevice final : public Device {
   std::optional<SimulatedGripper> gripper_;
   SimulatedOutputs outputs_;
   bool turns_or_grips_ = false;
-  bool has_more_ = false;  ///< including button presses
+  bool has_more_ = false;  ///< true if there is a rotation, a gripper or a button press
   Substeps take_substeps_;
   DeviceInfo info_;
   std::optional<LocalTime> last_read_;

@@ -121,12 +121,13 @@ class SceneFileError : public SceneError {
 };
 
 /// Throws SceneError if the scene is not valid, and SceneFileError if the file cannot be read or is not a regular file.
-/// Reports the first error, and missing keys only if there are no others, because a misspelled key is both.
+/// Reports the first error, and missing keys only if there are no others, because a misspelled key is also a missing
+/// one.
 Scene read_scene(const std::filesystem::path& file);
 
 /// Reads the scenes of a server. `loop.device` is set to the index of the first device of each scene. Only the first
-/// scene can have tables [network] and [recording]. Device names must be unique, and USB devices must be among the
-/// first limits::kMaxDevices of at most kMostDevices. `overrides` returns settings for parse_scene().
+/// scene can have tables [network] and [recording]. Device names must be unique. There can be kMostDevices, and USB
+/// devices must be among the first limits::kMaxDevices. `overrides` returns settings for parse_scene().
 using Overrides = std::function<std::vector<std::string>(const Scene&)>;
 std::vector<Scene> read_scenes(const std::vector<std::filesystem::path>& files, const Overrides& overrides = {});
 

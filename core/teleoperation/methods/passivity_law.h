@@ -7,11 +7,11 @@ namespace tendon {
 
 /// The method `passivity`: the force of the leader is s_f Rᵀ(−F_follower) − (α + B) u̇_l (PassivityLeader), where
 /// F_follower is the force of the follower on its tool. The spring of the follower has the stiffness K_f. Its reference
-/// starts at u and moves with the velocity of PassivityFollower, where λ = drift_rate. The upper limit of α is B,
-/// because the viscous friction of a device is too small. The law adds B, because otherwise E_in is 0 and the pair
-/// cannot start to move. E_in is the energy of this coupling. The energy of the peer is counted from the first state of
-/// an epoch on, because the energy before that state may already have been used. This law can generate some mJ because
-/// of the mass of the tool and because both ends predict one period. It needs limiters and an energy tank.
+/// starts at u and moves with the velocity of PassivityFollower, where λ = drift_rate. The upper limit of α is B. (The
+/// viscous friction of a device would be too small.) The law adds B, because otherwise E_in is 0 and the pair cannot
+/// start to move. E_in is the energy of this coupling. The energy of the peer is counted from the first state of an
+/// epoch on, because the energy before that state may already have been used. This law can generate some mJ because of
+/// the mass of the tool and because both ends predict one period. It needs limiters and an energy tank.
 class PassivityLaw : public CouplingLaw {
  public:
   PassivityLaw(const CouplingConfig& config, const MappedEnd& frame);

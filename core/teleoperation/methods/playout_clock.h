@@ -12,7 +12,7 @@ namespace tendon {
 ///     τ = t − min delay − D,      D = p99 of (delay + wait for a gap) − min delay,   0 ≤ D ≤ max_playout
 /// t is the local time and τ the time of the sender. A delay is the local arrival time minus the sending time; the
 /// offset of the clocks cancels. Both statistics use the last 256 to 512 messages. If the clock rates differ by 200
-/// ppm, this shifts τ by less than 0.1 ms at 1000/s. τ does not jump. Its rate is 1 + (lag / 250 ms), in [0, 2].
+/// ppm, this shifts τ by less than 0.1 ms at 1 kHz. τ does not jump. Its rate is 1 + (lag / 250 ms), in [0, 2].
 ///
 /// τ does not pass the newest message. If messages arrive in a burst that is longer than D, τ stops until the burst
 /// arrives, and continues at the same place. Nothing is skipped, so that an integral and its energy remain consistent.
