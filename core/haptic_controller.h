@@ -99,7 +99,8 @@ struct Step : PositionStep {
 ///
 /// Overruns: if an interval is longer than the longest_hold of the scene, its measured length is used, the step is
 /// flagged, and the limiter adapts (HoldBound). If it is longer than the watchdog of the device, or if a position is
-/// missing, the worst motion is booked. (If longest_hold is the watchdog time, this is not needed, but K_op is lower.)
+/// missing, the worst motion is booked. (If longest_hold is the watchdog time, there is no condition, but K_op → 2b /
+/// T_max.)
 ///
 /// A fault is latched: the force is zero (through the slew limit while positions are measured) until `rearm`. `disarm`
 /// is for the operator. This sets the force to zero without a ramp until `rearm` is called. It does not clear a fault.

@@ -12,7 +12,7 @@ namespace tendon {
 ///       decltype(&::libusb_init) init = file["libusb_init"];
 ///     };
 ///
-/// Preloaded libraries are used instead, as for linked libraries. Thread-safe: yes. Realtime-safe: no.
+/// Preloaded libraries take precedence, as for linked libraries. Thread-safe: yes. Realtime-safe: no.
 class LateLibrary {
  public:
   /// Converts to any function pointer without checking the type. Use the types in the header of the library.

@@ -48,8 +48,8 @@ class LogLoop {
   /// kTaken removes the steps, ports, datagrams and flights from the mailboxes and records them. kLeft leaves them.
   enum class Records : std::uint8_t { kTaken, kLeft };
 
-  /// The first scene configures the recording. `recorded`: the mailboxes with datagrams. Throws the errors of
-  /// PartRecorder.
+  /// The first scene configures the recording. `recorded` lists the mailboxes with the datagrams of each network loop.
+  /// Throws the errors of PartRecorder.
   LogLoop(const std::vector<Watched>& devices, const std::vector<Mailboxes*>& recorded, LocalTime started,
           Records records = Records::kTaken);
 

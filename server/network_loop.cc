@@ -164,8 +164,7 @@ DatagramFilter::Sender NetworkLoop::sender_of(const ServerHandshake::Client& cli
   return client.key != nullptr || let_in ? kClient : kUnauthenticated;
 }
 
-/// Repeats a lost answer. In suites 1 and 2 to any address, because it is only useful for the owner of the ephemeral
-/// key.
+/// Repeats a lost answer. In suites 1 and 2 to any address, because only the owner of the ephemeral key can use it.
 bool NetworkLoop::answer_again(LocalTime now, const Address& from, const ServerHandshake::Client& client) {
   for (const auto* list : {&clients_, &half_open_}) {
     for (const ServedClient& present : *list) {

@@ -16,10 +16,10 @@
 namespace tendon {
 
 /// If an object of this class exists, denormals (numbers below 2.2e-308) are treated as 0 by this thread, both as
-/// operands and as results. Otherwise, decaying forces and velocities become denormal, and arithmetic is then about a
-/// hundred times slower on x86-64. Create one in each step rather than one per thread, because a driver or a library
-/// that is loaded later can change the mode. The destructor restores the previous mode. x86-64 and AArch64; no effect
-/// elsewhere. Realtime-safe: yes.
+/// operands and as results. Otherwise, decaying forces and velocities become denormal, which makes arithmetic a hundred
+/// times slower on x86-64. Create one in each step rather than one per thread, because a driver or a library that is
+/// loaded later can change the mode. The destructor restores the mode. x86-64 and AArch64; no effect elsewhere.
+/// Realtime-safe: yes.
 class [[nodiscard]] DenormalsOff {
  public:
   DenormalsOff() noexcept : before_(mode()) { set_mode(before_ | kFlush); }

@@ -30,7 +30,8 @@ double expm1(double x) noexcept;
 /// Returns exactly ±1 for |x| ≥ 20, including ±∞.
 double tanh(double x) noexcept;
 
-/// Sine and cosine of x rad. Beyond 2³⁰ rad, x is reduced by the double nearest to 2π. ±∞ gives NaN.
+/// Sine and cosine of x rad. Beyond 2³⁰ rad, x is reduced by the double nearest to 2π, with an error that grows with x.
+/// ±∞ gives NaN.
 double sin(double x) noexcept;
 double cos(double x) noexcept;
 

@@ -12,9 +12,9 @@ namespace tendon {
 /// reflective force, f_e the wanted one, and Δx the last displacement. f(n) is the nearest force to f_e with
 ///     (i)   f(n)·Δx ≤ f(n−1)·Δx + c₁ ‖Δx‖²              the slope is at most c₁
 ///     (ii)  ‖f(n)‖² ≤ ‖f(n−1)‖² + 2 c₂ f(n)·Δx           it stores no more than was put in
-/// with c₂ ≤ c₁ ≤ b/T in N/m. If c₂ > c₁, the conditions can contradict each other. The law displays at most about c₁,
 /// with c₂ ≤ c₁ ≤ b/T in N/m. If c₂ > c₁, the conditions can contradict each other. The law can display a stiffness of
 /// at most about c₁, which is half of what force bounding and the AOL can display with the same friction.
+///
 /// The port is passive because E(n) ≥ ‖f(n)‖²/(2c₂), even if the device reduces the force. The proof assumes that holds
 /// are not longer than `longest_hold`. If an interval is not finite or not measured, the law restarts from zero force.
 ///

@@ -48,7 +48,7 @@ class ForceBounding {
 /// F is in N on the hand, F(n−1) is the applied force, and T the longest hold time. Walls feel like a spring with a
 /// stiffness of 2b/T. If a bound is not used, it is not saved. The force therefore only grows while the hand moves into
 /// the wall, and decreases by 2b/T times the distance of the hand to its deepest point. The port is passive for every
-/// demand, because E(n) ≥ T ‖F(n)‖²/(4b) in every step. If a hold was longer than T, the measured time is used.
+/// demand, because E(n) ≥ T ‖F(n)‖²/(4b) in every step. If a hold was longer than T, the viscous term uses its length.
 ///
 /// Source: Kim, Baek, Ryu, 2015, "more conservative" form with ξ = 1 (recalled; form as in published code);
 /// core/PROOFS.md, "Comparison laws".

@@ -12,6 +12,7 @@ namespace tendon {
 /// the friction of the device allows. All other laws are connected to the hand by a spring with this slope, K_max. The
 /// spring connects the hand to a proxy. The reflective force f = −F becomes g while the proxy does not move, and f(n)
 /// if it moves by (g − f(n))/K_max. P is the energy that the proxy has received so far:
+///     g    = f(n−1) + K_max Δx(n)
 ///     f(n) = the force nearest to f_e with  P(n) = P(n−1) + f(n)·(g − f(n))/K_max ≥ 0      (a ball about g/2)
 /// in N, m and J, with P(0) = 0. The port is passive for every demand if
 ///     b ≥ K_max T/2

@@ -12,7 +12,7 @@ namespace tendon {
 ///     F(n) = F_wanted · min(1, K q(n)/‖F_wanted‖)
 /// K (N/m) is the stiffness of the demand along its force if that is positive, else `stiffness`. A plain sampled spring
 /// has the energy ½ K x², although only ½ K x² − Σ ½ K Δx² was put in. Here the storage pays for the difference, so the
-/// state lags behind the position. Two amounts are booked as debt, which is repaid by half of all later energy:
+/// state lags behind the position. Two amounts are booked as debt, which is repaid by half of all energy put in later:
 ///     leap       while the hand moves into the force, q is at least the last motion, because the spring could not
 ///                load from q = 0 otherwise: ½ K ‖Δx‖² − H
 ///     overdraft  H < 0, because the hand moved further out than the state: H := 0

@@ -24,8 +24,9 @@ struct ClockExchange {
 /// Time is divided into blocks. The exchange with the smallest e is used for each block. A line is fitted to these with
 /// the weights 1 / (δ₀ + 2 eᵢ − 2 e_min). The line is then moved into the range that all of them allow at time t:
 ///     maxᵢ (θᵢ − eᵢ − ρ|t − tᵢ|) ≤ θ(t) ≤ minᵢ (θᵢ + eᵢ + ρ|t − tᵢ|)
-/// The error bound is the distance to the farther end of this range. Proof: core/PROOFS.md, "Clock offset". If the
-/// range is empty, the clock of the peer was set. In this case, `steps` is increased and all data is discarded.
+/// The error bound is the distance to the farther end of this range. It is proved for a given ρ (core/PROOFS.md, "Clock
+/// offset"). If the range is empty, the clock of the peer was set. Then, `steps` is increased and all data is
+/// discarded.
 ///
 /// A block has at least 16 exchanges and 3.2 s. This was the best of six estimators in measurements at 5 Hz between
 /// three pairs of hosts, with eight blocks.
@@ -48,7 +49,7 @@ class ClockOffsetEstimator {
     LocalTime to_local(PeerTime theirs) const noexcept { return LocalTime(theirs.time_since_epoch() - offset); }
   };
 
-  /// `fastest_drift` is ρ in s/s. The default exceeds the drift of a quartz. Throws std::invalid_argument if not in 0 …
+  /// `fastest_drift` is ρ in s/s. The default exceeds that of a quartz. Throws std::invalid_argument if not in 0 …
   /// 0.01.
   explicit ClockOffsetEstimator(double fastest_drift = 200e-6);
 

@@ -25,12 +25,11 @@ namespace tendon {
 template <int N>
 class VelocityEstimatorOf {
  public:
-  /// If this is increased, the estimate is smoother, but a reversal is detected later. Resolves 2 mm/s at 30 µm and 1
-  /// kHz.
+  /// If this is increased, the estimate is smoother at low speed, but a reversal is detected later. 2 mm/s for 30 µm at
+  /// 1 kHz.
   static constexpr std::size_t kWindow = 16;
 
-  /// `resolution`: an encoder count at the handle, m; 0 = exact. Throws std::invalid_argument if negative or not
-  /// finite.
+  /// `resolution`: encoder count at the handle, m; 0 = exact. Throws std::invalid_argument if negative or not finite.
   explicit VelocityEstimatorOf(double resolution);
 
   /// Returns the velocity in m/s. The sample is ignored if it is not finite or not newer.

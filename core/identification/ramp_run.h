@@ -23,7 +23,7 @@ struct RampRun {
 
 /// The part of a run in which the handle slides. If necessary, it is mirrored so that the handle slides along +x. The
 /// first 5 counts of the motion are not included because the handle can bend before it slides. The last 5 counts and 2
-/// samples are not included because of the stop at the end. A median of 5 samples removes outliers.
+/// samples before the farthest point are not included because of the stop. A median of 5 samples removes outliers.
 struct Slide {
   std::vector<RampSample> samples;
   double direction = 0;  ///< direction of the motion in the coordinates of the run, +1 or −1

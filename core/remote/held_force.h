@@ -44,7 +44,8 @@ class HeldForce {
  public:
   struct Config {
     Duration hold = std::chrono::milliseconds(20);  ///< covers two lost datagrams of a 100 Hz engine
-    /// Time constant. The force is reduced by 90 % in 115 ms, so that this does not feel like a kick.
+    /// Time constant. The force is reduced by 90 % in 115 ms. This does not feel like a kick, and a hand cannot lean on
+    /// it.
     Duration decay = std::chrono::milliseconds(50);
     /// Time from the end of validity to the safe stop. The force is then below 1 %.
     Duration safe_stop = std::chrono::milliseconds(250);

@@ -22,7 +22,8 @@ namespace tendon {
 /// and in every haptic step, with d = x − x_a:
 ///     F = F_a − θ K d + r,   ‖θ K d‖ ≤ max_stiffness ‖d‖,   ‖F − r‖ ≤ 1.5 F_late;   r ← r τ_r/(τ_r + T)
 /// r is chosen so that F does not jump at an answer. τ_r is `blend` or `blend_share` times the mean time between
-/// answers, whichever is smaller. F_late is the largest recent answer (within 1 s). θ decreases if the force varies.
+/// answers, whichever is smaller. F_late is the largest recent answer (within 1 s). θ decreases if the force varies
+/// over time.
 ///
 /// One-sided contact: if an answer is exactly zero and at least 0.3 mm away from the last force, it is assumed that the
 /// object can only push. F then fades to zero along F_a without reversing, F_a = 0 predicts zero, and pairs with a zero

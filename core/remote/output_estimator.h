@@ -28,9 +28,9 @@ namespace tendon {
 ///     re-anchor on the newest motion that was answered: off = −F − φᵀθ, or F(k) computed again since
 /// An axis does not learn while the hand has moved by less than three encoder counts since the last update. Until the
 /// first update, the held force is used as the prediction. The pole is bounded, because a pole that was fitted to 25 Hz
-/// data is often unstable at 1 kHz. The prediction is also bounded, because its error can be some newtons after a
-/// change of the environment. The result must be bounded by a limiter. The axes are independent: a wall at an angle to
-/// the axes is modelled by three springs that are only correct along the last press. Engines can use LocalModel.
+/// data is often unstable at 1 kHz. The prediction is also bounded, because its error can be some newtons if the
+/// environment changes. The result must be bounded by a limiter. The axes are independent: a wall at an angle to the
+/// axes is modelled by three springs that are only correct along the last press. Engines can send a LocalModel instead.
 ///
 /// Source: Lee and Lee, "Multirate output estimation for real-time haptic rendering". Only the abstract is available,
 /// so the condition for resetting P is a guess. Cap, cooldown, bounds, freeze and re-anchoring are ours:

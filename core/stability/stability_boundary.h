@@ -10,7 +10,8 @@ namespace tendon {
 ///
 /// Returns the spectral radius of one period of the closed loop. This is the magnitude of the largest eigenvalue of the
 /// exact discretisation, where the previous position and the d forces in transit are additional states. The loop is
-/// stable if this is less than 1. The other boundaries are compared with it. Thread-safe: yes. Realtime-safe: no.
+/// stable if this is below 1 and unstable above. The other boundaries are compared with it. Thread-safe: yes.
+/// Realtime-safe: no.
 double spectral_radius(const SampledSpring& spring);
 
 /// Returns the K (N/m) at which the spectral radius reaches 1, with a relative error of 1e-9, or 0 if the virtual
@@ -26,7 +27,7 @@ struct LinearLaw {
   double stiffness = 0;  ///< (b + B)/(T/2 + dT), N/m
   /// |B| (T/2 + dT)/m. If this is less than 0.003, the error of the law is at most 1 %, compared with the eigenvalues.
   /// The law is 3 % too high at 0.013, and four times too high at 1.4 (75 g, 1 kHz, B ≤ 5 N·s/m, d ≤ 20). Without a
-  /// damper, it is 1.5 %.
+  /// damper, it is at most 1.5 %.
   double damper_share = 0;
 };
 

@@ -18,7 +18,8 @@
 namespace tendon {
 
 /// Implements one end of a coupling between two devices. This includes engaging, the clutch, loss of the peer, position
-/// mapping, the law, and the exchange of energy. The haptic loop of each device owns one object.
+/// mapping, the law, and the exchange of energy. The haptic loop of each device owns one object, and the network only
+/// transfers PortStates.
 ///
 /// **In each period**, in this order:
 ///     coupling.receive(state of the peer)            any number of states, possibly late or duplicated
@@ -77,8 +78,8 @@ namespace tendon {
 /// it answers a state that was never sent, if `energy_in` has decreased within the epoch, or if the tank refuses it.
 /// Older states and duplicates are ignored. If the position or the velocity of the hand is not finite or larger than
 /// 10¹², the demand is not finite and the limiter sets the force to 0. The same is true for the orientation and the
-/// opening if they are coupled. If a measured force is not finite, 0 is used instead. A contact force is ignored if it
-/// is not finite.
+/// opening if they are coupled. If a measured force is not finite, 0 is used instead. Such a contact force is treated
+/// as not measured.
 ///
 /// **Share.** If a follower has several leaders (Couplings), K, D, B, max_force, and the contact force of each pair are
 /// multiplied by its share α at both ends. If the follower does not send α (PortState::share), it is 1. The rate of α
@@ -103,7 +104,7 @@ class Coupling {
   /// Starts an act; must be called at the leader. Returns true if the coupling is engaging or was engaged before.
   /// Returns false and does nothing if the phase is alone, lost or fault, or if the peer is not ready.
   bool engage() noexcept;
-  void disengage() noexcept;  ///< ends the act; this can be called at both ends
+  void disengage() noexcept;  ///< ends the act; both ends can call this
 
   void renew() noexcept;  ///< must be called if the peer has been replaced or has restarted
 
@@ -127,7 +128,8 @@ class Coupling {
   /// Must be called instead of `command` if there is no position. This only updates the phase. The force is 0.
   void command_unseen(LocalTime now, bool ready) noexcept;
 
-  /// Returns the changes of the account, or 0 without a tank or waves. Must be called before the limiter.
+  /// Returns the changes of the account, or 0 without a tank or waves. Must be called between `command` and the
+  /// limiter.
   EnergyTank::Settlement settle(double payable, double loss, Duration elapsed) noexcept;
 
   /// Returns the same for the account of the gripper. Both values are 0 if the grippers are not coupled.
@@ -197,7 +199,7 @@ class Coupling {
   bool answered_ = false;         ///< leader: the follower is engaged in this act
   bool ready_ = false;
   std::uint64_t act_sequence_ = 0;   ///< the first state that contains the act
-  std::uint64_t lost_sequence_ = 0;  ///< the first state that contains the loss, or 0 if the peer knows about it
+  std::uint64_t lost_sequence_ = 0;  ///< first state that contains the loss; 0 if the peer knows it or there is none
   LocalTime acted_at_{};
   Clutch clutch_;
   Alignment alignment_;

@@ -27,11 +27,13 @@ struct CoupledLeader {
 ///
 /// **Phases.** The phases, clutch, offsets and loss of the peer are separate for each coupling. A leader that is not
 /// engaged does not contribute, and the other shares do not change unless set_share is called. The unused part is used
-/// by a robot (`holds_place`) to hold its position. **One account.** All couplings use the account of the device's
-/// limiter, one after the other, and each of them only sees the remaining energy. This satisfies the condition of the
-/// theorem in energy_tank.h: before the bound, coupling j gives ΔG_j ≤ max(A_j, 0) with A_j = A + Σ_{k≤j} R_k − Σ_{k<j}
-/// ΔG_k. Therefore Σ ΔG ≤ max(A + Σ R, 0), and only R increases A. The limiter is only called after all couplings. If α
-/// changes while a spring is stretched, the work ½ ΔK δ² is charged to the account.
+/// by a robot (`holds_place`) to hold its position.
+///
+/// **One account.** All couplings use the account of the device's limiter, one after the other, and each of them only
+/// sees the remaining energy. This satisfies the condition of the theorem in energy_tank.h: before the bound, coupling
+/// j gives ΔG_j ≤ max(A_j, 0) with A_j = A + Σ_{k≤j} R_k − Σ_{k<j} ΔG_k. Therefore Σ ΔG ≤ max(A + Σ R, 0), and only R
+/// increases A. The limiter is called once, after all couplings. If α changes while a spring is stretched, the work ½
+/// ΔK δ² is charged to the account, and the limiter reduces the force if there is not enough energy.
 ///
 /// **Messages.** Each leader receives its part of the account and of the need: α_i A and α_i n. The ratio A/n, which
 /// determines the payments, is the same for all leaders. If each leader received the entire need, each would send all

@@ -44,7 +44,8 @@ struct EnergyTankMessage {
 /// G_ij, because totals do not decrease and only the largest received one is used. So Σ L_i = Σ A_i + Σ (G_ij − R_ij) +
 /// Σ discarded_i ≥ 0, because each term is ≥ 0. ∎ The theorem requires no common clock, no acknowledgement and no
 /// retransmission. It is assumed that all holds are at most T_max long (see OutputBound for longer holds). Several
-/// tanks can use the same account one after the other if `payable` is the remaining energy (Couplings).
+/// tanks can use the same account one after the other if `payable` is the remaining energy (Couplings), which satisfies
+/// the condition.
 ///
 /// **Amount.** The ports equalize the ratio of account to need, and count the energy in transit:
 ///     n_i = ℓ_i(F_wanted) + ε          ℓ: SharesAccount::worst_loss;  ε > 0, so that a port at rest can start to move

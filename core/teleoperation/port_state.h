@@ -11,7 +11,7 @@
 
 namespace tendon {
 
-/// The phase of a coupling. There is only a force in `kEngaged`, while it then fades out, and if a robot holds still.
+/// The phase of a coupling. There is only a force in `kEngaged`, in the fade after it, and if a robot holds still.
 enum class PortPhase : std::uint8_t {
   kAlone = 1,  ///< no peer
   kCoupled,    ///< no force; states are received, and the operator can engage

@@ -81,8 +81,8 @@ class FalconDevice final : public Device {
 
   falcon::ReplyParser parser_;
   std::optional<falcon::Reply> newest_{};
-  bool fresh_ = false;         ///< number of consecutive replies that are homed; negative if they are not homed
-  int homed_replies_ = 0;      ///< consecutive replies, < 0 if not homed
+  bool fresh_ = false;         ///< located in this `read`
+  int homed_replies_ = 0;      ///< number of consecutive replies that are homed; negative if they are not homed
   bool moved_origin_ = false;  ///< encoders have lost counts
   std::optional<falcon::Pose> pose_{};
   bool located_ = false;

@@ -31,9 +31,9 @@ class ForceLimit {
 /// Limits the rate at which a force can be increased in its own direction:
 ///
 ///     ‖s F‖ ≤ (F_before · F/‖F‖)₊ + rate · T
+///
 /// Forces may decrease at once, and reversed forces start at zero. If all changes were limited, the force would be
-/// applied even if it is no longer requested. Source: HD_EXCEEDED_MAX_FORCE_IMPULSE (0x0202) of OpenHaptics. no longer
-/// requested. Source: HD_EXCEEDED_MAX_FORCE_IMPULSE (0x0202) of OpenHaptics.
+/// applied even if it is no longer requested. Source: HD_EXCEEDED_MAX_FORCE_IMPULSE (0x0202) of OpenHaptics.
 class GrowthLimit {
  public:
   struct Config {
@@ -106,10 +106,10 @@ class HeatLimit {
 /// so that forces are not reduced if they pull the hand back. Far out, devices are close to their stops and
 /// singularities, where a small position error causes a large force error.
 ///
-/// The workspace does not apply a force and does not add damping. The force of such a wall would not be visible to the
-/// energy limiter, and it would only be passive if b > K T/2 + |B| (Colgate and Schenkel, J. Robotic Systems 14(1),
-/// 1997). With b = 1 N·s/m at 1 kHz, that allows a wall of 2 N/mm without damping or a damper of 1 N·s/m without a
-/// spring, and the limiter could no longer rely on that b. An engine can render such a wall through the limiter.
+/// The workspace does not apply a force and does not add damping. The force of a wall here would not be visible to the
+/// energy limiter, and the wall would only be passive if b > K T/2 + |B| (Colgate and Schenkel, J. Robotic Systems
+/// 14(1), 1997). With b = 1 N·s/m at 1 kHz, that allows a wall of 2 N/mm without damping or a damper of 1 N·s/m without
+/// a spring, and the limiter could no longer rely on that b. An engine can render such a wall through the limiter.
 class Workspace {
  public:
   struct Sphere {

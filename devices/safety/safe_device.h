@@ -68,7 +68,7 @@ std::string_view to_string(SafetyFault fault) noexcept;
 ///
 /// **Disarming** by the operator is not a fault either: the device returns to Homed, without a force, and a pending
 /// request is cancelled. It cannot be armed by `kStart` or the dead man's button until `arm` is called; the button must
-/// be pressed again after that. A fault is not cleared. If a watchdog is ramping the force down, it becomes one.
+/// be pressed again after that. A fault is not cleared. If a watchdog is ramping the force down, this becomes a fault.
 ///
 /// If the process hangs or dies, the guardian (guardian.h) or the device's watchdog ends the force. A guardian adds two
 /// faults, both set by the next `read`: kCommandSilent, if `apply` is not called for Heartbeat::kStill, and

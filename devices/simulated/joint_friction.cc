@@ -47,7 +47,7 @@ Stiction sticking(const Turns& turns, const Mat3& coupling, const Vec3& free, co
 }
 
 /// Returns the unique impulse with |impulseᵢ| ≤ mostᵢ. If joint i moves, its impulse is opposite to the velocity and
-/// |impulseᵢ| = mostᵢ. The nonzero entries of `known` are used as given. Selects the best of 27 cases.
+/// |impulseᵢ| = mostᵢ. The nonzero entries of `known` are given. Uses the best of 27 cases, because of rounding.
 Stiction stiction_of(const Mat3& coupling, const Vec3& free, const Vec3& most, const Turns& known = {}) noexcept {
   Stiction best;
   const auto holds = [&](Turns turns) {

@@ -27,8 +27,8 @@ class ScriptedMotion {
     Vec3 direction = Vec3::UnitX();  ///< normalized automatically
   };
 
-  /// Moves to `to` at a constant speed, starting at `from`. If `hold` is set, the hand moves back and forth, and waits
-  /// for this time at each end. The velocity is discontinuous. If both points are equal, the hand does not move.
+  /// Moves from `from` to `to` at a constant speed and stops there. If `hold` is set, it moves back and forth, and
+  /// waits for this time at each end. The velocity is discontinuous. If both points are equal, the hand does not move.
   struct RampHold {
     Vec3 from = Vec3::Zero();
     Vec3 to = Vec3::Zero();

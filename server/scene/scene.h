@@ -121,8 +121,7 @@ class SceneFileError : public SceneError {
 };
 
 /// Throws SceneError if the scene is not valid, and SceneFileError if the file cannot be read or is not a regular file.
-/// Reports the first error, and missing keys only if there are no others, because a misspelled key is also a missing
-/// one.
+/// Reports the first error, and missing keys only if there are no others, as a misspelled key is also missing.
 Scene read_scene(const std::filesystem::path& file);
 
 /// Reads the scenes of a server. `loop.device` is set to the index of the first device of each scene. Only the first

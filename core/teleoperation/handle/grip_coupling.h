@@ -39,7 +39,8 @@ namespace tendon {
 ///
 /// **Robots.** A follower with `holds_place` that is not live holds the opening z_h with the full K_f, where z_h = g_f
 /// + F/K_f is chosen once such that the force does not change. An object is neither dropped nor squeezed harder. This
-/// is also true when the leader engages again, because w then starts at this opening. A fault ends the force.
+/// is also true when the leader engages again, because w then starts at this opening. A fault ends the force. The grip
+/// of a hand fades.
 ///
 /// **Bad input.** A state that the tank would refuse is refused entirely (`accepts`). Openings must be finite.
 /// Thread-safe: no. Realtime-safe: yes, except the constructor.

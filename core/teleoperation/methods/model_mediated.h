@@ -87,7 +87,7 @@ class SurfaceEstimator {
   Moments moments_;
 };
 
-/// The leader's end of model-mediated teleoperation, which renders a surface. Energy from its changes must be paid for.
+/// The leader's end, which renders a surface at the full rate. Energy from a change of the model must be paid for.
 ///     F_wanted = K (d' − n·x)₊ n,     ½ K (d' − n·x)₊² ≤ ½ K_old (d'_old − n_old·x)₊² + budget
 /// In each period, the newest received surface is used. It is placed deeper (d' ≤ d) if its energy at the hand would
 /// exceed the energy of the previous one plus the budget. It then rises to its position as the hand retracts or as
