@@ -7,8 +7,8 @@ option(TENDON_FUZZ "Build the fuzz targets (clang)" OFF)
 if(TENDON_SANITIZE)
   add_compile_options(-fsanitize=${TENDON_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all)
   add_link_options(-fsanitize=${TENDON_SANITIZE})
-  # These check every access through a pointer and cost as much time as all the others together. Except for alignment and
-  # bad casts, AddressSanitizer finds the same errors. deploy/test-sanitizers has them.
+  # These two checks test every access through a pointer and take as much time as all other checks together. Except for
+  # alignment and bad casts, AddressSanitizer finds the same errors. deploy/test-sanitizers enables them.
   if(TENDON_SANITIZE MATCHES "undefined" AND NOT TENDON_SANITIZE_ALL)
     add_compile_options(-fno-sanitize=null,alignment,object-size,vptr)
   endif()

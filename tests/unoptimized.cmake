@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 # Precompiled headers for tests that are not optimized.
 #
-# With clang the inline functions of these headers are compiled once, optimized, into an object that each program links,
-# and not again in each source (https://clang.llvm.org/docs/UsersManual.html, "Building a PCH with object file").
+# With clang, the inline functions of these headers are compiled only once. They are optimized and put into an object
+# that each program links, instead of being compiled again in each source (https://clang.llvm.org/docs/UsersManual.html,
+# "Building a PCH with object file").
 #
-# This is for tests alone. The linker keeps one copy of an inline function, and a program that ships must not get one that
-# was not optimized.
+# Only tests may do this. The linker keeps one copy of an inline function, and an installed program must not get a copy
+# that was not optimized.
 
-# A failed test names its line. For a debugger there is the preset `dev`.
+# A failed test prints its line. Use the preset `dev` with a debugger.
 set(tests_debug_information $<$<CONFIG:RelWithDebInfo>:-g0>)
 
 # tendon_headers(name LIBS … HEADERS …): declares a set of headers.
@@ -44,8 +45,9 @@ function(tendon_links_headers program name)
       set(scope INTERFACE)
     endif()
     get_target_property(functions ${name}_functions FUNCTIONS)
-    # As a source it comes before the libraries: no member of an archive is linked for an inline function that it has
-    # too. Some of these functions call others that no library defines. The linker drops them because nobody calls them.
+    # The object is a source, so it comes before the libraries and no member of an archive is linked only for an inline
+    # function. Some of these functions call others that no library defines. The linker drops them because they are
+    # never called.
     target_sources(${program} ${scope} ${functions})
     target_link_libraries(${program} ${scope} -Wl,--gc-sections)
     add_dependencies(${program} ${name}_functions)

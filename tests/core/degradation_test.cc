@@ -20,7 +20,7 @@ using std::chrono::milliseconds;
 
 struct Stage {
   std::string name;
-  bool after_validity = false;  ///< "v + 20 ms": counted from the end of validity, not from the arrival of the force
+  bool after_validity = false;  ///< "v + 20 ms": counted from the end of the validity, not from the arrival
   Duration entered{};
   Mode mode{};
   Duration time_constant{};  ///< "e^(−t / 50 ms)", "t / 100 ms"

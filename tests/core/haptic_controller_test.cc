@@ -99,7 +99,7 @@ TEST(HapticController, AnOverrunIsBookedAsItWasAndFlagged) {
   EXPECT_DOUBLE_EQ(step.energy, 0.05 * 1e-3 + 0.26 * 1e-6 / 5e-3);
 }
 
-// Some energy is stored, and the hand follows the force during the pause (worst case).
+// The account holds some energy, and during the pause the hand follows the force, which is the worst case.
 Step after_a_pause(Bench& bench, Duration pause) {
   bench.move_freely(100);
   bench.want(-6);
@@ -132,7 +132,7 @@ TEST(HapticController, AfterAnOverrunTheLedgerNeverFallsAndRecovers) {
 TEST(HapticController, TheSecondHoldAsLongAsALateOneTakesNothing) {
   Bench bench(config());
   const Step first = after_a_pause(bench, std::chrono::microseconds(2230));
-  // Deficit (T_act − T)(‖F‖ − f_c)²/(4b): the force spent the whole account.
+  // The deficit is (T_act − T)(‖F‖ − f_c)²/(4b): the force has spent the whole account.
   EXPECT_NEAR(first.energy, -1.23e-3 * std::pow(first.was_applied.norm() - 0.05, 2) / (4 * 0.26), 1e-12);
   EXPECT_EQ(first.longest_hold, Duration(2787500)) << "2.23 ms and a quarter more";
   double x = bench.last.hand.position.x();
@@ -203,7 +203,7 @@ TEST(HapticController, APauseBeyondTheWatchdogIsChargedTheWorstNoMore) {
   bench.move_freely(100);
   bench.want(-6);
   const Step before = bench.move_to(0.02);
-  const Step after = bench.move_to(0.07, milliseconds(60));  // a long motion with the force off earns no credit
+  const Step after = bench.move_to(0.07, milliseconds(60));  // a long motion without a force does not fill the account
   EXPECT_TRUE(after.reasons.has(Reason::kWatchdog));
   EXPECT_NEAR(after.energy, before.energy - 5e-3 * std::pow(before.force.norm() - 0.05, 2) / (4 * 0.26), 1e-12);
 }

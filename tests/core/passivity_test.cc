@@ -151,8 +151,8 @@ TEST_P(Passivity, AHoldBeyondTheBoundTakesNoMoreThanIsSaid) {
   }));
 }
 
-// A searching adversary: hill climbing over genes of hand and environment maximizes the energy extracted relative to
-// the ledger's peak.
+// A searching adversary. It uses hill climbing over the genes of hand and environment to maximize the extracted energy
+// relative to the ledger's peak.
 struct Gene {
   double follow = 0;           // factor on the worst motion of eq. (7)
   Vec3 move = Vec3::Zero();    // m, added motion
@@ -165,7 +165,8 @@ class Search {
   Search(Law law, double bound_scale, std::uint64_t seed, bool late = false)
       : law_(law), bound_scale_(bound_scale), late_(late), dice_(seed) {}
 
-  /// Returns the lowest objective relative to the ledger's peak. Negative: below zero or the minimum for a late hold.
+  /// Returns the lowest objective relative to the ledger's peak. A negative value means that the ledger was below zero,
+  /// or below the minimum for a late hold.
   double worst() {
     double worst = 0;
     for (int start = 0; start < 20; ++start) {
@@ -203,7 +204,7 @@ class Search {
   }
 
   double objective(const std::vector<Gene>& genes) const {
-    // Zero Coulomb friction, or laws that ignore it would have a margin.
+    // The Coulomb friction is zero, because laws that ignore it would otherwise have a margin.
     const Friction friction{0, kViscous};
     Limiter limiter({.law = law_, .friction = friction, .longest_hold = std::chrono::milliseconds(1)});
     const bool per_axis = law_ == Law::kAolPerAxis;

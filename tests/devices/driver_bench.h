@@ -12,8 +12,8 @@
 
 namespace tendon {
 
-/// One period of the haptic loop after another. `Bench` adds `device`, `step(force)`, which calls `drive` and `look`,
-/// and `home(force)`, which homes the device as a user would.
+/// Runs a driver one haptic period at a time. `Bench` adds `device`, `step(force)`, which calls `drive` and `look`, and
+/// `home(force)`, which homes the device as a user would.
 template <class Bench>
 struct DriverBench {
   void drive(Device& device, const Vec3& force) {
@@ -31,7 +31,7 @@ struct DriverBench {
     for (const LocalTime end = now + time; now < end;) bench().step(force);
   }
 
-  /// Homes the device if necessary. Returns false after `most`.
+  /// Homes the device if it is not homed. Returns false if this takes longer than `most`.
   bool reaches(Device::State state, Duration most, const Vec3& force = Vec3::Zero()) {
     for (const LocalTime end = now + most; now < end && bench().device.state() != state;) {
       bench().step(force);

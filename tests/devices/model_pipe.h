@@ -9,7 +9,7 @@
 
 namespace tendon {
 
-/// Cable between a driver and a device model in one thread. `now` is the caller's simulated clock.
+/// Connects a driver to a device model in the same thread. `now` is the caller's simulated clock.
 template <class Model>
 class ModelPipe final : public usb::Pipe {
  public:

@@ -104,7 +104,7 @@ TEST(Diagnostics, AnEngineThatSleepsOnThisMachineIsBlamedAndNeverTheNetwork) {
   Guest watcher(server.address(), [](const DeviceState&, const LinkStats&) {});
   Guest engine(server.address(), [](const DeviceState& hand) { return Touch(Vec3(-1000 * hand.position.x(), 0, 0)); });
 
-  // Exceeds short pauses of a machine, which look like a slow network.
+  // This exceeds short pauses of a machine, which look like a slow network.
   constexpr Duration kAsleep = std::chrono::milliseconds(500);
   std::uint64_t last = 0;
   int told = 0;
@@ -137,7 +137,7 @@ TEST(Diagnostics, AnEngineThatSleepsOnThisMachineIsBlamedAndNeverTheNetwork) {
 
 TEST(Diagnostics, AnObserverSeesArmingAndFaultAndStepsBeforeItAreKept) {
   const ScratchFolder folder;
-  // The hand rests until the device is armed and has reported it. Then it moves too fast.
+  // The hand rests until the device is armed and has reported this. Then it moves too fast.
   const std::string scene = R"([device]
 kind = "simulated"
 profile = "falcon"

@@ -22,7 +22,7 @@ using testing::FakeAvahi;
 
 constexpr const char* kName = "falcon at bench 3";
 
-/// tendond on the address of its scene, which is not limited to this machine.
+/// Starts tendond on the address of its scene, which other machines can also reach.
 class Tendond : public Process {
  public:
   Tendond(const std::filesystem::path& folder, std::vector<std::string> scenes, std::vector<std::string> environment)

@@ -30,7 +30,7 @@ double quantile(std::vector<double>& values, double share) {
   return *at;
 }
 
-/// Latency (µs) of a thread that has the scheduling of the haptic thread and only sleeps.
+/// Returns the latency (µs) of a thread that only sleeps and has the same scheduling as the haptic thread.
 class Floor {
  public:
   Floor()
@@ -57,7 +57,7 @@ class Floor {
   std::thread thread_;
 };
 
-/// As JSON {"name":value,…}, or one line of text for each value.
+/// Prints JSON {"name":value,…}, or one line of text for each value.
 class Report {
  public:
   explicit Report(const std::string& event) : event_(event) {}

@@ -39,7 +39,7 @@ void on_a_stage(const FalconStage::Config& config, const Claim& claim) {
   }
 }
 
-/// Accepts faults only after a pause of the machine.
+/// Faults are only accepted after a pause of the machine.
 void expect_no_fault(FalconStage& stage, const std::string& end) {
   const auto faults = count_in(end.substr(end.find("\"safety\"")), "faults");
   if (faults + count_in(end, "fault") == 0) return;
@@ -125,7 +125,8 @@ TEST(FalconServer, StoppedInMidForceItLetsGoAndPushesAgainOnlyAfterArming) {
       EXPECT_EQ(stage.falcon().seen().pushes_begun, pushes_begun) << "before it was armed\n"
                                                                   << stage.server().process().err();
       stage.arm();
-      // This may take more than one press, because the ledger assumes that the force was held during the whole pause.
+      // More than one press may be necessary, because the ledger assumes that the force was held during the whole
+      // pause.
       const auto pushed = [&stage] {
         stage.go_to(-0.015);
         stage.go_to(0.004);
@@ -203,7 +204,7 @@ TEST(FalconServer, UnpluggedInMidForceItPushesAgainOnlyAfterHomingAndArming) {
     EXPECT_NE(server.err().find("fault of the safety layer: the device was unplugged"), std::string::npos)
         << server.err();
     const auto pushes_begun = stage.falcon().seen().pushes_begun;
-    stage.falcon().plug();  // loses its firmware and origin; the hand is in the wall and the button is pressed
+    stage.falcon().plug();  // loses firmware and origin while the hand is in the wall and the button is pressed
     server.wait_for_line("the device must be homed");
     stage.wait_for_commands(100);
     EXPECT_EQ(stage.falcon().seen().pushes_begun, pushes_begun) << "before it was homed";

@@ -181,8 +181,8 @@ TEST(Guardian, OutlivesWhatEndsTheDriversProcessGroup) {
   ended_by(pid);
 }
 
-// A process under load frees its memory for tens of milliseconds before it closes its files. Another holder of the same
-// files prolongs this here.
+// A process under load frees its memory for tens of milliseconds before it closes its files. This takes longer here if
+// another process holds the same files.
 TEST(Guardian, WritesZeroWhenItsParentDiesAndAgainWhenTheFilesClose) {
   Heard device;
   std::array<int, 2> lingering{};
@@ -356,7 +356,7 @@ TEST(Guardian, KnowsNoDeviceBeyondItsLast) {
   EXPECT_THROW(written(std::string(65, 'A')), std::invalid_argument);
 }
 
-// Does not check the time, because virtual machines pause. The figure is for the device's documentation.
+// The time is not checked, because virtual machines pause. It is printed for the documentation of the device.
 TEST(Guardian, SaysHowLongTheForceOutlivesTheDriver) {
   std::vector<double> ms;
   for (int i = 0; i < 50; ++i) {
@@ -385,7 +385,7 @@ LocalTime now() { return LocalTime(std::chrono::duration_cast<Duration>(Clock::n
 
 struct Killed {
   double pushed_for_ms = 0;
-  bool pushes = true;                   ///< when no process is left that could stop it
+  bool pushes = true;                   ///< after the end of the last process that could stop it
   std::vector<std::uint8_t> last_word;  ///< received by the device: endpoint and packet
   std::uint8_t lamps = 0;
 };
@@ -431,7 +431,7 @@ Killed kill_the_driver_of_a_falcon(bool guarded) {
   return result;
 }
 
-// The real driver, guardian and signals; the cable is a socket, and the Falcon a model.
+// The driver, the guardian and the signals are real. The cable is a socket, and the Falcon is a model.
 TEST(Guardian, AFalconWhoseDriverIsKilledIsLeftWithoutForce) {
   const auto zero = falcon::encode(falcon::kLastCommand);
   std::vector<std::uint8_t> last_word = {socket_cable::kOut};

@@ -67,7 +67,7 @@ TEST(MainJob, AHandFeelsALateLossyRemoteWallAndTheDeviceNeverGivesOutEnergy) {
     ASSERT_GE(step.loop_age, 2 * std::chrono::milliseconds(15)) << "tick " << step.tick;
   }
   EXPECT_GT(peak, 1);
-  // The claim holds for all of these. On a busy machine only some of the 3000 steps qualify.
+  // The claim holds for all of these steps. On a busy machine, only some of the 3000 steps qualify.
   EXPECT_GT(in_time, 100U);
 
   EXPECT_FALSE(recording.truncated);

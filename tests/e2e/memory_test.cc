@@ -39,7 +39,7 @@ std::int64_t faults(pid_t process) {
   return std::stoll(word);
 }
 
-/// The shared libraries of a process, without versions, for example "libz".
+/// Returns the shared libraries of a process without their versions, for example "libz".
 std::set<std::string> libraries(pid_t process) {
   std::set<std::string> names;
   std::ifstream maps("/proc/" + std::to_string(process) + "/maps");
@@ -85,8 +85,8 @@ TEST(Memory, OfAServerWithADeviceIsSmall) {
 
 TEST(Memory, HasNoLibraryThatTheSceneDoesNotNeed) {
   Fleet one(1);
-  // For every scene: language runtimes, the scene file, the protocol and its cryptography, the log. USB and discovery
-  // also load libusb and libsystemd with seven dependencies.
+  // Every scene needs these libraries for the language runtimes, the scene file, the protocol and its cryptography, and
+  // the log. USB and discovery also load libusb and libsystemd, which have seven dependencies.
   const std::set<std::string> needed = {"ld-linux-x86-64", "libc",        "libm", "libgcc_s",  "libstdc++",
                                         "libtomlplusplus", "libprotobuf", "libz", "libsodium", "libfmt"};
   for (const std::string& library : libraries(one.pid())) EXPECT_TRUE(needed.contains(library)) << library;

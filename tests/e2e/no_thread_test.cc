@@ -16,7 +16,7 @@ class NoThread : public ::testing::TestWithParam<const char*> {};
 
 TEST_P(NoThread, AServerWithoutIsStoppedInOrderAndSaysWhich) {
   const tendon::testing::ScratchFolder folder;
-  // The first thread only tests whether small stacks suffice.
+  // The first thread is only used to test whether small stacks are sufficient.
   const std::array<std::string, 4> in_order = {"output", "log", "network", "haptic-0"};
   const auto number = 2 + (std::ranges::find(in_order, GetParam()) - in_order.begin());
   const std::string scenes = TENDON_SCENES;

@@ -10,7 +10,7 @@
 namespace tendon::e2e::pipe_test {
 namespace {
 
-// bash keeps the filter's input open, so an answer arrives only if the filter does not wait for the next row.
+// bash keeps the input of the filter open, so there is only an answer if the filter does not wait for the next row.
 TEST(TendonLabFilter, AnswersEachRowOfALivePipeBeforeTheNextComes) {
   const std::string script =
       "coproc FILTER { \"$0\" filter --law aol --b 0.26 --fc 0.005; }\n"

@@ -37,7 +37,7 @@ struct Outcome {
 
   std::uint64_t workers(const std::string& key) const { return count_in(out.substr(out.rfind(R"({"workers")")), key); }
   std::uint64_t sessions() const { return count_in(out.substr(out.rfind(R"({"summary")")), "sessions"); }
-  /// Whether `wanted` is a subsequence of the modes.
+  /// Returns whether `wanted` is a subsequence of the modes.
   bool went_through(const std::vector<Mode>& wanted) const {
     auto next = wanted.begin();
     for (const Mode mode : modes) {

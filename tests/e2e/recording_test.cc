@@ -32,7 +32,7 @@ void wait_for_tick(Process& echo, std::uint64_t tick) {
   }
 }
 
-/// Steps that are bitwise identical in tendon-replay; there must be no others.
+/// These steps must be bitwise identical in tendon-replay, and there must be no others.
 std::uint64_t replayed(const std::filesystem::path& file) {
   Process replay(program("tendon-replay"), {file.string(), "--json"}, file.parent_path());
   EXPECT_EQ(replay.wait(), 0) << replay.out() << replay.err();
@@ -40,7 +40,7 @@ std::uint64_t replayed(const std::filesystem::path& file) {
   return count_in(replay.out(), "same");
 }
 
-// As under the shipped unit: the same scene in the same folder, killed and restarted.
+// This is what happens under the shipped systemd unit: the same scene in the same folder, killed and restarted.
 TEST(Recordings, ACrashedServersRecordingIsLeftAloneByTheNextStart) {
   const ScratchFolder folder;
   const auto first = folder.path() / "demo.mcap";

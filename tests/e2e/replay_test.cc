@@ -8,7 +8,7 @@
 namespace tendon::e2e::replay_test {
 namespace {
 
-// Includes late wake-ups, pauses of the machine and real datagrams.
+// The recording includes late wake-ups, pauses of the machine and real datagrams.
 TEST(TendonReplay, TakesEveryStepOfARealServerAgainBitForBit) {
   const testing::ScratchFolder folder;
   const auto file = folder.path() / "run.mcap";

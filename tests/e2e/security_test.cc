@@ -15,7 +15,7 @@ namespace {
 
 using testing::ScratchFolder;
 
-/// Keys for `wall` and for the observer `screen`; listens on all addresses.
+/// The server has keys for `wall` and for the observer `screen`, and listens on all addresses.
 class Lab {
  public:
   Lab() {

@@ -22,7 +22,7 @@ namespace {
 
 class Manager {
  public:
-  /// `path` is a file, or "@" and an abstract name.
+  /// `path` is the path of a file, or "@" followed by an abstract name.
   explicit Manager(const std::string& path) : socket_(socket(AF_UNIX, SOCK_DGRAM, 0)) {
     sockaddr_un address{};
     address.sun_family = AF_UNIX;
@@ -78,7 +78,7 @@ TEST(Service, IsSaidToAManagerWhoseSocketIsNoFile) {
 TEST(Service, WithoutAWatchdogNothingIsSaidBetweenTheBeginningAndTheEnd) {
   const testing::ScratchFolder folder;
   const Manager manager((folder.path() / "notify").string());
-  // Inherited variables for the watchdog of another process.
+  // These variables are inherited and belong to the watchdog of another process.
   setenv("WATCHDOG_USEC", "100000", 1);
   setenv("WATCHDOG_PID", "1", 1);
   Server server(folder.path(), demo_scene());

@@ -32,8 +32,8 @@ TEST(Softbody, AHandFeelsASoftBlockAsStiffAsTheSceneMakesIt) {
 
   const Recording recording = read_recording(file);
   expect_passive(recording, scene);
-  // 457.9 N/m at every depth, because the server follows the hand by each force's local model; except that the first
-  // forces are ramped in and late forces fade.
+  // The stiffness is 457.9 N/m at every depth, because the server follows the hand with the local model of each force.
+  // Exceptions are the first forces, which are ramped in, and late forces, which fade.
   double peak = 0;
   std::size_t deep = 0;
   std::size_t as_stiff = 0;
@@ -50,7 +50,7 @@ TEST(Softbody, AHandFeelsASoftBlockAsStiffAsTheSceneMakesIt) {
   EXPECT_GT(as_stiff, deep / 2);
 }
 
-/// Two threads may be unable to factorize concurrently; the engine reports it and still answers.
+/// It may be impossible for two threads to factorize concurrently. The engine then reports this and still answers.
 TEST(Softbody, ANearFieldAndACutAreMadeBesideTheAnswers) {
   const ScratchFolder folder;
   std::ifstream liver(demo_scene().replace_filename("liver_near.toml"));

@@ -11,8 +11,8 @@
 #include "tests/e2e/stage/stage.h"
 #include "tests/server/scratch_folder.h"
 
-// In separate processes. tests/server/clients/couple_test.cc and leaders_test.cc cover each method, whole handles and
-// several leaders in virtual time.
+// These tests run servers in separate processes. tests/server/clients/couple_test.cc and leaders_test.cc cover each
+// method, whole handles and several leaders in virtual time.
 
 namespace tendon::e2e::teleoperation_test {
 namespace {
@@ -60,8 +60,8 @@ TEST(Teleoperation, AHandLeadsTheDeviceOfAnotherServerThroughABadNetwork) {
     return high - low;
   };
   EXPECT_GT(spread(hand), 0.01);
-  // The wall is 8 mm away. Toward the other side it depends on where the hand engaged and on how far pauses of the
-  // machine have softened the spring.
+  // The wall is 8 mm away. In the other direction, the distance depends on where the hand engaged and on how far the
+  // spring was softened by pauses of the machine.
   EXPECT_GT(spread(tool), 0.004) << "it follows";
 }
 

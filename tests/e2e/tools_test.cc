@@ -145,7 +145,7 @@ TEST(Tools, ATableThatTheDiskHasNoRoomForIsAFailureWithASentence) {
   EXPECT_NE(replay.err().find(table.string()), std::string::npos) << replay.err();
 }
 
-// Uses bash, because `head` must exit while the bench writes. Exit code 124 would be timeout's.
+// Uses bash, because `head` must exit while the bench is still writing. Exit code 124 would come from timeout.
 TEST(Tools, TheBenchEndsWhenItsReaderGoes) {
   const ScratchFolder folder;
   Process bash(

@@ -53,7 +53,7 @@ class FullPipe : public Reader {
  public:
   explicit FullPipe(const std::filesystem::path& folder) : path_(folder / "pipe") {
     if (::mkfifo(path_.c_str(), 0600) != 0) throw std::runtime_error("mkfifo");
-    // Opens both ends of the pipe to avoid an end of file.
+    // Opens both ends of the pipe, so that reading does not end.
     fd_ = ::open(path_.c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC);
     const std::string block(512, 'x');
     while (::write(fd_, block.data(), block.size()) > 0) {

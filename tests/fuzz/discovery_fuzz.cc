@@ -6,7 +6,8 @@
 #include "protocol/discovery.h"
 #include "tests/fuzz/target.h"
 
-// A name is rejected or survives writing and parsing unchanged; a parsed TXT record can be written and parsed again.
+// A name must either be rejected or be unchanged by writing and parsing. It must be possible to write and parse a
+// parsed TXT record again.
 
 using namespace tendon;
 

@@ -38,7 +38,7 @@ class Cable final : public usb::Pipe {
       std::transform(noise.begin(), noise.end(), packet.begin(), std::to_integer<std::uint8_t>);
       return noise.size();
     }
-    // Usually a homed device near its previous position.
+    // This is usually a homed device near its previous position.
     std::array<std::uint8_t, falcon::kPacketBytes> reply =
         falcon::encode({.torque = {static_cast<std::int16_t>(decision), 0, static_cast<std::int16_t>(-decision)}});
     reply[13] = static_cast<std::uint8_t>('A' + (decision % 16 == 0 ? 0x30 : 0x70));

@@ -5,8 +5,8 @@
 #include "devices/falcon/firmware.h"
 #include "tests/fuzz/target.h"
 
-// The input decides the answers of a boot loader and their timing, and when the cable accepts no data. The loader
-// reports success only after it has sent the whole image in order and received an exact echo of each piece.
+// The input decides the answers of a boot loader and their timing, and when the cable accepts no data. The loader must
+// only report success after it has sent the whole image in order and has received an exact echo of each piece.
 
 using namespace tendon;
 

@@ -4,8 +4,8 @@
 #include "devices/falcon/packet.h"
 #include "tests/fuzz/target.h"
 
-// In arbitrary fragments. The replies equal those found by scanning the whole stream for 16-byte replies. Every byte
-// belongs to a reply, is skipped, or may begin the next reply.
+// The stream arrives in arbitrary fragments. The replies must equal those found by scanning the whole stream for
+// 16-byte replies. Every byte must belong to a reply, be skipped, or be the possible beginning of the next reply.
 
 using namespace tendon;
 using namespace tendon::falcon;

@@ -6,8 +6,9 @@
 
 #include "tests/fuzz/target.h"
 
-// Unauthenticated clients and servers. No reply is longer than its request, no client is accepted without the key, only
-// a genuine Answer completes an encrypted handshake, and both ends of a handshake agree on suite and keys.
+// Unauthenticated clients and servers exchange arbitrary bytes. No reply may be longer than its request, no client may
+// be accepted without the key, only a genuine Answer may complete an encrypted handshake, and both ends of a handshake
+// must agree on suite and keys.
 
 using namespace tendon;
 
@@ -27,7 +28,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     if (!suites.empty()) config.suites = suites;
     return ClientHandshake(config, now);
   };
-  // Copied, because half of the cost of a run is the elliptic curve. Without a key, suite 1 only, all suites.
+  // The clients are copied, because half of the cost of a run is the elliptic curve. They have no key, only suite 1, or
+  // all suites.
   static const std::array<ClientHandshake, 3> fresh = {client_of({}), client_of({Suite::kNoise}), client_of(all)};
   std::array<ClientHandshake, 3> clients = fresh;
   const Address here = parse_address("127.0.0.1:4000");
@@ -61,7 +63,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     std::size_t length = reply.size;
     std::optional<SessionKeys> its;
     if (reply.client) {
-      // In suite 1 only the holder of the key can get here. Every byte except the cookie is authenticated.
+      // In suite 1, only a client that knows the key can get here, and every byte except the cookie is authenticated.
       if (reply.client->key != nullptr) fuzz::require(reply.client->hello.name == "a");
       Welcome welcome;
       welcome.version = 1;

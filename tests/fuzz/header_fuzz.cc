@@ -3,7 +3,8 @@
 #include "protocol/wire/header.h"
 #include "tests/fuzz/target.h"
 
-// The unencrypted header and the layout of the handshake: parsed values encode to the same bytes.
+// Parses the unencrypted header and the layout of the handshake. If a value can be parsed, it must encode to the same
+// bytes.
 
 using namespace tendon;
 

@@ -16,7 +16,8 @@ declare -A longest=([header]=64 [payload]=400 [handshake]=24 [session]=24 [key]=
   [falcon_reply]=200 [falcon_loader]=60 [falcon_device]=200 [spacemouse_report]=64
   [woodenhaptics_report]=64 [woodenhaptics_device]=200)
 cmake --preset asan && cmake --build --preset asan --target fuzzers
-# Omits stack traces of allocations and entropic scheduling, which are not worth their cost for these targets.
+# Stack traces of allocations and entropic scheduling are omitted, because they are not worth their cost for these
+# targets.
 export ASAN_OPTIONS=malloc_context_size=0:quarantine_size_mb=1:thread_local_quarantine_size_kb=16
 for target in "${targets[@]}"; do
   folder=build/asan/long/$target

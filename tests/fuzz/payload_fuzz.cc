@@ -4,7 +4,8 @@
 #include "tests/fuzz/target.h"
 #include "tests/protocol/wire/told.h"
 
-// Sealed with the peer's key and given to a session. The fast parser and the one for fields in arbitrary order agree.
+// The input is sealed with the peer's key and passed to a session. The fast parser and the parser for fields in
+// arbitrary order must agree.
 
 using namespace tendon;
 

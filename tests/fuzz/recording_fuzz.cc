@@ -9,7 +9,8 @@
 #include "server/recording/recording_reader.h"
 #include "tests/fuzz/target.h"
 
-// Every byte sequence yields records and then the end, or an error. A record survives encoding and decoding unchanged.
+// Every sequence of bytes must yield records and then the end, or an error. A record must be unchanged by encoding and
+// decoding.
 
 using namespace tendon;
 
@@ -19,7 +20,7 @@ void require_same_again(const RecordingReader::Record& record, const SolverPaths
   if (const auto* scene = std::get_if<SceneRecord>(&record)) {
     fuzz::require(recording::decode_scene(recording::encode(*scene)) == *scene);
   } else if (const auto* step = std::get_if<StepRecord>(&record)) {
-    // The bytes are compared, because NaN differs from itself.
+    // The bytes are compared, because NaN is not equal to itself.
     const auto bytes = recording::encode(*step, ways.name_of(step->force_way));
     SolverPaths own;
     const StepRecord again = recording::decode_step(bytes, step->hand.at, own);

@@ -4,7 +4,7 @@
 #include "server/scene/scene.h"
 #include "tests/fuzz/target.h"
 
-// A scene file is rejected with a SceneError, or the device and the haptic loop accept the scene.
+// A scene file must either be rejected with a SceneError, or be accepted by the device and the haptic loop.
 
 using namespace tendon;
 

@@ -26,7 +26,7 @@ void append(std::vector<std::uint8_t>& bytes, const std::optional<Axes>& axes) {
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  const std::vector<std::uint8_t> bytes(data, data + size);  // of exactly that size, so that the sanitizer detects
+  const std::vector<std::uint8_t> bytes(data, data + size);  // the size is exact, so that the sanitizer detects
   const auto report = spacemouse::parse(bytes);
   const int id = size > 0 ? bytes[0] : -1;
   const bool motion = (id == 1 && (size == 7 || size == 13)) || (id == 2 && size == 7);

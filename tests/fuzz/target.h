@@ -43,7 +43,7 @@ class InputBuffer : public std::streambuf {
   }
 };
 
-/// Splits the input into small decisions and pieces. After the end returns zeros and empty pieces.
+/// Splits the input into small decisions and pieces. After the end of the input, it returns zeros and empty pieces.
 class Input {
  public:
   Input(const std::uint8_t* data, std::size_t size) : left_(std::as_bytes(std::span(data, size))) {}

@@ -9,7 +9,8 @@
 #include "tests/tools/injector/traces/trace.h"
 #include "tests/tools/injector/traces/trace_player.h"
 
-// Rejected with file and line, or survives writing and parsing, can be replayed, and has no release before its arrival.
+// A trace must be rejected with its file and line. Otherwise it must be unchanged by writing and parsing, it must be
+// possible to replay it, and no release may be before its arrival.
 
 using namespace tendon;
 using namespace tendon::injector;

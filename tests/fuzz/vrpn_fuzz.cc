@@ -7,8 +7,8 @@
 #include "tests/clients/bridge/vrpn/program.h"
 #include "tests/fuzz/target.h"
 
-// TCP fragments and datagrams. Rendered forces are finite, answers can be parsed, and stored data stays within the
-// limits.
+// The input is TCP fragments and datagrams. Rendered forces must be finite, it must be possible to parse the answers,
+// and stored data must stay within the limits.
 
 using namespace tendon;
 using namespace tendon::bridge;

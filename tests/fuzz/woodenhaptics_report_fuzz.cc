@@ -5,8 +5,9 @@
 #include "devices/woodenhaptics/report.h"
 #include "tests/fuzz/target.h"
 
-// One byte selects the model. A packet is accepted only with 14 bytes. The pose of the arm is finite. Currents are
-// within bounds and zero without a force, and the resulting force exceeds the requested one only by rounding.
+// One byte selects the model. A packet is only accepted if it has 14 bytes. The pose of the arm must be finite.
+// Currents must be within bounds and zero without a force, and the resulting force may only exceed the requested one by
+// rounding.
 
 using namespace tendon;
 using namespace tendon::woodenhaptics;
@@ -14,7 +15,7 @@ using namespace tendon::woodenhaptics;
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   if (size == 0) return 0;
   const Model& model = models()[data[0] % models().size()];
-  const std::vector<std::uint8_t> bytes(data + 1, data + size);  // of exactly that size, so that the sanitizer detects
+  const std::vector<std::uint8_t> bytes(data + 1, data + size);  // the size is exact, so that the sanitizer detects
   const auto report = parse(bytes);
   fuzz::require(report.has_value() == (bytes.size() == kReportBytes && bytes[12] < 2 && bytes[13] == 0));
   if (!report) return 0;

@@ -79,7 +79,7 @@ std::pair<int, std::string> run(const std::string& command) {
   return result;
 }
 
-// Oracle: the compiler itself, run on the sources that detect NaN or compensate rounding.
+// Oracle: the compiler itself, which is run on the sources that detect NaN or compensate rounding.
 TEST(HardArithmetic, FastMathStopsTheBuildOfEveryRoomThatCatchesNaN) {
   const std::string sentence = "Tendon is not built with -ffast-math";
   const std::string preprocess =
@@ -138,7 +138,7 @@ class CarelessDevice final : public Device {
 
 bool slow(double value) { return std::fpclassify(value) == FP_SUBNORMAL; }
 
-// Oracle: the processor's mode register, and that numbers below 2.2e-308 are 0 during a step.
+// Oracle: the mode register of the processor. In addition, numbers below 2.2e-308 must be 0 during a step.
 TEST(HardArithmetic, DenormalsAreOffInHapticStepsAndSoftBodyAnswers) {
   if (DenormalsOff::kFlush == 0) GTEST_SKIP() << "this processor's mode is not known to DenormalsOff";
   CarelessDevice device;
@@ -189,8 +189,8 @@ TEST(HardArithmetic, DenormalsAreOffInHapticStepsAndSoftBodyAnswers) {
        .without = "DenormalsOff left out: " + std::to_string(slow_without) + " answers"});
 }
 
-/// A simulation of a tool that is pressed into a soft block over a bad network. Two twins with the same seed are
-/// bitwise identical until a datagram is inserted.
+/// Simulates a tool that is pressed into a soft block over a bad network. Two twins with the same seed are bitwise
+/// identical until a datagram is inserted.
 struct Twin {
   explicit Twin(std::uint64_t seed)
       : device(hand()), world(config(seed), device), body(softbody::parse_scene(scene(), "s.toml", ".")) {
@@ -260,8 +260,8 @@ struct Twin {
   std::vector<std::uint64_t> bits;
 };
 
-// Oracle: a twin that receives a datagram without a frame instead of the invalid one. All values at the device, the
-// hand and the engine are bitwise identical.
+// Oracle: a twin that receives a datagram without a frame at the time when the other receives the invalid frame. All
+// values at the device, the hand and the engine must be bitwise identical.
 TEST(HardArithmetic, NaNIsCountedAndLeavesServerAndEngineAsTheyWere) {
   constexpr double kInf = std::numeric_limits<double>::infinity();
   const std::array bad = {std::nan(""), -std::nan(""), kInf, -kInf, 1e300, -1e300, 1.1e12};

@@ -15,7 +15,8 @@
 namespace tendon::hard::hard_device_test {
 namespace {
 
-/// Moves along the normal: 12 mm into the wall, from `since` on out and in, and to rest again `then` later.
+/// Presses along the normal. The hand is 12 mm deep until `since`. It then alternates between the depths `shallow` and
+/// `deep` for `then`, and finally rests at 12 mm.
 ScriptedMotion press(Case& set, Duration since, Duration then, double shallow, double deep) {
   ScriptedMotion::MinimumJerk reach;
   reach.back_and_forth = false;
@@ -76,7 +77,7 @@ TEST(HardLoop, AnEstimatorThatLearnsNonsenseDoesNotBlowUp) {
 Observed wind_up(std::uint64_t seed, double prior_variance) {
   constexpr double kMostError = 1;  // N
   Case set(seed);
-  // A stiff grip without static friction, so that the noise moves the hand by micrometers.
+  // The grip is stiff and has no static friction, so the noise moves the hand by micrometers.
   set.device.hand->stiffness = 20'000;
   set.device.hand->damping = 50;
   set.device.coulomb_friction.reset();
@@ -216,7 +217,7 @@ Observed stuck(std::uint64_t seed, bool limiter) {
   bench.encoder.stuck = bench.owes = true;
   bench.run(milliseconds(400));
   bench.encoder.stuck = false;
-  // The jump then counts as viscous friction in one window of the ledger.
+  // The jump is then booked as viscous friction in one window of the ledger.
   const double never_paid = kFriction.viscous * kHidden * kHidden / (robust.window * 1e-3);
   const LocalTime paid = bench.world.now() + milliseconds(1500);
   bench.expect_of_steps([&bench, never_paid, paid](const StepRecord& step) -> std::string {

@@ -20,7 +20,7 @@ Observed rate_collapse(std::uint64_t seed, bool limiter) {
   if (!limiter) set.let_all_through();
   Bench bench(set);
   bench.run(seconds(1));
-  // Receives a state every 200 ms, with an answer delay of the same length.
+  // Receives a state every 200 ms. The delay of the answer is also 200 ms.
   bench.world.network().change(Case::weather("base=199ms", "outage(at=0ms,every=200ms,for=199ms)"), bench.world.now());
   bench.run(milliseconds(2200));  // the hand comes to rest
   bench.world.network().change(Case::fair(), bench.world.now());
@@ -87,7 +87,8 @@ Observed restart(std::uint64_t seed, bool ramp) {
   const LocalTime back = bench.world.now();
   set.engine.seed = 2;
   bench.world.restart_controller(bench.engine, set.engine, set.physics);
-  // At most the wall's deepest force, spread over the 100 ms ramp, plus a quarter for the moving hand.
+  // The force may grow at most as fast as the largest force of the wall over the ramp of 100 ms, plus a quarter for the
+  // motion of the hand.
   const double fastest = 1.25 * set.stiffness * 0.02 / 0.1;
   std::optional<LocalTime> engaged;
   bench.expect_of_steps([=](const StepRecord& step) mutable -> std::string {
@@ -190,7 +191,8 @@ TEST(HardLoop, ContactThatChattersOnAnEdgeStaysPassive) {
 
 Observed pull_through(std::uint64_t seed, bool limiter) {
   Case set(seed);
-  // 8 mm, pushes toward the nearer side. A hand that has touched it sticks to it up to a distance of 5 mm.
+  // A plate of 8 mm, which pushes toward the nearer side. A hand that has touched it sticks to it up to a distance of 5
+  // mm.
   set.physics = [n = set.into, k = set.stiffness, stuck = false](const DeviceState& hand) mutable -> Touch {
     const double depth = hand.position.dot(n);
     const double out = depth < 0.004 ? depth : depth - 0.008;  // distance to the nearer side; > 0 is inside near the

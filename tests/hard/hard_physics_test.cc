@@ -86,7 +86,7 @@ TEST(HardPhysics, ANearlyIncompressibleBlockDoesNotLock) {
           .without = "tet4, which the warning names: +" + text(locked, 4) + " %"});
 }
 
-/// B1's free nodes are mirrored below the floor, or at random positions.
+/// The free nodes of B1 are mirrored below the floor, or they are at random positions.
 VectorXd turned_inside_out(const Solid& solid, bool scattered, std::uint64_t seed) {
   Dice dice(seed);
   VectorXd u = VectorXd::Zero(solid.size());
@@ -138,8 +138,8 @@ TEST(HardPhysics, ABlockTurnedInsideOutComesBackRightWayRound) {
                      "ends in NaN"});
 }
 
-// Oracle: the oracle of the previous case must fail here, because the mirror image minimizes the energy of St.
-// Venant-Kirchhoff as well.
+// Oracle: the previous case. It must fail here, because the mirror image also minimizes the energy of St.
+// Venant-Kirchhoff.
 TEST(HardPhysics, FiniteAndAtRestIsNoOracleStVenantKirchhoffEndsSoInsideOut) {
   PressedByNewton pressed(Element::kTet4, 4, Law::kStVenantKirchhoff, 300);
   pressed.model.set_displacements(turned_inside_out(pressed.solid, false, 0));
@@ -190,7 +190,7 @@ TEST(HardPhysics, AnElementWithoutVolumeIsNamedAndASliverStepRefused) {
   const double thin = 6 * 3.6e-6;  // ratio of its volume to the cube of its edges: 3.6e-6
   const Solid sliver = solid(thin);
   const double limit = largest_step(sliver, 1000);
-  // The mass of its top is proportional to h and the stiffness to 1/h, so 2/ω is proportional to h.
+  // The mass of the top node is proportional to h and the stiffness to 1/h, so 2/ω is proportional to h.
   EXPECT_NEAR(limit / largest_step(solid(10 * thin), 1000), 0.1, 1e-3);
   const TouchSurface top(sliver.mesh(), Vec3::UnitZ(), 0.004);
   const auto engine = [&](double step) {
@@ -275,7 +275,7 @@ TEST(HardPhysics, StiffnessesAMillionTimesApartAreSolvedAsAnotherSolverDoes) {
           .without = "a factor in floats: " + text(float_error, 2)});
 }
 
-/// Amplitude of the explicit rule after `steps`, relative to the small initial disturbance.
+/// Returns the amplitude of the explicit rule after `steps`, relative to the small initial disturbance.
 double swung_out(const Solid& solid, double density, double dt, int steps) {
   SymmetricMatrix stiffness = solid.pattern();
   solid.stiffness(VectorXd::Zero(solid.size()), Elastic::Curvature::kExact, stiffness);
@@ -384,7 +384,7 @@ TEST(HardPhysics, AnExplicitStepIsStableBelowItsLimitAndRefusedAboveIt) {
     config.effects = {.density = 1000, .step = step, .inertia = true};
     return pressed_b1(compared::Kind::kTensorMass, Element::kTet4, 4, config);
   };
-  // 0.95 of it is stable with a tool too, without any damping.
+  // With a tool, 0.95 of this step is also stable, without any damping.
   compared::PressedBody body = tensor_mass(0.95 * limit);
   for (int i = 0; i < 3000; ++i) EXPECT_LT(std::abs(body.press(Prescribed::kForce, 0.3).depth), 1e-3);
   const std::string refused = thrown_by<std::exception>([&] { tensor_mass(1.05 * limit); });

@@ -80,7 +80,7 @@ class Encoder final : public Device {
   }
   Vec3 apply(const Vec3& force) noexcept override { return truth_.apply(force); }
 
-  std::optional<double> range;  ///< m: range of its counter on each axis about `middle`, where it wraps
+  std::optional<double> range;  ///< m, range of its counter on each axis around `middle`; the counter wraps there
   Vec3 middle = Vec3::Zero();   ///< m
   bool stuck = false;
   Duration behind{};  ///< delay of its time stamps
@@ -90,7 +90,7 @@ class Encoder final : public Device {
   Vec3 last_ = Vec3::Zero();
 };
 
-/// The values observed at the port. For multiple runs, each is the worst value.
+/// The values that were observed at the port. If there are several runs, each value is the worst one.
 struct Observed {
   double least_energy = 0;  ///< J
   double least_work = 0;    ///< J, of the hand
@@ -130,7 +130,7 @@ inline std::string result_of(const Observed& seen) {
   return "least energy " + text_of(1e3 * seen.least_energy, "mJ") + ", ≤ " + text_of(seen.most_force, "N") + ", ≤ " +
          text_of(seen.most_rate, "N/s") + ", quiet after " + text_of(seen.noisy_for);
 }
-/// Margins of time and force only, because the slew limit is reached exactly whenever the engine requests more.
+/// Only time and force have margins, because the slew limit is reached exactly whenever the engine requests more.
 inline double margin_of(const Observed& seen, Duration quiet_within) {
   const double time = tendon::seconds(quiet_within) / tendon::seconds(std::max<Duration>(seen.noisy_for, Duration(1)));
   return std::min(time, kMaxForce / seen.most_force);
@@ -265,7 +265,7 @@ class Bench {
       const bool cut = step.reasons.has(Reason::kEnergy) || step.reasons.has(Reason::kUnseen);
       const double change =
           cut ? step.applied.norm() - step.was_applied.norm() : (step.applied - step.was_applied).norm();
-      // In a pause, or when the device's time jumps ahead, the force may grow only for the longest hold.
+      // During a pause, or when the time of the device jumps ahead, the force may only grow for the longest hold.
       const Duration held = std::min(std::max<Duration>(world.now() - *last_, step.held), longest_hold_);
       seen_.most_rate = std::max(seen_.most_rate, change / tendon::seconds(held));
     }

@@ -15,7 +15,7 @@ using std::chrono::microseconds;
 
 const Address kPeer = parse_address("127.0.0.1:5");
 
-/// Datagrams are named by their size. Each query advances the clock slightly.
+/// The size of a datagram is its name. Each query advances the clock slightly.
 class Queue : public Link {
  public:
   void send(const Address& /*to*/, std::span<const std::byte> /*datagram*/) override { ++sent; }

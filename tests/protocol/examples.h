@@ -13,7 +13,7 @@
 #include "protocol/wire/codec.h"
 #include "protocol/wire/handshake_codec.h"
 
-// Shown in protocol/vectors/golden.md.
+// These examples are shown in protocol/vectors/golden.md.
 
 namespace tendon::examples {
 
@@ -64,7 +64,8 @@ inline ForceCommand force() {
           .valid_for = std::chrono::milliseconds(20)};
 }
 
-/// All fields: the tool is 2 mm deep in a surface with the normal −x, and the table has the forces at other depths.
+/// All fields are set. The tool is 2 mm deep in a surface with the normal −x, and the table has the forces at other
+/// depths.
 inline ForceCommand force_with_all() {
   ForceCommand all = force();
   all.sequence = 101;
@@ -78,7 +79,7 @@ inline ForceCommand force_with_all() {
   return all;
 }
 
-/// Uses the second solver path of its Hello.
+/// This uses the second solver path of its Hello.
 inline ForceCommand force_with_way() {
   ForceCommand command = force();
   command.sequence = 102;
@@ -116,7 +117,7 @@ inline LinkReport report() {
           .words = "forces were late 3 times, by up to 75 ms: the network (round trip 131 ms, usually 41 ms)"};
 }
 
-// Sent to an observer with the feature "diagnostics".
+// This is sent to an observer with the feature "diagnostics".
 
 /// A wall along x demands four times the permitted force.
 inline DeviceState state_with_wanted() {
@@ -126,7 +127,7 @@ inline DeviceState state_with_wanted() {
   return diagnosed;
 }
 
-/// Armed before, now tripped. Three steps were not counted.
+/// It was armed before and has tripped now. Three steps were not counted.
 inline DeviceReport device_report() {
   DeviceReport report{.number = 7,
                       .until = PeerTime{Duration{1'000'000'000}},
@@ -173,9 +174,9 @@ inline Welcome welcome() {
           .server = "tendond"};
 }
 
-// Two devices, the second of which has two channels.
+// There are two devices, and the second one has two channels.
 
-/// Observes the first device and claims "tissue" of the second.
+/// Observes the first device and claims the channel "tissue" of the second one.
 inline Hello hello_with_claims() {
   Hello hello = examples::hello();
   hello.features.emplace_back(kFeatureChannels);
@@ -184,7 +185,7 @@ inline Hello hello_with_claims() {
   return hello;
 }
 
-/// An engine with two solver paths that names the path of each force.
+/// An engine that has two solver paths and names the path of each force.
 inline Hello hello_with_ways() {
   Hello hello = examples::hello();
   hello.features.emplace_back(kFeatureWays);
@@ -235,7 +236,7 @@ inline DeviceDescription description() {
                         .holder = "wall"}}};
 }
 
-// Sent to a client with the feature "handle".
+// This is sent to a client with the feature "handle".
 
 inline DeviceState state_with_buttons() {
   DeviceState state = examples::state();
@@ -243,7 +244,7 @@ inline DeviceState state_with_buttons() {
   return state;
 }
 
-/// All parts: rotated by 106° about y, moving, and the fingers close on something soft.
+/// All parts are present: the handle is rotated by 106° about y and is moving, and the fingers close on something soft.
 inline DeviceState state_with_handle() {
   DeviceState state = examples::state();
   state.buttons = 1;
@@ -273,7 +274,7 @@ inline ForceCommand force_with_torque() {
   return command;
 }
 
-/// Axes of a WoodenHaptics, buttons of a Falcon, and motors for all degrees of freedom.
+/// The handle has the axes of a WoodenHaptics, the buttons of a Falcon, and motors for all degrees of freedom.
 inline HandleDescription handle_description() {
   return {.device = 1,
           .operator_from_device = Quat{.w = 0.5, .x = -0.5, .y = 0.5, .z = 0.5},
@@ -286,14 +287,14 @@ inline HandleDescription handle_description() {
           .hand = Hand::kRight};
 }
 
-/// Sent to a client with the feature "joints": the joints of a Phantom.
+/// This is sent to a client with the feature "joints". The joints are those of a Phantom.
 inline ControlAck joints_described(std::uint32_t id) {
   ControlAck ack{.id = id, .code = Code::kOk, .detail = {}};
   ack.handle = HandleDescription{.device = 1, .joints = {"turntable", "upper arm", "forearm"}};
   return ack;
 }
 
-/// Sent to a client with the feature "outputs".
+/// This is sent to a client with the feature "outputs".
 inline ControlAck outputs_described(std::uint32_t id) {
   ControlAck ack{.id = id, .code = Code::kOk, .detail = {}};
   ack.handle = HandleDescription{.device = 1};
@@ -308,9 +309,9 @@ inline SetOutput vibration() {
   return {.device = 1, .output = 1, .setting = pulse};
 }
 
-// Sent between peers with the feature "teleoperation".
+// This is sent between peers with the feature "teleoperation".
 
-/// The leader pulls by 2 mm. No measured contact.
+/// The leader pulls by 2 mm. There is no measured contact.
 inline PortFrame port() {
   PortFrame port;
   port.device = 1;
@@ -343,7 +344,7 @@ inline PortFrame port_in_contact() {
   return port;
 }
 
-/// A follower with one of the other methods. It has found a floor, and waves have been sent.
+/// A follower that uses one of the other methods. It has found a floor, and waves have been sent.
 inline PortFrame port_by_model() {
   PortFrame port = port_in_contact();
   port.surface = {.normal = {0, 0.6, 0.8}, .offset = -0.125, .stiffness = 500};
@@ -370,7 +371,7 @@ inline Couple couple() {
           .period = std::chrono::milliseconds(1)};
 }
 
-/// Sent to an observer. Fields of a whole aligned handle that no single end sends together.
+/// This is sent to an observer. It has the fields of a whole aligned handle, which no single end sends together.
 inline PortFrame port_with_all() {
   PortFrame port = port_by_model();
   port.phase = PortPhase::kAligning;
@@ -385,7 +386,7 @@ inline PortFrame port_with_all() {
   return port;
 }
 
-/// Whole handles with an absolute map in rate control.
+/// Two whole handles with an absolute map in rate control.
 inline Couple couple_with_all() {
   Couple couple = examples::couple();
   couple.method = CouplingMethod::kRate;

@@ -23,7 +23,7 @@ Address address(std::uint8_t host, std::uint16_t port) {
   return a;
 }
 
-/// A is a client, Z the server side.
+/// A is a client, and Z is the server side.
 class Handshake : public ::testing::Test {
  protected:
   static ClientHandshake::Config client_config() {

@@ -9,7 +9,7 @@
 #include "tests/protocol/examples.h"
 #include "tests/support/property_cases.h"
 
-// Must never crash a receiver or yield a value out of bounds, and must always be counted.
+// Hostile bytes must never crash a receiver or yield a value out of bounds, and they must always be counted.
 
 namespace tendon::hostile_test {
 namespace {
@@ -22,7 +22,7 @@ bool bounded(const Vec3& v) { return v.allFinite() && v.cwiseAbs().maxCoeff() <=
 class Target {
  public:
   Target() : session_({.connection_id = examples::kConnection}, LocalTime{}) {
-    // Outstanding packets and requests for the echoes and answers of the examples.
+    // The session has outstanding packets and requests, so that the echoes and answers of the examples match.
     std::array<std::byte, kMaxDatagram> buffer;
     for (int i = 0; i < 10; ++i) session_.request(Rearm{});
     for (std::uint64_t i = 1; i <= 4; ++i) {

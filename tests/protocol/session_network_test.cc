@@ -12,7 +12,7 @@ using std::chrono::milliseconds;
 using std::chrono::minutes;
 using std::chrono::seconds;
 
-/// Half an hour of 50 % loss includes two seconds without a datagram.
+/// If half of all datagrams are lost for half an hour, there are two seconds without any datagram.
 Session::Config patient() {
   Session::Config config;
   config.timeout = seconds(60);
@@ -124,7 +124,7 @@ TEST(SessionOverAPerfectNetwork, BothEndsSendKeepAlivesAtTheirRate) {
 
 TEST(SessionOverAPerfectNetwork, ARequestAnsweredInTimeIsSentOnce) {
   World world(perfect(milliseconds(40)));
-  world.run(seconds(3));  // this is enough to know the round trip
+  world.run(seconds(3));  // this is enough to measure the round trip
   bool answered = false;
   world.on_z = [&](const Session::Event& event) {
     world.z.answer(std::get<Session::RequestArrived>(event).id, Code::kOk, "");

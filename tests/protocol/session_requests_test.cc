@@ -149,7 +149,7 @@ TEST_F(TwoEnds, ARequestOfANewerPeerIsAnsweredUnsupported) {
   EXPECT_EQ(std::get<ControlAck>(content->frames[0]).code, Code::kUnsupported);
 }
 
-// Regression: the request was never answered, so later ones, including Disarm, were not delivered.
+// Regression: the request was never answered, so later requests, including Disarm, were not delivered.
 TEST_F(TwoEnds, ARequestOutOfBoundsIsAnsweredAndTheNextIsDelivered) {
   const auto bad = a_.request(SetScale{.device = 1, .position_scale = 0.001});
   const auto disarm = a_.request(Disarm{.device = 1});

@@ -43,7 +43,7 @@ void free(void* block) {
   count();
   __libc_free(block);
 }
-// operator new with an alignment calls one of these.
+// The aligned form of operator new calls one of the following functions.
 void* memalign(std::size_t alignment, std::size_t size) {
   count();
   return __libc_memalign(alignment, size);

@@ -46,8 +46,8 @@ TEST(HeapGuard, SeesAlignedHeapCalls) {
   EXPECT_EQ(posix_memalign(&block, 3, 100), EINVAL);
 }
 
-// Device, velocity estimator, controller with all limiters active, mailboxes, faults and rearms, with the recording
-// ring full and not full.
+// Tests the device, the velocity estimator, the controller with all limiters active, mailboxes, faults and rearms. The
+// recording ring is tested both full and not full.
 TEST(HapticLoop, AMillionStepsMakeNoHeapCall) {
   SimulatedDevice::Config hand = find_device_profile("falcon")->device();
   hand.hand =
@@ -97,7 +97,7 @@ TEST(HapticLoop, AMillionStepsMakeNoHeapCall) {
   EXPECT_GT(limited, 500U);
 }
 
-// Four leaders engage, clutch, stop sending, and change their shares.
+// Four leaders engage, hold the clutch, stop sending, and change their shares.
 TEST(HapticLoop, OfAFollowerWithFourLeadersMakesNoHeapCall) {
   SimulatedDevice device(find_device_profile("falcon")->device());
   HapticLoop::Config config;
@@ -153,7 +153,7 @@ TEST(HapticLoop, OfAFollowerWithFourLeadersMakesNoHeapCall) {
   EXPECT_GT(engaged, 20'000U);
 }
 
-// All parts of the safety layer, armed, faulted and disarmed.
+// Tests all parts of the safety layer while it is armed, faulted and disarmed.
 TEST(SafeDevice, MakesNoHeapCallWhateverHappens) {
   SimulatedDevice::Config still = find_device_profile("falcon")->device();
   still.hand = OperatorHand::Config{
@@ -184,7 +184,7 @@ TEST(SafeDevice, MakesNoHeapCallWhateverHappens) {
   EXPECT_GT(safe.times_armed(), 20U);
 }
 
-// All laws of the catalogue, all parts of AOL+, and all ways to extrapolate between two forces.
+// Tests all laws of the catalogue, all parts of AOL+, and all ways to extrapolate between two forces.
 TEST(HapticController, NoLawAndNoPartMakesAHeapCallInTheLoop) {
   for (const LawInfo& law : laws()) {
     for (int between = 0; between < 4; ++between) {

@@ -12,7 +12,7 @@ using namespace tendon;
 
 namespace {
 
-/// Hand motion without libm, whose instruction count depends on the processor.
+/// The motion of the hand does not use libm, because its instruction count depends on the processor.
 double swing(std::uint64_t tick, std::uint64_t period) {
   const double u = 2.0 * static_cast<double>(tick % period) / static_cast<double>(period) - 1;
   return u * (1 - u * u);
@@ -88,7 +88,7 @@ RemoteForce answer(std::uint64_t sequence, LocalTime now, bool whole) {
 
 }  // namespace
 
-/// Neither inlined nor mangled, for callgrind.
+/// This function is neither inlined nor mangled, so callgrind can find it.
 extern "C" [[gnu::noinline]] void step_in_turn(HapticLoop& loop, Mailboxes& mail, bool whole, LocalTime& now,
                                                std::uint64_t steps) {
   for (std::uint64_t i = 0; i < steps; ++i) {

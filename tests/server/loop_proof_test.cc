@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kSteps = 3000 - 1000;  // the two run lengths of loop-proof
 
-/// Step of a point at 38d7a6d, before rotation and grip existed.
+/// The number of instructions for a step of a point at 38d7a6d, before rotation and grip existed.
 constexpr double kBeforeHandles = 2977.5;
 
 using LoopProof = testing::InstructionTest;
@@ -28,7 +28,7 @@ TEST_F(LoopProof, APointsStepIsNoSlowerAndAWholeHandleCostsTwoAndAHalf) {
             << " before there were handles), of a "
             << "handle that turns and grips " << handle << ": " << handle / point << " times as many; of a point "
             << "with three joints " << jointed << "\n";
-  EXPECT_LT(point, 0.9 * kBeforeHandles);  // the velocity estimate is cheaper since
+  EXPECT_LT(point, 0.9 * kBeforeHandles);  // the velocity estimate has become cheaper since then
   EXPECT_GT(point, 0.5 * kBeforeHandles) << "this is no step";
   EXPECT_LT(handle, 2.6 * point);
   EXPECT_GT(handle, 1.5 * point) << "this is no handle";

@@ -17,7 +17,7 @@
 
 namespace tendon {
 
-/// A simulated device with one channel. `more` continues its table [device].
+/// A simulated device with one channel. `more` is appended to its table [device].
 inline Scene device_named(const std::string& name, const std::string& more = "") {
   const std::string head = "[device]\nkind = \"simulated\"\nprofile = \"falcon\"\nname = \"";
   return parse_scene(head + name + "\"\n" + more, "s.toml", {});

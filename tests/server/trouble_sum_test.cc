@@ -14,7 +14,7 @@ namespace {
 
 using std::chrono::seconds;
 
-/// (second, count, per minute) of each message when `often` events happen in each second.
+/// Returns (second, count, per minute) of each message if there are `often` events in each second.
 std::vector<std::tuple<int, std::uint64_t, bool>> logged(int for_s, const std::function<std::uint64_t(int)>& often) {
   std::vector<std::tuple<int, std::uint64_t, bool>> all;
   TroubleSum sum;

@@ -26,7 +26,7 @@ struct Clock {
   }
 };
 
-/// One direction of the wire with its datagram in flight. After the handshake there is at most one.
+/// One direction of the wire with the datagram in flight. After the handshake, there is never more than one.
 struct Half {
   struct Datagram {
     std::array<std::byte, kMaxDatagram> bytes;
@@ -89,7 +89,7 @@ class Pair {
     state.force_age = std::chrono::milliseconds(7);
     state.mode = Mode::kActive;
     mail_->state.put();
-    // The first poll of each end has no result. The second poll finds a datagram.
+    // The first poll of each end finds nothing, and the second one finds a datagram.
     LocalTime at_client = clock_.now;
     LocalTime at_server = clock_.now;
     client_busy_.look(at_client);
@@ -141,7 +141,7 @@ class Pair {
 
 }  // namespace
 
-/// Neither inlined nor mangled, for callgrind.
+/// This function is neither inlined nor mangled, so callgrind can find it.
 extern "C" [[gnu::noinline]] void exchange_in_turn(Pair& pair, std::uint64_t times) {
   for (std::uint64_t i = 0; i < times; ++i) pair.exchange();
 }

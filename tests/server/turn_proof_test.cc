@@ -36,7 +36,8 @@ TEST_F(TurnProof, AStateAndItsForceTakeTwoDatagramsAndFewInstructions) {
   EXPECT_EQ(sent, 2 * kTurns);
   // Each end polls once without a result and once with a result. The server polls again after it has sent a state.
   EXPECT_EQ(looks, 5 * kTurns);
-  // After each of the first four polls, after the doorbell of the step, and after the engine's answer.
+  // The clock is read after each of the first four polls, after the doorbell of the step, and after the engine's
+  // answer.
   EXPECT_EQ(readings, 6 * kTurns);
   EXPECT_LE(instructions, kMost);
   EXPECT_GE(instructions, 0.5 * kMost) << "this is no whole turn, or this bound is old";

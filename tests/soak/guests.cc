@@ -32,14 +32,15 @@ ForceClient::Config observer(const std::string& name) {
   return config;
 }
 
-/// Takes one turn, then waits for the next one or a datagram, at most kLook.
+/// Takes one turn, and then waits until the next turn is due or a datagram arrives, at most kLook.
 template <class Transport>
 void turn(ForceClient& client, Transport& transport) {
   const LocalTime due = client.turn(clock::now());
   transport.wait(std::min<Duration>(due - clock::now(), kLook));
 }
 
-/// At one of kHomes local addresses (127.1.0.1 and up), because HelloLimit accepts few clients per second from one.
+/// The sessions use kHomes local addresses (127.1.0.1 and up), because HelloLimit accepts only a few clients per second
+/// from one address.
 class Home : public Link {
  public:
   static constexpr std::uint64_t kHomes = 200;
@@ -90,7 +91,7 @@ class Home : public Link {
 class Promises {
  public:
   std::optional<std::string> broken(const DeviceState& state) {
-    // If a state was missed, it may have reported an overrun.
+    // If a state was missed, that state may have reported an overrun.
     const bool next = tick_ != 0 && state.tick == tick_ + 1;
     tick_ = state.tick;
     excused_ = state.energy < 0 && (excused_ || !next || Reasons::from_bits(state.reasons).has(Reason::kOverrun));

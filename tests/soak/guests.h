@@ -14,8 +14,9 @@
 
 namespace tendon::soak {
 
-/// Observers that connect, receive one state, send Bye and reconnect from another port. They do so `in_all` times,
-/// evenly over `duration`, from `threads` threads. This multiplies any leak per session.
+/// Observers that connect, receive one state, send a Bye and reconnect from another port. There are `in_all`
+/// reconnections, evenly distributed over `duration` and over `threads` threads. If a session leaks anything, this
+/// makes it visible.
 class Reconnecting {
  public:
   Reconnecting(const Address& server, std::uint64_t in_all, Duration duration, int threads);

@@ -62,7 +62,7 @@ std::vector<std::string> operator+(std::vector<std::string> words, const std::ve
 
 constexpr int kVisitors = 8;
 constexpr VitalSigns kGrowth{.resident = std::size_t{1} << 20};
-/// A socket and statistics for each recent engine, so their number varies.
+/// Each recent engine has a socket and statistics, so their number varies.
 constexpr VitalSigns kProxyGrowth{.resident = std::size_t{4} << 20, .files = 8};
 /// The index of a recording is held in memory until the end: four chunks per second, about 200 bytes each.
 constexpr std::size_t kIndexBytesPerSecond = 1024;
@@ -110,7 +110,7 @@ class Program {
   std::unique_ptr<e2e::Process> process_;
 };
 
-/// A small tmpfs. Empty without the right to mount.
+/// A small tmpfs. It is empty if this process may not mount.
 class SmallDisk {
  public:
   explicit SmallDisk(std::filesystem::path path) : path_(std::move(path)) {
@@ -202,7 +202,7 @@ class Run {
     const LocalTime start = clock::now();
     const LocalTime end = start + config_.duration;
     const Address server = parse_address(address(*server_));
-    // A little early, so that the last sample shows an idle server.
+    // This is a little early, so that the last sample shows an idle server.
     Reconnecting visitors(server, config_.reconnects, config_.duration * 9 / 10, kVisitors);
     Watching watcher(server);
     LocalTime next_look = start;

@@ -24,7 +24,7 @@ std::optional<VitalSigns> vital_signs(pid_t process);
 ///
 ///     max(last two fifths) ≤ max(second and third fifth) + `growth`
 ///
-/// Returns a sentence about the first value that grows. nullopt if none does or with fewer than ten samples.
+/// Returns a sentence about the first value that grows, or nullopt if none does or if there are fewer than ten samples.
 std::optional<std::string> not_flat(const std::string& name, const std::vector<VitalSigns>& looks,
                                     const VitalSigns& growth);
 

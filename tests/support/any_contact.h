@@ -6,7 +6,8 @@
 
 namespace tendon {
 
-/// Valid (core/remote/answer.h), with the tool at `position`: of a wall at x = 0 or without a surface.
+/// Returns a valid contact (core/remote/answer.h) with the tool at `position`. It is a contact with a wall at x = 0, or
+/// has no surface.
 inline Contact any_contact(Dice& dice, const Vec3& position) {
   Contact contact{.normal = -Vec3::UnitX(), .gap = -position.x()};
   if (dice.chance(0.3)) contact = {.normal = dice.direction(), .gap = dice.within(-0.01, 0.01)};

@@ -9,7 +9,7 @@
 
 namespace tendon {
 
-/// Own inverse CDFs, because std:: distributions differ between standard libraries.
+/// This class has its own inverse CDFs, because std:: distributions differ between standard libraries.
 class Dice {
  public:
   explicit Dice(std::uint64_t seed) : random_(seed) {}

@@ -30,7 +30,7 @@ std::vector<std::string> read_strings(sd_bus_message* message) {
   return strings;
 }
 
-/// Sends a signal as avahi-daemon does through a bus, which adds the sender.
+/// Sends a signal as avahi-daemon does. A real bus adds the sender.
 template <class... Values>
 void emit(sd_bus* bus, const char* path, const char* interface, const char* member, const char* types,
           Values... values) {
@@ -132,7 +132,7 @@ struct FakeAvahi::Peer {
 
   int browse(sd_bus_message* call) const {
     constexpr const char* kPath = "/Client0/ServiceBrowser1";
-    // Sends the first signals before the reply with the path, which Avahi is allowed to do.
+    // Sends the first signals before the reply that contains the path, as Avahi may do.
     for (const auto& [name, service] : avahi->services_) {
       for (const int protocol : {0, 1}) {
         emit(bus, kPath, kBrowser, "ItemNew", "iisssu", 2, protocol, name.c_str(), "_tendon._udp", "local", 0U);

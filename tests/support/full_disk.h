@@ -7,7 +7,7 @@
 
 namespace tendon::testing {
 
-/// Limits every file of this process to `bytes`.
+/// Limits the size of every file of this process to `bytes`.
 class FullDisk {
  public:
   explicit FullDisk(rlim_t bytes) : handler_(std::signal(SIGXFSZ, SIG_IGN)) {

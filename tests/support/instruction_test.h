@@ -7,7 +7,7 @@
 
 namespace tendon::testing {
 
-/// Skips tests with callgrind.h if valgrind is missing.
+/// Skips tests that use callgrind.h if valgrind is missing.
 class InstructionTest : public ::testing::Test {
  protected:
   void SetUp() override {

@@ -34,7 +34,7 @@ struct Spoiled {
   void (*change)(Config&);
 };
 
-/// Checks that `use(good)` does not throw, and that each row makes it throw an `Error` with the expected message.
+/// Checks that `use(good)` does not throw, and that with each row it throws an `Error` with the expected message.
 template <class Error = std::invalid_argument, class Config, class Use>
 void expect_refusals(const Config& good, Use use, std::initializer_list<Spoiled<std::type_identity_t<Config>>> rows) {
   EXPECT_EQ(thrown_by<Error>([&] { use(good); }), "") << "the configuration without a change";

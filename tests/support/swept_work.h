@@ -23,14 +23,14 @@
 
 namespace tendon {
 
-/// Of this process: all units if neither `units` nor `from` is set (part_options.h).
+/// The part that this process computes. If neither `units` nor `from` is set, this is all units (part_options.h).
 struct Part {
   std::optional<Units> units{};                 ///< the units of this shard
   std::optional<std::filesystem::path> from{};  ///< the file with the results of the shards
   bool progress = false;
 };
 
-/// A program defines a unit and how its outcome is written and read; outcomes() does the rest.
+/// A program defines a unit and how its outcome is written and read. outcomes() does the rest.
 template <class Outcome>
 struct SweptWork {
   std::string_view what;    ///< plural name of the units, for example "situations"
@@ -43,7 +43,7 @@ struct SweptWork {
   std::function<void(const Outcome& outcome, ShardEnd& end)> count{};
 };
 
-/// NaN where JsonLine wrote null.
+/// Returns NaN if JsonLine wrote null.
 inline double number_of(const nlohmann::json& line, const std::string& key) {
   const nlohmann::json& value = line.at(key);
   return value.is_null() ? std::numeric_limits<double>::quiet_NaN() : value.get<double>();

@@ -38,7 +38,7 @@ class UnitDigest {
  public:
   void add(std::uint64_t unit, std::string_view outcome) noexcept;
   void add(const UnitDigest& other) noexcept;
-  /// 32 hexadecimal digits: the sum.
+  /// Returns the sum as 32 hexadecimal digits.
   std::string text() const;
   std::string moment() const;
   /// Throws std::invalid_argument if the input is malformed.
@@ -82,7 +82,7 @@ struct ShardEnd {
   double least_of(std::string_view name) const;
 };
 
-/// nullopt for lines other than {"unit":17,…}.
+/// Returns nullopt for lines other than {"unit":17,…}.
 std::optional<std::uint64_t> unit_of(std::string_view line);
 
 /// Runs `units` out of the units 0 to `all` − 1. `run` returns a unit's lines, each with '\n', and counts it; the
@@ -95,8 +95,9 @@ void write_shard(const Units& units, std::uint64_t all,
 /// end line is missing or not the last.
 ShardEnd read_to_end(std::istream& lines, const std::function<void(const std::string& line)>& take);
 
-/// The lines of each of the units 0 to `all` − 1, of one shard or of merged shards. Throws std::invalid_argument that
-/// names the line or unit unless each is present once and the digest of the end line matches.
+/// Returns the lines of each of the units 0 to `all` − 1, from one shard or from merged shards. Throws
+/// std::invalid_argument that names the line or unit unless each unit is present once and the digest of the end line
+/// matches.
 std::vector<std::string> read_shards(std::istream& lines, std::uint64_t all);
 
 }  // namespace tendon

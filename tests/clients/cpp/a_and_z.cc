@@ -156,7 +156,7 @@ bool World::run_until(ForceClient::Phase phase, Duration limit) {
 }
 
 void World::advance() {
-  constexpr int kMaxTurns = 1000;  // per instant: a few datagrams arrive together, and each costs two turns
+  constexpr int kMaxTurns = 1000;  // a few datagrams arrive at one instant, and each costs two turns
   turns_at_once_ = next() > now ? 0 : turns_at_once_ + 1;
   if (turns_at_once_ > kMaxTurns) throw std::logic_error("somebody wants to be called again and again at one instant");
   now = std::max(now, next());

@@ -33,7 +33,7 @@ struct Weather {
 };
 inline constexpr Weather kFineWeather{.loss = 0, .delay = std::chrono::milliseconds(5), .jitter = Duration::zero()};
 
-/// The force depends on the state, so a test can tell which state an answer belongs to.
+/// The force depends on the state, so a test can find out which state an answer belongs to.
 inline Vec3 answer(const DeviceState& hand) { return -100 * hand.position; }
 
 class Network {
@@ -42,9 +42,9 @@ class Network {
 
   void set(Weather weather) { weather_ = weather; }
   void send(LocalTime now, const Address& from, const Address& to, std::span<const std::byte> bytes);
-  /// The size of the next datagram for `to` that is due at `now`, or 0.
+  /// Receives the next datagram for `to` that is due at `now`. Returns its size, or 0 if there is none.
   std::size_t receive(LocalTime now, const Address& to, Address& from, std::span<std::byte> buffer);
-  /// Drops the datagrams that have arrived while no socket was open.
+  /// Drops the datagrams that arrived while there was no open socket.
   void drop_arrived(LocalTime now);
   LocalTime next_arrival() const { return flying_.empty() ? LocalTime::max() : flying_.begin()->first; }
 

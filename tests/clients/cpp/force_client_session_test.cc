@@ -77,7 +77,7 @@ TEST(ForceClient, ConnectsAgainWhenTheServerHasRestarted) {
     world.run(3 * kSecond);
     ASSERT_EQ(world.a->phase(), Phase::kOpen) << "seed " << seed;
     world.restart_server();
-    // 2 s of silence, 100 ms of back-off, and a handshake.
+    // This allows for 2 s of silence, 100 ms of back-off, and a handshake.
     world.run(4 * kSecond);
     EXPECT_EQ(world.a->phase(), Phase::kOpen) << "seed " << seed;
     EXPECT_EQ(world.a->stats().sessions, 2U) << "seed " << seed;
@@ -168,7 +168,7 @@ TEST(ForceClient, CountsATooLargeDatagramWithAGoodBeginningAsMalformed) {
   World world(23, kFineWeather);
   world.connect({.rate_hz = 100}, answer);
   world.run(kSecond);
-  // A Data header for connection 1 with a new packet number, tx_time_ns = 0, then unknown fields.
+  // A Data header for connection 1 with a new packet number and tx_time_ns = 0. Unknown fields follow.
   std::vector<unsigned char> bytes = {0x54, 0x13, 0, 0, 1, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0};
   bytes.insert(bytes.end(), {0x09, 0, 0, 0, 0, 0, 0, 0, 0, 0x78, 0x80, 0x00});
   const auto pad_to = [&](std::size_t size) {

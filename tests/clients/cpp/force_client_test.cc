@@ -200,7 +200,7 @@ TEST(ForceClient, AForceIsValidForThreePeriodsAndAtLeastTwentyMilliseconds) {
   EXPECT_EQ(valid_ms({.rate_hz = 100, .valid_for = milliseconds(7)}), 7);
 }
 
-/// The engine's answers have `change` applied. Returns the last force after a second.
+/// Applies `change` to the answers of the engine. Returns the last force after one second.
 ForceCommand last_force(World& world, ForceClient::Config config, const std::function<void(Touch&)>& change) {
   config.rate_hz = 100;
   world.connect(config, [&](const DeviceState& hand) {

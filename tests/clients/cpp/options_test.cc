@@ -56,7 +56,7 @@ TEST(CommandLine, ReadsWhatIsGiven) {
   EXPECT_TRUE(parsed.local_model);
 }
 
-/// The argument SHAPE and the option --reach-mm. Returns the exit code; `err` is the error message.
+/// A program with the argument SHAPE and the option --reach-mm. Returns the exit code; `err` is the error message.
 std::optional<int> parse_shape(std::vector<const char*> words, std::string& shape, double& reach, std::string& err) {
   Options options{.client = {.name = "shapes"}};
   CommandLine line("Shapes.", options);

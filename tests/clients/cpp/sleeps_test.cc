@@ -34,7 +34,7 @@ class Server {
   Server& operator=(const Server&) = delete;
 
   Address address() const { return link_.local_address(); }
-  /// Stops the thread. Returns the number received.
+  /// Stops the thread and returns the number of received datagrams.
   std::uint64_t forces() {
     end();
     return z_.forces.size();
@@ -52,7 +52,7 @@ class Server {
   std::thread thread_;
 };
 
-/// Voluntary context switches of this thread, without preemption.
+/// Returns the number of voluntary context switches of this thread, which does not include preemption.
 std::uint64_t sleeps() {
   rusage usage{};
   ::getrusage(RUSAGE_THREAD, &usage);

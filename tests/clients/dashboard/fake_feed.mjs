@@ -12,7 +12,7 @@ const product = (a, b) => [
 const kBox = [[-0.08, -0.06, -0.06], [0.08, 0.06, 0.06]];
 const handle = (more) => ({ operator_from_device: [1, 0, 0, 0], buttons: [], orientation_measured: false, max_torque_nm: 0, gripper_open_rad: null, max_gripper_force_n: 0, group: "", hand: "any", ...more });
 
-/** A base frame with x to the user, y right, z up, as of a Falcon. */
+/** The x axis points to the user, y points right, and z points up, as in the base frame of a Falcon. */
 export const kTurnedFrame = [0.5, -0.5, -0.5, -0.5];
 
 export const kDevices = [

@@ -39,7 +39,8 @@ it("measures", { timeout: 120_000 }, async (test) => {
   }, 20);
   await until("enough steps come", () => steps.length >= kSteps);
   clearInterval(pinging);
-  // A report has the same time on the server's clock (CLOCK_MONOTONIC, as hrtime) and as converted for Foxglove.
+  // A report contains the same instant twice: on the server's clock (CLOCK_MONOTONIC, like hrtime), and as converted
+  // for Foxglove.
   const report = reports.at(-1);
   const offset = report.time - BigInt(report.until_ns);
   const late = steps.map((step) => Number(step.now - (step.time - offset)) / 1e6);

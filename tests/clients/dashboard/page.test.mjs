@@ -115,7 +115,7 @@ it("says that there is no such page, and shows the pages there are", async (test
   await page.locator("main.live").waitFor();
 });
 
-/** A hand that rests 8 mm deep in a wall. The device is armed by request, and the operator has its own channel. */
+/** The hand rests 8 mm deep in a wall. The device is armed by a request, and the operator has its own channel. */
 const kGuarded = `
 [device]
 kind = "simulated"

@@ -72,7 +72,7 @@ it("opens recordings, scrubs them, and shows two side by side", async (test) => 
     await wall.stop();
   };
   await Promise.all([record("one"), record("two", "--without-limiter")]);
-  // As after a crash of the server: there is no index, and the last chunk is incomplete.
+  // This is what remains after a crash of the server: there is no index, and the last chunk is incomplete.
   copyFileSync(join(folder, "one.mcap"), join(folder, "torn.mcap"));
   truncateSync(join(folder, "torn.mcap"), 400_000);
   writeFileSync(join(folder, "noise.mcap"), "this is no recording");

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A robot that follows the hand at half its way, over a table, and writes down what it did."""
+"""A robot that follows the hand at half scale over a table, and records its motion."""
 import sys
 import time
 from pathlib import Path

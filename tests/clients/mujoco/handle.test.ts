@@ -12,7 +12,7 @@ import { kStiff } from "./scenes.js";
 
 const kOrigin: Vec3 = { x: 0, y: 0, z: 0 };
 const kHeld: Quat = { w: 1, x: 0, y: 0, z: 0 };
-/** A device frame that is rotated against the scene. */
+/** A device frame that is rotated relative to the scene. */
 const kAskew = [2, -1, 2, 2, 2, -1, -1, 2, 2].map((value) => value / 3);
 const kInertia = '<inertial pos="0 0 0" mass="0.05" diaginertia="2e-5 2e-5 2e-5"/>';
 
@@ -32,7 +32,7 @@ const about = (axis: readonly number[], degrees: number): Quat => {
   const [x, y, z] = axis.map((value) => (Math.sin(half) * value) / length) as [number, number, number];
   return { w: Math.cos(half), x, y, z };
 };
-/** Rodrigues' formula, because the code under test uses quaternions. */
+/** This is Rodrigues' formula, because the code under test uses quaternions. */
 function turned(axis: readonly number[], degrees: number, v: readonly number[]): number[] {
   const [angle, n] = [(degrees * Math.PI) / 180, axis.map((value) => value / Math.hypot(...axis))];
   const along = n.reduce((sum, value, i) => sum + value * v[i]!, 0);

@@ -14,7 +14,7 @@ import { kRoot } from "../typescript/support/paths.js";
 import { findTendond, Program, scene } from "../typescript/support/program.js";
 
 const kBuilt = join(kRoot, "clients/mujoco/dist/examples/robot_arm.js");
-/** The values in the example and its scene. kSpeed is in m/s. */
+/** These are the values in the example and its scene. kSpeed is in m/s. */
 const [kScale, kForceScale, kSpeed] = [0.5, 0.4, 0.25];
 
 interface Line {
@@ -39,7 +39,7 @@ async function freePort(): Promise<number> {
   return port;
 }
 
-/** Splits the lines into runs of the same phase. */
+/** Splits the lines into sequences with the same phase. */
 function stretches(lines: readonly Line[]): Line[][] {
   const all: Line[][] = [];
   for (const line of lines) {

@@ -164,8 +164,8 @@ describe("while it runs", () => {
     assert.match(limited.warnings.join(), /the tool lags/);
     near(limited.last, 7.39, 0.05, "at rest");
     assert.ok(limited.most < 2 * limited.last && limited.least >= 0, JSON.stringify(limited));
-    // Without the limit the tool passes the surface at once. The surface then closes over it and pulls it down with
-    // 69 N.
+    // Without the limit, the tool passes through the surface in one step. The surface then closes over the tool and
+    // pulls it down with 69 N.
     const free = await dive({ maxToolSpeed: 1e3 });
     assert.ok(free.lagging === 0 && free.least < -30, JSON.stringify(free));
   });

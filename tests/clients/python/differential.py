@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Shows the same random and damaged datagrams to the C++ decoder (tests/fuzz/decode_lines) and to the Python one, and compares
-what they take them for, to the last bit. Exit code 0: the same; 1: not the same, the first such datagrams are printed."""
+"""Passes the same random and damaged datagrams to the decoders in C++ (tests/fuzz/decode_lines) and in Python, and
+compares the results bit by bit. The exit code is 0 if they are equal. Otherwise it is 1, and the first datagrams that
+differ are printed."""
 
 from __future__ import annotations
 
@@ -51,7 +52,7 @@ from tendon.messages import (
     Welcome,
 )
 
-# ---- What Python takes a datagram for, in the words of decode_lines ----
+# ---- The result of the Python decoder in the format of decode_lines ----
 
 
 def _double(number: float) -> str:

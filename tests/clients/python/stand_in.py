@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A server for one client without I/O. It performs the handshake in either suite and keeps one Session."""
+"""A server for one client that does no I/O. It performs the handshake in either suite and keeps one Session."""
 
 from __future__ import annotations
 
@@ -18,7 +18,8 @@ COOKIE = bytes(range(1, 17))
 
 
 class StandIn:
-    """With `refusal` it refuses every client, and with `deaf` it never answers. `grants` is the answer to any claim."""
+    """If `refusal` is set, it refuses every client. If `deaf` is set, it never answers. `grants` is the answer to any
+    claim."""
 
     def __init__(self, key: bytes | None = None, suites: tuple[Suite, ...] = (Suite.NOISE,)) -> None:
         self.key = key

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Devices, channels and leases of a client."""
+"""Tests the devices, channels and leases of a client."""
 
 from __future__ import annotations
 
@@ -249,7 +249,7 @@ def test_who_has_lost_the_lease_is_told_to_whom_and_sends_nothing_more():
     assert (stage.client.holds, stage.client.stats.lease_lost_to) == (False, "another")
     assert [answer.code for answer in stage.answers] == [Code.OK]
     seen, forces = list(stage.seen), list(stage.forces)
-    stage.client.send(seen[-1], Touch((1, 0, 0)))  # as an engine that was still computing
+    stage.client.send(seen[-1], Touch((1, 0, 0)))  # like an engine that was still computing
     stage.run(400 * MS)
     assert (stage.seen, stage.forces) == (seen, forces)
     assert stage.client.phase is Phase.OPEN

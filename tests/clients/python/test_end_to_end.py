@@ -17,7 +17,8 @@ from tendon import Client, Config, DeviceState, Phase, RefusedForGood, Role, Tou
 STIFFNESS = 2000
 
 LEASED = '[[channel]]\nname = "tissue"\nlease_ms = 300\n[network]\ncontroller_timeout_ms = 60000\n'
-"""A client without a force for 0.3 s loses the channel if another asks for it. Its session times out after a minute."""
+"""If a client sends no force for 0.3 s, it loses the channel to the next client that asks for it. Its session times out
+after one minute."""
 
 
 def wall(hand: DeviceState) -> Touch:

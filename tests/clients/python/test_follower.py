@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The cases in tests/clients/follower_cases.json, which the C++ and TypeScript clients run as well."""
+"""Runs the cases in tests/clients/follower_cases.json. The C++ and TypeScript clients run the same cases."""
 
 from __future__ import annotations
 

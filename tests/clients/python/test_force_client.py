@@ -151,7 +151,7 @@ def test_attempts_are_given_up_after_2_s_and_wait_twice_as_long_each_time():
     stage.run(30 * SECOND)
     hellos = [decode_hello(datagram).random for datagram in stage.world.there.delivered]
     assert stage.client.stats.attempts == len(set(hellos))
-    # Attempts of 2 s, separated by 0.1, 0.2, 0.4, 0.8, 1.6, 2, 2 … s.
+    # The attempts take 2 s each and are separated by 0.1, 0.2, 0.4, 0.8, 1.6, 2, 2 … s.
     assert stage.client.stats.attempts == 10
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""deploy/scenes/grasp.toml: two hands at two devices grasp a simulated liver."""
+"""Tests deploy/scenes/grasp.toml, in which two hands at two devices grasp a simulated liver."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Addresses, name resolution and socket errors."""
+"""Tests addresses, name resolution and socket errors."""
 
 import asyncio
 import errno

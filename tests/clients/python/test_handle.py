@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Orientation, torque and gripper of a handle."""
+"""Tests the orientation, the torque and the gripper of a handle."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Key files. test_vectors.py tests their contents."""
+"""Tests the reading of key files. test_vectors.py tests their contents."""
 
 import os
 from hashlib import sha256

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Cipher suites 1 and 2 with both roles in Python. test_vectors.py has the public vectors."""
+"""Tests cipher suites 1 and 2 with both roles in Python. The public vectors are in test_vectors.py."""
 
 
 import pytest

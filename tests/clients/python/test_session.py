@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The guarantees of SESSION.md over good and bad networks with fixed seeds."""
+"""Tests the guarantees of SESSION.md over good and bad networks with fixed seeds."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def drain(session: Session) -> list:
     return events
 
 
-# ---- The network as it is ----
+# ---- Realistic networks ----
 
 
 @pytest.mark.parametrize("suite", ["plain", "sealed"])
@@ -121,7 +121,7 @@ def test_the_same_seed_gives_the_same_world():
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_no_damage_done_to_a_sealed_datagram_is_believed(seed):
-    """One of the sessions receives each datagram twice, first damaged and then intact."""
+    """One of the sessions receives each datagram twice: first a damaged copy and then the original."""
     dice = random.Random(seed)
     it = world(PERFECT, seed, "sealed")
     genuine = it.a.receive
@@ -141,7 +141,7 @@ def test_no_damage_done_to_a_sealed_datagram_is_believed(seed):
     assert stats.forged > 0
 
 
-# ---- One rule at a time ----
+# ---- Single rules ----
 
 
 def test_a_quiet_session_says_something_every_50_ms():

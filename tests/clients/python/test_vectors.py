@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Checks that the client produces and reads the bytes of protocol/vectors."""
+"""Checks that the client produces and reads the bytes in protocol/vectors."""
 
 import hmac
 import json

@@ -317,7 +317,7 @@ def test_two_ranks_of_mpi_end_with_the_stream(proxy, tmp_path):
         assert program.returncode == 0
 
 
-# ---- tendon-conformance: real programs that it must pass, and that it must not ----
+# ---- tendon-conformance: programs that must pass, and programs that must fail ----
 
 
 BROKEN = "import os, sys, time\nimport tendon\nrun = tendon.worker.run\n"

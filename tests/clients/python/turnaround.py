@@ -1,9 +1,10 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""From a state's datagram handed to the socket to the datagram of the force that answers it, taken out of the socket: clients by
-turns, on loopback, against the same stand-in server, which gives states at 1 kHz. A floor is a program in the client's language
-that answers as many bytes with as many, and knows nothing else; to_floor is a client's median over it. `answered` is the share of the states that
-got a force of their own, `core_share` how much of one processor core the client took, its start included."""
+"""Measures the time from a state to the force that answers it, from socket to socket on loopback. The clients run one
+after another against the same stand-in server, which sends states at 1 kHz. The floor is a program in the same language
+that answers each datagram with a datagram of the same size and does nothing else. `to_floor` is the median of a client
+divided by that of its floor. `answered` is the share of states that were answered, and `core_share` is the CPU time of
+the client, including its start, as a share of one core."""
 
 from __future__ import annotations
 
@@ -54,7 +55,7 @@ setTimeout(() => process.exit(0), 1000 * Number(after("--duration-s")));
 
 
 class Floor:
-    """The server for the floor, without a session."""
+    """The server for the floor. It has no session."""
 
     def __init__(self) -> None:
         self._state = b""

@@ -78,7 +78,7 @@ class World:
         self.back = Direction(weather, f"back {seed}")
 
     def run(self, length: int, each_turn: Callable[[], Instant]) -> None:
-        """`each_turn` runs the users of both peers and returns the time of their next turn."""
+        """`each_turn` runs the users of both peers and returns when it must be called again."""
         end = self.now + length
         while True:
             due = self._turn(each_turn)

@@ -127,7 +127,8 @@ describe("ReplayWindow", () => {
         assert.equal(window.highest, highest);
         assert.equal(window.missing, highest + 1n - BigInt(inserted.size));
         if (i % 10 === 0) {
-          // For the newest and an earlier number: an authentic but malformed datagram is not echoed.
+          // An authentic but malformed datagram is not echoed, whether it has the newest packet number or an earlier
+          // one.
           for (const of of [highest, highest - BigInt(random.below(40))]) {
             let mask = 0;
             for (let bit = 0; bit < 32; ++bit) {

@@ -37,7 +37,8 @@ describe("the name of a server", () => {
     const way = udp(`LOCALHOST:${port}`)((datagram) => came.push(datagram[0]!), assert.fail);
     test.after(() => way.close());
     for (let i = 0; i < 20; ++i) way.send(Uint8Array.of(i));
-    // If the system resolves to ::1 first, no server answers there and the next address is tried, as in a session.
+    // The system may resolve the name to ::1 first. No server answers there, so the next address is tried, as in a
+    // session.
     for (let round = 0; came.length === 0 && round < 50; ++round) {
       await new Promise((resolve) => setTimeout(resolve, 100));
       if (came.length > 0) break;

@@ -201,7 +201,7 @@ describe("bounds.json", () => {
   };
 
   it("the bounds of tendon.proto are those of the codec", () => {
-    // This client never requests states in columns.
+    // This client never requests states that are encoded in columns.
     const bounds = readVectors("bounds.json").bounds.filter((vector: any) => !vector.field.startsWith("DeviceStates."));
     assert.ok(bounds.length > 300);
     const wrong = bounds.filter((vector: any) => isTaken(vector) !== vector.accepted);

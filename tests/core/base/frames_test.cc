@@ -145,7 +145,7 @@ TEST(Frames, WorkAndTurnsAreTheSameSeenFromAnyOfThe48Bases) {
     const Mat3 turn = any_rotation(random);
     const Vec3 place = any_vector(random);
     const Vec3 force = any_vector(random);
-    // Rotating a point of the handle and changing the frame must commute.
+    // The result must not depend on whether a point of the handle is rotated first or the frame is changed first.
     EXPECT_LT((frame.orientation(turn) * frame.position(place) - frame.position(turn * place)).norm(), 1e-12);
     EXPECT_NEAR(frame.orientation(turn).determinant(), 1, 1e-12);
     EXPECT_LT((frame.torque(place.cross(force)) - (frame.position(place) / 100).cross(frame.force(force))).norm(),

@@ -34,7 +34,7 @@ Vec<N> worst_motion(const Vec<N>& force, const Friction& friction, Duration held
   return force / size * (seconds(held) * (size - friction.coulomb) / (2 * friction.viscous));
 }
 
-/// Laws that are passive only in static worlds are tested with one of these.
+/// Use one of these worlds to test laws that are only passive if the world is static.
 template <int N>
 using World = std::function<Demand<N>(const Vec<N>& position)>;
 
@@ -43,8 +43,9 @@ struct Walls {
   double bilateral = 0.4;  ///< share of walls that also pull
 };
 
-/// Returns the force −∇ of a convex potential with its minimum at the origin: springs to random planes with random
-/// stiffness. Their total stiffness is at most `stiffest`. Planes of bilateral springs pass through the origin.
+/// Returns the force −∇ of a convex potential with its minimum at the origin. The potential consists of springs to
+/// random planes with random stiffness. The total stiffness is at most `stiffest`. The planes of springs that also pull
+/// contain the origin.
 template <int N>
 World<N> static_world(Dice& dice, double stiffest, const Walls& of) {
   struct Wall {
@@ -85,7 +86,7 @@ World<N> delayed(World<N> world, int periods) {
   };
 }
 
-/// Huge, tiny, zero, NaN, along and against the motion, with changing stiffness.
+/// The demand is huge, tiny, zero or NaN. It acts along or against the motion, and its stiffness changes.
 template <int N>
 World<N> hostile_world(Dice& dice) {
   return [&dice, last = Vec<N>(Vec<N>::Zero())](const Vec<N>& x) mutable {
@@ -190,8 +191,8 @@ inline Friction random_friction(Dice& dice) {
   return {dice.chance(0.3) ? 0.0 : dice.decades(-3, -0.3), dice.decades(-2, 0.3)};
 }
 
-/// `make(claimed friction, longest hold)`. Counts the seeds for which the port generated energy. The law assumes a
-/// viscous friction that is larger by `overclaim`.
+/// Counts the seeds for which the port generated energy. `make(claimed friction, longest hold)` returns the law. The
+/// law assumes a viscous friction that is too large by the factor `overclaim`.
 template <int N, class Make>
 int broken_by_hostile_worlds(Make make, int seeds, double overclaim = 1) {
   int broken = 0;
@@ -210,7 +211,8 @@ int broken_by_hostile_worlds(Make make, int seeds, double overclaim = 1) {
   return broken;
 }
 
-/// For laws that are passive in static, convex worlds. `make` also gets the world's slope, `stiffest` in N/m.
+/// This test is for laws that are only passive in static, convex worlds. `make` also gets the world's largest slope
+/// `stiffest`, N/m.
 template <int N, class Make>
 int broken_by_static_worlds(Make make, int seeds, const Walls& walls = {}, int periods_late = 0) {
   int broken = 0;

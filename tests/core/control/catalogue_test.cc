@@ -35,7 +35,7 @@ TEST(Catalogue, EveryPartOfAolPlusIsARowOfTheReadme) {
 }
 
 TEST(Catalogue, EachPartOfAolPlusIsListedOnce) {
-  // This binding fails to compile when Parts gains a member. Add a row to kAolParts then.
+  // This binding fails to compile if Parts gains a member. In this case, add a row to kAolParts.
   PointAolPlus::Parts parts;
   const auto& [cap, robust, knee, reserve, bounded, shaping, adaptive, thrift, damper, fading] = parts;
   EXPECT_EQ(std::tuple_size_v<decltype(kAolParts)>, 10U);

@@ -60,7 +60,7 @@ TEST(EnergyBounding, NoOtherFeasibleForceIsNearerToTheWantedOne) {
   }
 }
 
-// Slow entry costs the stored energy. Leaving in one step returns (c1 − b/T) Δx² when c1 exceeds b/T.
+// A slow entry costs the stored energy. If c1 is larger than b/T, leaving in one step returns (c1 − b/T) Δx².
 double energy_after_creeping_in_and_stepping_out(double overclaim) {
   EnergyBounding<1> law({{0, kFriction.viscous * overclaim}, milliseconds(1)});
   EnergyLedger truth({0, kFriction.viscous});

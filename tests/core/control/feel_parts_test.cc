@@ -39,7 +39,7 @@ TEST(Shaping, ShowsNoObjectStifferWhateverThePeriodIs) {
     config.parts.bounded_acceleration = {{.most = {100}}};
     config.parts.shaping = {{.stiffness = {900}}};
     EXPECT_LE(displayed(config, 20000), 900 * 1.06) << "friction earns, too; " << us << " us";
-    if (us > 1000) continue;  // this would cost more energy than is stored in the spring
+    if (us > 1000) continue;  // this would cost more energy than the spring stores
     EXPECT_GE(displayed(config, 20000), 900 * 0.9) << us << " us";
   }
 }
@@ -78,7 +78,7 @@ TEST(Thrift, AForceGrowsOnlyByWhatTheAccountCanPayTheCountsOf) {
   EXPECT_LT(-limited.force[0], 0.9 * limited.permitted) << "the bound itself is not what held it back";
 }
 
-/// J, during one second of hand vibration at 20 Hz with `amplitude` (m/s), in a contact of 2 N.
+/// Returns the energy (J) during one second if the hand vibrates at 20 Hz with `amplitude` (m/s) in a contact of 2 N.
 double damped(const AolPlus<1>::Config& config, double amplitude, double slow_speed = 0, double slow_hz = 0) {
   AolPlus<1> law(config);
   law.credit(0.05);

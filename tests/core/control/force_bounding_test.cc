@@ -10,7 +10,7 @@ using std::chrono::milliseconds;
 
 constexpr Friction kFriction{0.05, 0.26};
 
-// Lee & Lee 2009 eq. (8) with f_c = 0, written out.
+// This is Lee & Lee 2009, eq. (8), with f_c = 0.
 TEST(ForceBounding, WithoutCoulombFrictionItIsTheAdjustingOutputLimiter) {
   for (std::uint64_t seed = 0; seed < 50; ++seed) {
     Dice dice(seed);
@@ -96,7 +96,7 @@ TEST(MemorylessForceBounding, AForceDoesNotAppearWhileTheHandIsAtRest) {
   }
 }
 
-// f_c = 0: unclaimed Coulomb friction would compensate for the overclaimed viscous friction.
+// f_c must be zero. Otherwise the unclaimed Coulomb friction would compensate for the overclaimed viscous friction.
 template <class Law>
 double least_energy(double overclaim) {
   double least = 0;

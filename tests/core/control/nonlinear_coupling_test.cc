@@ -30,7 +30,7 @@ TEST(NonlinearCoupling, TheLedgerCoversTheSpringAndTheProxysAccount) {
   }
 }
 
-// The condition K_max ≤ 2b/T on the slope: core/PROOFS.md, "Comparison laws".
+// The slope must satisfy K_max ≤ 2b/T: core/PROOFS.md, "Comparison laws".
 TEST(NonlinearCoupling, AStaticFieldNoSteeperThanItMayBePassesUnchanged) {
   for (std::uint64_t seed = 0; seed < 200; ++seed) {
     Dice dice(seed);

@@ -63,7 +63,7 @@ TEST(PassiveSynthesis, NoAdversaryDrawsEnergyFromAStaticFieldThatIsLate) {
   EXPECT_EQ(broken<3>(3, 150), 0);
 }
 
-// Many slow circles in a spring. The bound is tight in this limit, with and without delay.
+// The hand moves in many slow circles in a spring. In this limit the bound is tight, both with and without delay.
 double energy_of_slow_waving(int periods_late, double overclaim) {
   const double viscous = 0.26;
   PassiveSynthesis<1> law({{0, viscous * overclaim}, milliseconds(1), milliseconds(periods_late), 20000});

@@ -15,7 +15,7 @@ using enum PassivityObserver;
 constexpr double kInf = std::numeric_limits<double>::infinity();
 constexpr Friction kFriction{0.05, 0.26};
 
-// Energy that the law observes for a spring under random motion, and the minimum of the ledger.
+// The energy that the law observes for a spring under random motion, and the minimum of the ledger.
 struct Seen {
   double worst_of_sum = 0;  // J, |observed − (K x²/2 ± K/2 Σ Δx²)|
   double least_observed = 0;
@@ -103,7 +103,7 @@ TEST(ParallelPassivityController, TheEnvironmentIsLeftBehindByWhatIsMissing) {
   ParallelPassivityController<1> law({kFriction, kZohExact, kInf});
   law.observe({Vec<1>(1.0), Vec<1>(1e-3), milliseconds(1)});  // 1 mJ generated
   const LimitedForce<1> limited = law.limit({Vec<1>(-4.0), Mat<1>(1000.0)});
-  // Σ f Δx is −1 mJ, and another such interval at 4 N adds 4 mJ, so no damping is needed.
+  // In this interval Σ f Δx is −1 mJ, and another such interval at 4 N adds 4 mJ, so no damping is needed.
   EXPECT_EQ(limited.force[0], -4);
   law.observe({Vec<1>(-4.0), Vec<1>(-0.5e-3), milliseconds(1)});  // −3 mJ
   const double missing = 3e-3 + 3.5 * 0.5e-3;

@@ -60,7 +60,7 @@ TEST(VirtualCoupling, WithinColgatesRuleNoAdversaryDrawsEnergy) {
   }
 }
 
-// At the surface the demand reports a stiff world, while the tool, which lags or leads the hand, is outside.
+// At the surface, the demand reports a stiff world while the tool, which lags or leads the hand, is outside of it.
 TEST(VirtualCoupling, AWorldStifferForTheHandThanForTheToolGivesEnergy) {
   const Friction friction{0, 0.26};
   VirtualCoupling<1> law({friction, milliseconds(1), 520});
@@ -76,7 +76,7 @@ TEST(VirtualCoupling, AWorldStifferForTheHandThanForTheToolGivesEnergy) {
   EXPECT_LT(law.energy(), -1e-4);
 }
 
-// The motion for which the rule is tight.
+// This is the motion for which the rule is tight.
 double energy_of_shaking_a_rigid_wall(double share_of_damping, double excess) {
   const Friction friction{0, 0.26};
   const double damping = share_of_damping * friction.viscous;
@@ -108,7 +108,7 @@ TEST(CouplingDesign, ColgatesRule) {
   EXPECT_THROW(colgate_coupling(1, Duration::zero(), 0), std::invalid_argument);
 }
 
-// Adams & Hannaford's matrix: minimum of 2 Re h11 Re h22 − |h12 h21| − Re(h12 h21).
+// The minimum of 2 Re h11 Re h22 − |h12 h21| − Re(h12 h21) for Adams & Hannaford's matrix.
 double llewellyn(double mass, double viscous, double stiffness, double damping) {
   constexpr double kPeriod = 1e-3;
   double least = std::numeric_limits<double>::infinity();

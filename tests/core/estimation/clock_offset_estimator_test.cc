@@ -37,7 +37,7 @@ struct Hosts {
   }
 };
 
-/// Bad Wi-Fi: just above 1 ms, but one in 14 is a stall with a long tail.
+/// A bad Wi-Fi network: the delay is just above 1 ms, but one in 14 datagrams is in a stall with a long tail.
 Duration wifi(Dice& dice) {
   const double little = -0.15e-3 * std::log(1 - dice.uniform());
   const double stall = dice.chance(0.07) ? 4e-3 / (1 - dice.uniform()) : 0;

@@ -16,7 +16,7 @@
 namespace tendon::recursive_least_squares_test {
 namespace {
 
-/// The library avoids it because it loses definiteness.
+/// The library does not use this form because it loses definiteness.
 template <int M, class Scalar>
 struct Textbook {
   using Vector = Eigen::Matrix<Scalar, M, 1>;
@@ -53,7 +53,7 @@ void expect_equals_batch(std::uint64_t seed) {
     const Vec3 phi(gaussian(dice), gaussian(dice), gaussian(dice));
     regressors.row(i) = phi;
     outputs[i] = phi.dot(kTruth) + 0.1 * gaussian(dice);
-    // The cap on forgetting of the header is active during the first samples.
+    // During the first samples, the cap on forgetting that the header describes is active.
     forgotten[i] = std::max(kForgetting, std::min(1.0, estimator.trace() / (3 * kPrior)));
     ASSERT_TRUE(estimator.observe(phi, outputs[i]));
   }
@@ -152,8 +152,8 @@ void expect_definite() {
 TEST(RecursiveLeastSquares, UdStaysDefiniteInFloat32) { expect_definite<float>(); }
 TEST(RecursiveLeastSquares, UdStaysDefiniteInFloat64) { expect_definite<double>(); }
 
-/// Only one of two directions is excited in 1200 of 2000 samples. `error`: the largest of θ when both are excited
-/// again.
+/// In 1200 of 2000 samples, only one of two directions is excited. `error` is the largest error of θ after both are
+/// excited again.
 struct Return {
   double trace;
   double error;

@@ -26,7 +26,7 @@ double income(const Vector& force, const Vector& moved, const Friction& friction
   return -force.dot(moved) + friction.coulomb * way + friction.viscous * way * way / seconds(held);
 }
 
-/// Eq. (7): the motion along the force that extracts the most energy.
+/// The motion of eq. (7), which extracts the most energy along the force.
 template <class Vector>
 Vector worst_motion(const Vector& force, const Friction& friction, Duration held) {
   const double size = force.norm();
@@ -169,7 +169,7 @@ TEST_P(HandlePassivity, NoHandAndNoEngineMakesItsAccountsNegative) {
 INSTANTIATE_TEST_SUITE_P(Laws, HandlePassivity, ::testing::Values(Law::kAol, Law::kAolPlus),
                          [](const auto& test) { return test.param == Law::kAol ? "Aol" : "AolPlus"; });
 
-/// Fills the account, then moves along a wrench `scale` times the permitted one. Returns the minimum energy, J.
+/// Fills the account, then moves along a wrench that is `scale` times the permitted one. Returns the minimum energy, J.
 double after_a_wrench(double scale, double share_of_torque) {
   const std::array friction{Friction{0.02, 0.26}, Friction{1e-4, 1e-3}};
   WrenchPort port({.law = Law::kAol, .friction = friction, .longest_hold = kLongest});

@@ -9,7 +9,7 @@
 
 namespace tendon::testing {
 
-/// m dv/dt = s t + bias − b v − f_c from rest, with optional encoder rounding.
+/// The exact solution of m dv/dt = s t + bias − b v − f_c from rest, with optional rounding by an encoder.
 struct ExactRamp {
   double rate = 0.1;  ///< s, N/s, either sign
   double viscous = 0.26;

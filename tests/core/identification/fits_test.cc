@@ -39,7 +39,8 @@ TEST(KellyFit, DoesNotCareWhenTheClockStarted) {
 }
 
 TEST(KellyFit, OnADesktopSeesTheFrictionThatTheSpecSays) {
-  // 0.25 m of travel, f_c = 0.05 N. Expected from a line through velocities; kelly_fit uses positions, hence the 5 %.
+  // The travel is 0.25 m and f_c = 0.05 N. The expected value is that of a line through velocities; kelly_fit uses
+  // positions, which explains the 5 %.
   struct Row {
     double viscous, rate, kelly_viscous, kelly_coulomb;
   };

@@ -80,7 +80,8 @@ Vec3 worst_motion(const Vec3& force, const Friction& friction, Duration held) {
   return force / size * (seconds(held) * (size - friction.coulomb) / (2 * friction.viscous));
 }
 
-// Returns the minimum energy after `steps` steps of random and worst motion with forces of `scale` times the bound.
+// Returns the minimum energy after `steps` steps of random and worst-case motion. The forces are `scale` times the
+// bound.
 double least_energy_against_adversary(double scale, std::uint64_t seed) {
   std::mt19937_64 random(seed);
   const auto uniform = [&random] { return static_cast<double>(random() >> 11) * 0x1p-53; };
@@ -214,7 +215,8 @@ TEST(OutputBound, TheLargestScaleSpendsTheBudgetAndNotMore) {
   }
 }
 
-// Regression: with a budget of 2e-42 J, a corner rounded to just above Coulomb friction left the wrench unbounded.
+// Regression: with a budget of 2e-42 J, a corner was rounded to just above the Coulomb friction, which left the wrench
+// unbounded.
 TEST(OutputBound, AlmostNoBudgetPermitsFrictionAndNoMoreThanEachPartAlone) {
   Dice dice(29091);
   for (int trial = 0; trial < 20000; ++trial) {

@@ -76,7 +76,8 @@ TEST(AdaptiveLocalModel, NothingJumpsWhenAnAnswerArrivesEvenInABlend) {
   }
 }
 
-/// Returns the energy (J) of a hand that moves by 1 mm in the worse of a soft and a stiff spring at each reversal.
+/// Returns the energy (J) of a hand that moves by 1 mm in a soft or a stiff spring, whichever is worse after each
+/// reversal.
 double handed_out(const AdaptiveLocalModel::Config& config) {
   AdaptiveLocalModel model(config);
   double energy = 0;

@@ -44,7 +44,8 @@ TEST(ForceChannels, TheSumIsThatOfTheFreshForcesAndTheirStiffness) {
   const auto both = two.wanted(at(milliseconds(1), Vec3(0.01, 0, 0)));
   EXPECT_TRUE(both.force.isApprox(Vec3(1 - 100 * 0.01, 2, 0), 1e-12));
   EXPECT_EQ(both.stiffness(0, 0), 100);
-  // Only the first engine continues. The sum must not contain the old force, and the device must not stop.
+  // Only the first engine continues to send. The sum must not contain the old force of the other engine, and the device
+  // must not stop.
   RemoteForce later = stiff;
   later.received = LocalTime(milliseconds(400));
   two.observe(0, later);
@@ -103,8 +104,8 @@ TEST(ForceChannels, TheReleaseOfAnEngineThatIsNoLongerHeardChangesNothing) {
   EXPECT_EQ(one.wanted(at(milliseconds(2))).mode, Mode::kActive);
 }
 
-// Two engines oppose each other, one sends NaN, one stops sending, and one is replaced during contact. The force
-// changes within the slew limit unless the limiter reduces it, and the ledger stays nonnegative.
+// Two engines push against each other, one sends NaN, one stops sending, and one is replaced during contact. The force
+// must change within the slew limit unless the limiter reduces it, and the ledger must not become negative.
 TEST(ForceChannels, NoEngineAndNoHandoverOverdrawsTheLedgerOrJumps) {
   HapticController::Config config;
   config.limiter.law = Law::kAol;
@@ -122,7 +123,7 @@ TEST(ForceChannels, NoEngineAndNoHandoverOverdrawsTheLedgerOrJumps) {
     const Motion hand{LocalTime(milliseconds(t)), Vec3(0.02 * std::sin(phase), 0, 0), Vec3::Zero()};
     const double x = hand.position.x();
     controller.observe(force_at(milliseconds(t), Vec3(-4000 * (x - 0.005), 0, 0), 1), 0);
-    // Opposes the first, is replaced every 400 ms during contact, and pauses for a while.
+    // This engine pushes against the first one, is replaced every 400 ms during contact, and pauses for a while.
     if (t % 2000 < 1500)
       controller.observe(force_at(milliseconds(t), Vec3(3000 * x, 1, 0), 2 + static_cast<std::uint32_t>(t) / 400), 1);
     if (t % 3 == 0) {

@@ -28,7 +28,7 @@ struct Link {
   int late = 30;   ///< ms of delay
 };
 
-/// The model extrapolates late answers. `see`: time, prediction and position.
+/// The model extrapolates late answers. `see` is called with time, prediction and position.
 void follow(LearnedModel& model, const Object& object, const std::function<Vec3(double)>& motion, const Link& link,
             int length_ms, const std::function<void(double, const Vec3&, const Vec3&)>& see) {
   for (int n = 0; n < length_ms; ++n) {
@@ -110,7 +110,7 @@ TEST(LearnedModel, DoesNotPullEvenAtTheFirstEndOfAWallItCameToFromFreeSpace) {
 }
 
 TEST(LearnedModel, ForgetsOneSidednessOfAnObjectThatPullsToo) {
-  // Bilateral, so the prediction may cross zero after the sign of the force has changed.
+  // The wall is bilateral, so the prediction may cross zero after the sign of the force has changed.
   const Object becomes = [](double t, const Vec3& x) {
     return t < 2 ? Vec3(x.x() > 0 ? -500 * x.x() : 0, 0, 0) : Vec3(-500 * x.x(), 0, 0);
   };
@@ -155,7 +155,7 @@ TEST(LearnedModel, AHandAtRestTeachesNothingHoweverNoisyTheAnswersAre) {
 }
 
 TEST(LearnedModel, DoesNotLeadAForceFarBeyondWhatFrictionLimitsItTo) {
-  // 8000 N/m, slides at 1 N: stiff between two answers but not over the delay.
+  // A wall of 8000 N/m that slides at 1 N. It is stiff between two answers, but not over the delay.
   const auto slides = [] {
     return [foot = 0.0](double, const Vec3& x) mutable {
       foot = std::clamp(foot, x.x() - 1.0 / 8000, x.x() + 1.0 / 8000);

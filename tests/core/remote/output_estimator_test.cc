@@ -38,7 +38,7 @@ double hand(int k) {
   return 0.012 * std::sin(2 * std::numbers::pi * 0.7 * t) + 0.003 * std::sin(2 * std::numbers::pi * 2.3 * t);
 }
 
-/// Force on the hand from a hardening spring whose stiffness steps 300 → 700 → 400 N/m.
+/// The force on the hand of a hardening spring whose stiffness steps from 300 to 700 to 400 N/m.
 double environment(int k) {
   const double stiffness = k < 4000 ? 300 : k < 8000 ? 700 : 400;
   const double x = hand(k);
@@ -240,7 +240,7 @@ TEST(OutputEstimator, CooldownEndsConstantResettingWhenTheModelCannotFit) {
 }
 
 TEST(OutputEstimator, AnOutputRecursiveModelRunsAwayOnlyWithAFreePole) {
-  // This is the same least-squares estimator with a free pole, which is run at 1 kHz between answers at 25 Hz.
+  // This is the same least-squares estimator with a free pole. It runs at 1 kHz between answers at 25 Hz.
   UdLeastSquares<2> raw({.forgetting = 0.95, .prior_variance = 1e8});
   std::vector<double> output(kSteps, 0.0);
   double largest_raw = 0;

@@ -22,7 +22,8 @@ struct Swing {
   double late = 0;   ///< m/s, largest speed in the last tenth
 };
 
-/// From the spring's rest position, which is the edge between two encoder counts, the worst case. `speed`: m/s.
+/// Starts at the rest position of the spring, which is on the edge between two encoder counts. This is the worst case.
+/// `speed` is in m/s.
 Swing let_swing(const SampledSpring& spring, double speed, Duration span) {
   SimulatedDevice::Config config;
   config.mass = spring.mass;
@@ -104,7 +105,7 @@ TEST(DiolaitiSimulated, EachRegionDoesWhatItsNameSays) {
     ASSERT_EQ(diolaiti(spring).region, DiolaitiRegion::kLimitCycle);
     const Swing swing = let_swing(spring, 0.05, 3s);
     EXPECT_GT(swing.late, smaller);
-    // A limit cycle of about one count at the frequency of the spring, which does not grow.
+    // This is a limit cycle of about one count at the frequency of the spring. It does not grow.
     EXPECT_LT(swing.late, spring.encoder_step * std::sqrt(stiffness / spring.mass));
     smaller = swing.late;
   }

@@ -163,7 +163,8 @@ TEST(FalconDevice, ButtonsComeWithThePosition) {
   EXPECT_EQ(bench.sample->buttons, 5U);
 }
 
-// The event character makes the chip send each complete reply; the latency timer of 1 ms may delay every second one.
+// The event character makes the chip send each complete reply. With only the latency timer of 1 ms, every second reply
+// could be late.
 TEST(FalconDevice, EveryPeriodOfAMillisecondHasItsSample) {
   for (const bool flush : {true, false}) {
     Bench bench({.has_firmware = true, .is_homed = true, .knows_flush_character = flush});
@@ -187,7 +188,7 @@ TEST(FalconDevice, WhatIsReturnedIsWhatTheMotorsGive) {
     const Vec3 wanted = dice.within(0, 40) * dice.direction();
     bench.run(5ms, wanted);
     ASSERT_TRUE(bench.sample);
-    // The driver knows the position to a count, so the force has an error of a few thousandths.
+    // The driver knows the position to one count, so the force has an error of a few thousandths.
     ASSERT_LT((bench.written - bench.falcon.force()).norm(), 0.01 * bench.written.norm() + 1e-3);
     ASSERT_LE(bench.written.norm(), wanted.norm() + 0.005);  // each torque is rounded separately
     ASSERT_GT(bench.written.normalized().dot(wanted.normalized()), 0.99);
@@ -298,7 +299,7 @@ TEST(FalconDevice, AMomentaryEncoderJumpCostsOnlySamples) {
   EXPECT_TRUE(bench.falcon.pushes());
 }
 
-// Although its origin has moved. Positions would be wrong.
+// The encoders have lost counts, so the origin has moved and positions would be wrong.
 TEST(FalconDevice, AMovedOriginIsNotBelievedUntilHomedAnew) {
   for (const bool with_firmware : {false, true}) {
     Bench bench({.has_firmware = true, .is_homed = true, .firmware_bytes = 4096, .own_supply = true},

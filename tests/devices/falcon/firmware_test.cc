@@ -127,7 +127,7 @@ TEST(FalconFirmware, NobodyIsGreetedForEver) {
   EXPECT_LT(load.now, LocalTime(std::chrono::seconds(12)));
 }
 
-// Wrong, truncated, missing and excess echoes at each point of the load.
+// Tests wrong, truncated, missing and excess echoes at each point of the load.
 TEST(FalconFirmware, AnEchoThatDiffersEndsTheLoadWhereverItHappens) {
   using enum FakeFalcon::Fault;
   for (const auto fault : {kGarblesAll, kSilent, kStalls, kLosesFirmware}) {

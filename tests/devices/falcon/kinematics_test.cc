@@ -68,7 +68,7 @@ TEST(FalconKinematics, TheJacobianIsTheDerivativeOfTheAngles) {
     ASSERT_TRUE(pose);
     worst = std::max(worst, (pose->jacobian - numeric_jacobian(position)).cwiseAbs().maxCoeff());
   }
-  EXPECT_LE(worst, 1e-8);  // rad/m, of about 20
+  EXPECT_LE(worst, 1e-8);  // rad/m; the values are about 20
 }
 
 // It has sin² θ₂ instead of sin θ₂ sin θ₃: 60 to 94 % of the true value within the ball of 50 mm, so a force along z
@@ -151,7 +151,8 @@ TEST(FalconKinematics, OneNewtonIs252CountsAlongZAnd606Across) {
   EXPECT_NEAR(largest(Vec3::UnitX()), 606, 6);
 }
 
-// If the force is saturated, its direction must not change. In the public driver the values wrap at 16 bits instead.
+// If the force is saturated, its direction must not change. In the public driver, the values wrap around at 16 bits
+// instead.
 TEST(FalconKinematics, ATooLargeForceKeepsItsDirectionAndNeverWraps) {
   Dice dice(7);
   for (int i = 0; i < 20'000; ++i) {

@@ -7,8 +7,8 @@
 
 #include "core/base/motion.h"
 
-/// Half-angle form of Stamper's thesis and the Jacobian of libnifalcon with its wrong z column, independently of
-/// devices/falcon/kinematics.cc.
+/// The half-angle form of Stamper's thesis and the Jacobian of libnifalcon with its wrong z column. This code is
+/// independent of devices/falcon/kinematics.cc.
 namespace tendon::published {
 
 struct Leg {
@@ -43,7 +43,7 @@ inline Leg leg_at(const Vec3& p, std::size_t leg) {
 
 inline Vec3 angles_at(const Vec3& p) { return {leg_at(p, 0).theta1, leg_at(p, 1).theta1, leg_at(p, 2).theta1}; }
 
-/// ∂θ₁/∂z of a leg in libnifalcon: sin² θ₂ in place of sin θ₃ sin θ₂.
+/// ∂θ₁/∂z of a leg in libnifalcon, which uses sin² θ₂ in place of sin θ₃ sin θ₂.
 inline double wrong_z_column(const Vec3& p, std::size_t leg) {
   const Leg angles = leg_at(p, leg);
   return std::pow(std::sin(angles.theta2), 2) /

@@ -35,7 +35,7 @@ struct Replayed {
   int without = 0;  ///< reads without a sample
 };
 
-/// Every `period` with a timing error of up to ±`jitter`.
+/// Samples are taken every `period`, with a timing error of up to ±`jitter`.
 Replayed replayed(ReplayDevice& device, Dice& dice, Duration period, double jitter, Duration time) {
   Replayed out;
   for (Duration t{}; t <= time; t += period) {

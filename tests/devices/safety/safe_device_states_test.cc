@@ -169,7 +169,7 @@ TEST(SafeDevice, EveryFaultInEveryStateEndsInZeroForce) {
         ASSERT_EQ(rig.step(kPush), Vec3::Zero());
         ASSERT_EQ(rig.puppet.told, Vec3::Zero());
       }
-      // A clear path must not arm it either: no new request was made.
+      // The path is now clear, but this must not arm the device either, because there was no new request.
       rig.steps(2000);
       EXPECT_EQ(rig.steps(50, kPush), Vec3::Zero());
       EXPECT_NE(rig.state(), SafetyState::kArmed);
@@ -208,7 +208,7 @@ TEST(SafeDevice, DisarmedInAnyStateItGivesNoForceUntilTheOperatorArms) {
         ASSERT_EQ(rig.step(kPush), Vec3::Zero());
         ASSERT_EQ(rig.puppet.told, Vec3::Zero());
       }
-      // Rest, the button or a replug must not arm it without a request.
+      // Without a request, neither rest nor the button nor a replug may arm the device.
       for (const Device::State stage : {Device::State::kAbsent, Device::State::kHomed}) {
         rig.puppet.stage = stage;
         rig.steps(200);

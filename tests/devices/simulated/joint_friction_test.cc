@@ -31,13 +31,13 @@ SimulatedDevice::Config rubbing(const Mechanism::Kind& kind, const Vec3& coulomb
   return config;
 }
 
-/// Motion of the handle when only one joint rotates, m/rad.
+/// Returns the motion of the handle (m/rad) if only one joint rotates.
 Vec3 way_of(const Mechanism::Kind& kind, const Vec3& at, Eigen::Index joint) {
   return Mechanism(kind).jacobian(at).inverse().col(joint);
 }
 
 TEST(JointFriction, OfOneTurningJointIsItsTorqueOverItsLever) {
-  // Just below and just above the static friction of that joint.
+  // The torque is just below or just above the static friction of that joint.
   const Vec3 torques(0.02, 0.03, 0.04);
   for (const Mechanism::Kind& kind : all_kinds()) {
     double least = std::numeric_limits<double>::infinity();
@@ -102,8 +102,8 @@ TEST(JointFriction, BrakesAHandleThatTurnsOneJointAsTheClosedFormSays) {
 }
 
 TEST(JointFriction, TurnsRoundWithoutAPauseUnderAForceThatItCannotHold) {
-  // Friction stops the joint, then the force reverses it. Friction may have the wrong sign for the rest of the 50 µs
-  // substep of the reversal; a pause of that length would cost 2.5 mm/s.
+  // Friction stops the joint, and then the force reverses it. For the rest of the 50 µs substep in which this happens,
+  // friction may have the wrong sign. A pause of that length would cost 2.5 mm/s.
   const Vec3 torques(0.02, 0.02, 0.02);
   for (const Mechanism::Kind& kind : all_kinds()) {
     for (Eigen::Index joint = 0; joint < 3; ++joint) {
@@ -113,7 +113,8 @@ TEST(JointFriction, TurnsRoundWithoutAPauseUnderAForceThatItCannotHold) {
         const double friction = torques[joint] / way.norm();
         config.start_velocity = v0 * way.normalized();
         Bench bench(config);
-        // This is along the motion unless the other joints rotate. The friction of these joints holds the rest.
+        // The handle moves along this direction unless the other joints rotate. The friction of those joints holds the
+        // rest.
         bench.push(-5 * way.normalized(), 2ms);
         const double back = 2e-3 - config.mass * v0 / (5 + friction);
         EXPECT_NEAR(bench.truth().velocity.dot(way.normalized()), -(5 - friction) / config.mass * back,

@@ -61,7 +61,7 @@ TEST(OperatorProfiles, AreRangesOfWhichTheHandIsTheMiddle) {
     EXPECT_EQ(hand.damping, profile.damping.middle());
     EXPECT_EQ(hand.mass, profile.mass.middle());
     EXPECT_NEAR(hand.motion.at(0.25).position.norm(), 0.01, 1e-12);
-    // Damping ratios of 0.05 to 3 over the published range: at most a slightly underdamped hand.
+    // Over the published range, the damping ratio is 0.05 to 3, so the hand is at most slightly underdamped.
     const double zeta = hand.damping / (2 * std::sqrt(hand.stiffness * hand.mass));
     EXPECT_GT(zeta, 0.05) << profile.name;
     EXPECT_LT(zeta, 3) << profile.name;

@@ -23,7 +23,7 @@ SimulatedDevice::Config bare() {
 
 }  // namespace
 
-/// Neither inlined nor mangled, for callgrind.
+/// This function is neither inlined nor mangled, so callgrind can find it.
 extern "C" [[gnu::noinline]] void live_in_turn(SimulatedDevice& device, int from, int to) {
   for (int i = from; i < to; ++i) {
     const auto sample = device.read(LocalTime(std::chrono::milliseconds(i)));

@@ -51,7 +51,7 @@ std::vector<std::pair<std::string, ScriptedMotion>> all_kinds() {
 TEST(ScriptedMotion, HasTheVelocityThatIsTheDerivativeOfItsPosition) {
   for (const auto& [name, motion] : all_kinds()) {
     const double h = 1e-6;
-    // Times that avoid the corners of the ramps.
+    // These times avoid the corners of the ramps.
     for (double t = 0.0037; t < 3; t += 0.00713) {
       const Vec3 difference = (motion.at(t + h).position - motion.at(t - h).position) / (2 * h);
       ASSERT_LT((motion.at(t).velocity - difference).norm(), 1e-6) << name << " at " << t;
@@ -143,7 +143,8 @@ TEST(Recorded, IsHeldAtTheEndOrPlayedAgainFromTheStart) {
 }
 
 TEST(Recorded, FollowsASmoothMotionThatWasSampledWell) {
-  // Second-order error of slopes away from extrema, first-order at them: 0.2 % for a 1 Hz sine at 100 Hz.
+  // The slopes have an error of second order away from extrema, and of first order at them. For a sine of 1 Hz sampled
+  // at 100 Hz, the error is 0.2 %.
   Recorded recorded;
   for (int i = 0; i <= 200; ++i) {
     recorded.samples.push_back({0.01 * i, std::sin(2 * std::numbers::pi * 0.01 * i)});

@@ -96,7 +96,7 @@ struct World {
 };
 
 TEST(SimulatedDeviceEnergy, HandAndWallsNeverDoLessWorkThanEquation5Demands) {
-  // 2000 random devices, hands, forces and intervals, with exact position sensing.
+  // 2000 random devices, hands, forces and intervals are tested with exact position sensing.
   double least = 1e300;
   for (std::uint64_t seed = 0; seed < 2000; ++seed) {
     Dice dice(seed);
@@ -120,7 +120,8 @@ TEST(SimulatedDeviceEnergy, HandAndWallsNeverDoLessWorkThanEquation5Demands) {
 
       const double balance = brought + stored_at_start - stored(bench.truth()) - equation.energy;
       least = std::min(least, balance);
-      // Rounding errors grow with the exchanged energy: 1e-12 J, and 1e-13 of the energy above 10 J.
+      // The tolerance allows for rounding errors, which grow with the exchanged energy: 1e-12 J, and 1e-13 of the
+      // energy above 10 J.
       ASSERT_GE(balance, -1e-12 * std::max(1.0, turnover / 10)) << "seed " << seed << ", step " << step;
     }
   }
@@ -128,7 +129,7 @@ TEST(SimulatedDeviceEnergy, HandAndWallsNeverDoLessWorkThanEquation5Demands) {
 }
 
 TEST(SimulatedDeviceEnergy, NothingIsLostWhereNothingRubs) {
-  // Exact without friction, including a hand with mass and a stiff grip.
+  // The result is exact without friction, also for a hand with mass and a stiff grip.
   SimulatedDevice::Config config;
   config.mass = 0.075;
   config.start_velocity = {0.1, -0.2, 0.3};
@@ -150,7 +151,7 @@ TEST(SimulatedDeviceEnergy, NothingIsLostWhereNothingRubs) {
 }
 
 TEST(SimulatedDeviceEnergy, UniformSlidingIsTheCaseWhereTheBoundIsReached) {
-  // At constant velocity in equation (5), the work of the hand equals the friction loss.
+  // At constant velocity, the work of the hand in equation (5) is equal to the friction loss.
   SimulatedDevice::Config config;
   config.mass = 0.075;
   config.viscous_friction = 0.26;

@@ -11,8 +11,8 @@
 #include "devices/simulated/simulated_device.h"
 #include "tests/devices/device_bench.h"
 
-/// Known stability boundaries of a real device with a sampled spring. With others, experiments on a limiter would only
-/// test the simulator.
+/// The simulator must have the known stability boundaries of a real device with a sampled spring. Otherwise,
+/// experiments on a limiter would only test the simulator.
 
 namespace tendon::simulated_device_stability_test {
 namespace {
@@ -34,7 +34,7 @@ double exact_k_max(double m, double b, double t) {
   return b * (1 - delta) / (m * (1 - delta) / b - t * delta);
 }
 
-/// Spectral radius of one period of the closed loop, from two periods with unit states.
+/// Returns the spectral radius of one period of the closed loop, which is computed from two periods with unit states.
 double spectral_radius(double m, double b, double stiffness) {
   Eigen::Matrix2d period;
   for (Eigen::Index i = 0; i < 2; ++i) {
@@ -64,8 +64,8 @@ TEST(SampledSpring, LosesStabilityAtTheStiffnessOfTheClosedForm) {
   }
 }
 
-/// In the last half second of 3 s, with the spring's rest position on the edge between two counts (worst case). f_c =
-/// 0.05 N and a count of 0.2 mm: 2 f_c/Δ = 500 N/m.
+/// The motion in the last half second of 3 s. The rest position of the spring is on the edge between two counts, which
+/// is the worst case. With f_c = 0.05 N and a count of 0.2 mm, 2 f_c/Δ = 500 N/m.
 double late_speed_on_a_count_edge(double stiffness) {
   const double step = 2e-4;
   auto config = device(0.075, 2);

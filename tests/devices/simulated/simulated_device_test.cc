@@ -178,8 +178,8 @@ TEST(CoulombFriction, HoldsAgainstAForceThatBrakedTheDeviceToAStop) {
 }
 
 TEST(CoulombFriction, TurnsRoundWithoutAPauseUnderAForceThatItCannotHold) {
-  // F + f_c stops the handle, then F − f_c reverses it. Friction may have the wrong sign for the rest of the 50 µs
-  // substep of the reversal; a pause of that length would cost 3 mm/s.
+  // First, F + f_c stops the handle, and then F − f_c reverses it. For the rest of the 50 µs substep in which this
+  // happens, friction may have the wrong sign. A pause of that length would cost 3 mm/s.
   const double m = 0.075;
   const double error = 2 * 0.04 / m * seconds(SimulatedDevice::Config{}.max_substep);
   for (const double v0 : {0.1, 0.1003, 0.1011, 0.1017, 0.1026}) {
@@ -195,7 +195,8 @@ TEST(CoulombFriction, TurnsRoundWithoutAPauseUnderAForceThatItCannotHold) {
 }
 
 TEST(CoulombFriction, OpposesTheVelocityAlongACurvedPath) {
-  // A lateral force while sliding, against Runge-Kutta for m dv/dt = F − f_c v/|v| in steps of 1 µs.
+  // A lateral force acts while the handle slides. The result is compared to Runge-Kutta for m dv/dt = F − f_c v/|v| in
+  // steps of 1 µs.
   const double m = 0.075;
   const double f_c = 0.04;
   const Vec3 force(0, 0.1, 0.05);

@@ -30,7 +30,7 @@ SimulatedDevice::Config ringing(double hz, double zeta) {
   return config;
 }
 
-/// A linear oscillator after a force step from rest.
+/// A linear oscillator after a step of the force from rest.
 double step_response(double force, double omega, double zeta, double t) {
   const double damped = omega * std::sqrt(1 - zeta * zeta);
   const double ring = std::cos(damped * t) + zeta * omega / damped * std::sin(damped * t);
@@ -152,7 +152,8 @@ TEST(StructuralMode, StoresWhatItHasTakenIn) {
   EXPECT_GT(most, 1e-4);
 }
 
-/// Scaled by 2⁻¹⁰, 14 terms, squared ten times.
+/// Returns the matrix exponential. The exponent is scaled by 2⁻¹⁰, the series has 14 terms, and the result is squared
+/// ten times.
 Eigen::MatrixXd exponential(const Eigen::MatrixXd& exponent) {
   const Eigen::MatrixXd small = exponent / 1024;
   Eigen::MatrixXd result = Eigen::MatrixXd::Identity(exponent.rows(), exponent.cols());
@@ -165,7 +166,8 @@ Eigen::MatrixXd exponential(const Eigen::MatrixXd& exponent) {
   return result;
 }
 
-/// Spectral radius of one period with a sampled spring and damper held for 1 ms. States: y, x, ẏ, v, previous y.
+/// Returns the spectral radius of one period with a spring and a damper that are sampled and held for 1 ms. The states
+/// are y, x, ẏ, v and the previous y.
 double spectral_radius(const SimulatedDevice::Config& config, double stiffness, double damping) {
   const auto& mode = *config.structural_mode;
   const double b = *config.viscous_friction;
@@ -185,7 +187,7 @@ double spectral_radius(const SimulatedDevice::Config& config, double stiffness, 
   return period.eigenvalues().cwiseAbs().maxCoeff();
 }
 
-/// The smallest value for which `radius` is at least 1.
+/// Returns the smallest value for which `radius` is at least 1.
 double boundary(const std::function<double(double)>& radius) {
   double unstable = 1;
   while (radius(unstable) < 1) unstable *= 1.02;
@@ -214,7 +216,8 @@ double growth(const SimulatedDevice::Config& config, double stiffness, double da
 }
 
 TEST(StructuralMode, RenderableDampingEndsWhereAnEigenvalueIsOne) {
-  // 2 m/T = 150 N·s/m without the mode and about 2 (m − m_h)/T = 90 with it; less as it approaches the sampling rate.
+  // The boundary is 2 m/T = 150 N·s/m without the mode and about 2 (m − m_h)/T = 90 with it. It decreases as the
+  // frequency of the mode approaches the sampling rate.
   double before = 2 * kMotor / 1e-3;
   for (const double hz : {60.0, 100.0, 200.0}) {
     auto config = ringing(hz, 0.02);

@@ -25,7 +25,7 @@ SimulatedDevice::Config free_mass(std::optional<Duration> sample, std::optional<
 }
 
 TEST(TransportDelay, ASampleIsThatOfTheInstantThatItSays) {
-  // The position shows the time of the sample. The intervals are not multiples of the delay.
+  // The position shows when the sample was taken. The intervals are not multiples of the delay.
   for (const Duration delay : {Duration(1ms), Duration(1'700us), Duration(333'333ns), Duration(100ms)}) {
     auto config = free_mass(delay, std::nullopt);
     config.start_velocity = {1, 0, 0};
@@ -42,7 +42,8 @@ TEST(TransportDelay, ASampleIsThatOfTheInstantThatItSays) {
 }
 
 TEST(TransportDelay, AForceActsFromItsDelayUntilTheDelayOfTheNext) {
-  // 2 N for 1 ms: an impulse of 2 mN·s for every delay. The position shows when the force was applied.
+  // A force of 2 N is applied for 1 ms, which is an impulse of 2 mN·s for every delay. The position shows when it was
+  // applied.
   for (const Duration delay : {Duration(1ns), Duration(999'999ns), Duration(300us), Duration(1ms), Duration(1'700us),
                                Duration(2ms), Duration(12'345'678ns)}) {
     Bench bench(free_mass(std::nullopt, delay));
@@ -172,7 +173,7 @@ TEST(TransportDelay, TheWatchdogCountsTheForcesThatArrive) {
 }
 
 TEST(TransportDelay, HasRoomForAllForcesOfTheFastestLoop) {
-  // The longest delays, a period of 100 µs, and a different force in each.
+  // This tests the longest delays, a period of 100 µs, and a different force in each period.
   Bench bench(free_mass(100ms, 100ms));
   double sum = 0;
   for (int i = 0; i < 5000; ++i) {

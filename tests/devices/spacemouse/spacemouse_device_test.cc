@@ -48,7 +48,7 @@ class MousePipe final : public usb::Pipe {
 struct Bench {
   explicit Bench(const SpaceMouseDevice::Config& config = {}) : device(config, std::make_unique<MousePipe>(mouse)) {}
 
-  /// Holds the cap at `cap` for `time`: a report every 16 ms, a read every millisecond.
+  /// Holds the cap at `cap` for `time`. There is a report every 16 ms and a read every millisecond.
   void hold(const Axes& cap, Duration time) {
     for (Duration t{}; t < time; t += 1ms) {
       if (t % 16ms == Duration::zero()) mouse.push(cap);

@@ -21,7 +21,7 @@ bool comes_true(const Holds& holds) {
   return holds();
 }
 
-/// Called at 1 kHz in real time, as by the haptic thread.
+/// Called at 1 kHz in real time, as the haptic thread does.
 struct FalconDriver {
   explicit FalconDriver(std::unique_ptr<usb::Pipe> pipe) : device({.firmware = fake_firmware(4096)}, std::move(pipe)) {}
 
@@ -46,7 +46,7 @@ struct FalconDriver {
     return turns_until([&] { return device.state() == state; }, force);
   }
 
-  /// Repeats each step as needed until `pushes()`, because a machine that stalls loses these states.
+  /// Repeats the steps until `pushes()` returns true, because the device leaves these states if the machine stalls.
   template <class Home, class Pushes>
   bool comes_to_push(SafeDevice& safe, const Vec3& force, const Home& home, const Pushes& pushes) {
     const LocalTime end = real_now() + std::chrono::seconds(30);
@@ -60,7 +60,7 @@ struct FalconDriver {
   }
 
   FalconDevice device;
-  Device* turned = &device;  ///< or a wrapper around it
+  Device* turned = &device;  ///< the device itself, or a wrapper around it
   std::optional<PositionSample> sample;
   Vec3 written = Vec3::Zero();
   std::chrono::steady_clock::time_point due = std::chrono::steady_clock::now();

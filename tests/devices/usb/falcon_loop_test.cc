@@ -35,7 +35,7 @@ RemoteForce answer(const DeviceState& state, std::uint64_t number, LocalTime now
 
 bool near(const Vec3& felt, const Vec3& written) { return (felt - written).norm() <= 0.1 + 0.2 * written.norm(); }
 
-// No limiter: it would rightly remove most of the wall on a machine that stalls for several periods.
+// There is no limiter. It would remove most of the wall, with good reason, if the machine stalls for several periods.
 TEST(FalconLoop, AWallIsFeltThroughTheRealLibraryWithoutAHeapCallInTheLoop) {
   UsbfsShim shim({.has_firmware = true, .is_homed = true});
   FalconDevice device({}, usb::open_pipe({.node = [&shim] { return shim.node(); }}));
@@ -89,7 +89,7 @@ TEST(FalconLoop, AWallIsFeltThroughTheRealLibraryWithoutAHeapCallInTheLoop) {
   loop.stop();
   EXPECT_EQ(heap_calls, 0U);
   EXPECT_GT(pushed, 0U);  // a sign error would pull
-  // After a late step, hand and levers have moved. A reply that has timed out answers the next request.
+  // After a late step, the hand and the legs have moved. A reply that has timed out answers the next request.
   EXPECT_LE(at_odds, loop.stats().overruns + loop.stats().unseen);
 }
 

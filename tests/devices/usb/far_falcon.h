@@ -24,8 +24,9 @@ namespace tendon {
 ///     tendond ── libusb ── far_usbfs (preloaded) ══ cable: a socket ══ FarFalcon, a FakeFalcon and the hand on it
 ///        └ guardian ──────── the node: a pty, of which FarFalcon has the master end ─┘
 ///
-/// Each opening of the node has a new cable and a new pty. What a guardian writes arrives after all data that the dead
-/// process sent by cable. Runs in its own thread at the highest real-time priority granted.
+/// Each time the node is opened, there is a new cable and a new pty. Data written by a guardian arrives after all data
+/// that the dead process sent by cable. The Falcon runs in its own thread at the highest real-time priority that is
+/// granted.
 ///
 /// Thread-safe.
 class FarFalcon {

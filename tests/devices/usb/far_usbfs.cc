@@ -27,7 +27,7 @@
 namespace tendon {
 namespace {
 
-/// libusb's name of a wrapped node (bus 0), consistent with USBDEVFS_CONNECTINFO.
+/// The name that libusb gives to a wrapped node (bus 0), consistent with USBDEVFS_CONNECTINFO.
 constexpr std::string_view kNode = "/dev/bus/usb/000/007";
 
 int connect_to_falcon() {
@@ -43,7 +43,7 @@ int connect_to_falcon() {
   return cable;
 }
 
-/// Receives the node with its descriptors. Negative: nothing is plugged in.
+/// Receives the node and its descriptors. A negative value means that nothing is plugged in.
 int take_node(int cable, std::vector<std::uint8_t>& descriptors) {
   descriptors.resize(1024);
   iovec part{.iov_base = descriptors.data(), .iov_len = descriptors.size()};
@@ -155,7 +155,7 @@ int close(int file) {
   return static_cast<int>(syscall(SYS_close, file));
 }
 
-/// Access to the socket implies access to the node.
+/// A process that has access to the socket also has access to the node.
 int access(const char* path, int mode) noexcept {
   return path == tendon::kNode ? 0 : static_cast<int>(syscall(SYS_faccessat, AT_FDCWD, path, mode));
 }

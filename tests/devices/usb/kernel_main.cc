@@ -135,7 +135,7 @@ TEST(UsbKernel, FromThePlugToTheForce) {
                                  Vec3::Zero()));
 }
 
-/// Returns the times of a packet and its reply for a single thread with blocking calls.
+/// Returns the times of a packet and its reply, measured by a single thread that uses blocking calls.
 std::vector<double> bare_round_trips_ms(const std::string& node, int count) {
   const int file = open(node.c_str(), O_RDWR | O_CLOEXEC);
   unsigned interface = 0;
@@ -159,7 +159,7 @@ std::vector<double> bare_round_trips_ms(const std::string& node, int count) {
   return times;
 }
 
-// The limit is relative to the bare round trip of the same run, because an emulated machine may get little time.
+// The limit is relative to the bare round trip of the same run, because an emulated machine may get little CPU time.
 TEST(UsbKernel, ExchangesAtAKilohertzOrAsFastAsThisMachineCan) {
   std::optional<LocalTime> before;
   std::vector<double> intervals_ms;
@@ -278,7 +278,7 @@ class Driven {
     return kill_and_wait();
   }
 
-  std::optional<LocalTime> let_go;  ///< start of the present time without force
+  std::optional<LocalTime> let_go;  ///< start of the current period without force
   FakeFalcon falcon{kReady};
   UsbIpCable cable{falcon, [this](LocalTime at) {
                      if (falcon.pushes()) {
@@ -300,7 +300,7 @@ class Driven {
   pid_t pid_ = -1;
 };
 
-// In half of the runs, this must take at most 20 ms. If four bare round trips are longer, these are the limit.
+// In half of the runs, this must take at most 20 ms, or four bare round trips if that is longer.
 TEST(UsbKernel, AGuardedFalconHasNoForce20MillisecondsAfterItsDriversSigkill) {
   std::vector<double> took_ms;
   std::vector<double> trips_ms;

@@ -223,7 +223,7 @@ TEST(LibusbPipe, RequestsAndDataReachTheDeviceInOrder) {
   UsbfsShim shim({.has_firmware = false, .firmware_bytes = 4096});
   const auto pipe = pipe_to(shim);
   ASSERT_TRUE(comes_true([&] { return pipe->connection() != 0; }));
-  // The greeting is valid only at 9600 baud, so its order relative to the requests matters.
+  // The greeting is only valid at 9600 baud, so its order relative to the requests matters.
   const std::vector<std::uint8_t> greeting = {0x0A, 0x43, 0x0D};
   EXPECT_TRUE(pipe->request(usb::ftdi::divisor(2)));
   EXPECT_TRUE(pipe->request(usb::ftdi::divisor(0x4138)));
@@ -246,7 +246,7 @@ double quantile(std::vector<double> values, double share) {
   return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1))];
 }
 
-// There is a sample in nearly every period. The limit depends on the wake-up latency of this machine.
+// There is a sample in almost every period. The limit depends on the wake-up latency of this machine.
 TEST(LibusbPipe, KeepsUpWithAKilohertz) {
   UsbfsShim shim(kReady);
   Loop loop(shim);

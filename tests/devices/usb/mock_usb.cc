@@ -55,7 +55,7 @@ void check(bool done, GError* error) {
 struct Unref {
   void operator()(UMockdevIoctlData* data) const { umockdev_ioctl_data_unref(data); }
 };
-/// Copy of the ioctl caller's memory. Writes to it reach the caller when the ioctl ends.
+/// A copy of the memory of the ioctl's caller. What is written to it reaches the caller when the ioctl ends.
 using Data = std::unique_ptr<UMockdevIoctlData, Unref>;
 
 Data resolve(UMockdevIoctlData* in, std::size_t at, std::size_t size) {
@@ -169,7 +169,7 @@ struct MockPort::Inside {
     while (!stop) {
       const LocalTime at = real_now();
       while (plugged && !waiting.empty() && model.next_in() <= at) let_in(at);
-      // The model may be changed without notification.
+      // The model may be changed without a notification.
       changed.wait_for(lock, std::clamp<Duration>(plugged && !waiting.empty() ? model.next_in() - at : Duration::max(),
                                                   std::chrono::microseconds(10), std::chrono::milliseconds(5)));
     }

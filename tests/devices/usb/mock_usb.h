@@ -33,7 +33,7 @@ class MockUsb {
 /// One port of the machine and its device model, in real time. Thread-safe.
 class MockPort {
  public:
-  /// Port `number` of bus 1, 1 to 9. Nothing is plugged in. `usb` and `model` must outlive this object.
+  /// Creates port `number` of bus 1, from 1 to 9, with nothing plugged in. `usb` and `model` must outlive this object.
   MockPort(MockUsb& usb, int number, UsbModel& model);
   ~MockPort();
   MockPort(const MockPort&) = delete;
@@ -41,7 +41,7 @@ class MockPort {
 
   /// Uses a new address each time, like the kernel.
   void plug();
-  /// Like the kernel: transfers end, the node fails, the device leaves sysfs, and udev sends an event.
+  /// As with the kernel, the transfers end, the node fails, the device leaves sysfs, and udev sends an event.
   void unplug();
 
   std::string node() const;       ///< of the plugged device: "/dev/bus/usb/001/002"

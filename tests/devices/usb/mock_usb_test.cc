@@ -71,7 +71,7 @@ TEST_F(MockUsbTest, DevicesAreListedWhereTheyArePluggedInAndNotWhenTheyAreOut) {
   EXPECT_EQ(report(), "");
 }
 
-// The default user of a container is root and may open every node, so this runs without privileges.
+// The default user of a container is root and may open every node, so this test runs without privileges.
 TEST_F(MockUsbTest, AForbiddenAnUnpluggedAndAMissingNodeAreToldApart) {
   const auto look = [] {
     const auto lacks = [] {

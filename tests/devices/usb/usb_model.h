@@ -22,7 +22,7 @@ class UsbModel {
  public:
   virtual ~UsbModel() = default;
 
-  /// USB 2.0, 9.6: device descriptor of 18 bytes, then the complete configuration.
+  /// The device descriptor of 18 bytes, followed by the complete configuration (USB 2.0, 9.6).
   virtual std::span<const std::uint8_t> descriptors() const = 0;
   /// HID report descriptor (HID 1.11, 6.2.2).
   virtual std::span<const std::uint8_t> report_descriptor() const { return {}; }
@@ -30,10 +30,10 @@ class UsbModel {
   virtual void plug() = 0;
   virtual void unplug() = 0;
 
-  /// Vendor request without data. Returns false for a stall.
+  /// Handles a vendor request without data. Returns false for a stall.
   virtual bool request(LocalTime now, std::uint8_t request, std::uint16_t value) = 0;
   virtual bool write(LocalTime now, std::span<const std::uint8_t> bytes) = 0;
-  /// When a waiting IN transfer ends without another event; LocalTime::max(): never.
+  /// Returns when a waiting IN transfer ends if there is no other event. LocalTime::max() means never.
   virtual LocalTime next_in() const = 0;
   virtual std::vector<std::uint8_t> take_in(LocalTime now) = 0;
 

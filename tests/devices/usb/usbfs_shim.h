@@ -22,7 +22,7 @@ class UsbfsShim final : public UsbfsNode {
   void unplug();
   void plug();
 
-  /// Errors of transfers, not faults of the device.
+  /// These are errors of USB transfers, not faults of the device.
   enum class Trouble {
     kNone,
     kOverflow,  ///< IN: more data than requested

@@ -22,13 +22,14 @@ namespace {
 
 using namespace std::chrono_literals;
 
-// Big-endian. 48 bytes: five common fields, five fields of the command, and the setup packet of a control transfer.
+// Big-endian. The 48 bytes are five common fields, five fields of the command, and the setup packet of a control
+// transfer.
 constexpr std::uint32_t kSubmit = 1;
 constexpr std::uint32_t kUnlink = 2;
 constexpr std::uint32_t kSubmitted = 3;
 constexpr std::uint32_t kUnlinked = 4;
 
-/// Bus 1, device 1 at the remote side, which the kernel requires and ignores.
+/// Bus 1, device 1 on the remote side. The kernel requires these numbers but ignores them.
 constexpr std::uint32_t kFarId = 0x10001;
 constexpr int kFullSpeed = 2;
 constexpr int kPorts = 8;
@@ -53,7 +54,7 @@ bool receive(int end, void* to, std::size_t size) {
   return recv(end, to, size, MSG_WAITALL) == static_cast<ssize_t>(size);
 }
 
-/// The kernel rejects ports in use, which become free some time after detaching.
+/// The kernel rejects ports that are in use. A port becomes free some time after the device is detached.
 bool attach(int socket) {
   for (int tries = 0; tries < 500; ++tries) {
     for (int port = 0; port < kPorts; ++port) {

@@ -21,7 +21,7 @@ namespace tendon {
 /// Thread-safe.
 class UsbIpCable {
  public:
-  /// This is called with the time of each accepted OUT transfer. The model is locked.
+  /// This is called with the time of each accepted OUT transfer, while the model is locked.
   using Watch = std::function<void(LocalTime)>;
 
   /// Plugs the device in. Throws std::runtime_error if the kernel rejects it.

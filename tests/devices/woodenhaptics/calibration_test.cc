@@ -67,7 +67,7 @@ TEST(WoodenHapticsDevice, CountersNotSetAsToldAreNoCalibration) {
   EXPECT_TRUE(bench.reaches(State::kHomed, 1s));
 }
 
-// Found by tests/fuzz: a board that stops answering has not requested a second calibration.
+// Found by tests/fuzz: if a board stops answering, this is not a request for a second calibration.
 TEST(WoodenHapticsDevice, TheCountersAreNotSetAgainUnlessItIsAskedForAgain) {
   int until_set = 0;
   for (const bool silent : {false, true}) {

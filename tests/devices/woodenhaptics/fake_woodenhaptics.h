@@ -16,8 +16,8 @@
 
 namespace tendon {
 
-/// The published firmware (haptikfabrikenapi, firmware/main.cpp) step by step, its amplifiers, the arm, and a
-/// full-speed bus with one report per direction in each frame of 1 ms. Shares no code with the driver.
+/// Models the published firmware (haptikfabrikenapi, firmware/main.cpp) step by step, its amplifiers, the arm, and a
+/// full-speed bus with one report per direction in each frame of 1 ms. It shares no code with the driver.
 ///
 ///     firmware:  loop: send the counters and wait until the host reads them; wait for a report; take the newest;
 ///                if it has 14 bytes: amplifiers on, watchdog set to 0.5 s, execute it
@@ -56,7 +56,7 @@ class FakeWoodenHaptics {
 
   bool plugged() const { return plugged_; }
   int times_plugged() const { return times_plugged_; }
-  /// Not a serial chip, so there are no vendor requests.
+  /// The board is not a serial chip, so it has no vendor requests.
   bool request(LocalTime, std::uint8_t, std::uint16_t) { return false; }
   bool write(LocalTime now, std::span<const std::uint8_t> bytes);
   LocalTime next_in() const;
@@ -77,7 +77,7 @@ class FakeWoodenHaptics {
   bool calibrated() const { return calibrated_ && !calibrate_ && fault_ != Fault::kJumps; }
   bool amplifiers_on() const { return amplifiers_on_; }
   bool pushes() const { return amplifiers_on_ && current_ma_ != std::array<int, 3>{}; }
-  /// Duty cycle at the amplifiers: 0.5 is zero current, 0.1 and 0.9 are full scale.
+  /// The duty cycle at the amplifiers: 0.5 is zero current, and 0.1 and 0.9 are full scale.
   double pulse_width(std::size_t motor) const;
   /// Force on the hand, N, by virtual work.
   Vec3 force() const;

@@ -20,7 +20,7 @@ using published_arm::Arm;
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
-/// Uniform in the published workspace, with full force.
+/// Uniform in the published workspace, with the full force.
 Pose place(Dice& dice, const Model& model) {
   for (;;) {
     const auto pose = pose_at(model, model.workspace_radius * std::cbrt(dice.uniform()) * dice.direction());
@@ -80,7 +80,7 @@ TEST(WoodenHapticsKinematics, TheTipIsWhereTheTurnedLinksEnd) {
   }
 }
 
-// (0, 0, 6000) or (0, 0, -5000): upper link upright, lower link level and straight ahead.
+// At (0, 0, 6000) or (0, 0, -5000), the upper link is upright, and the lower link is level and points straight ahead.
 TEST(WoodenHapticsKinematics, CalibratedTheUpperLinkIsUprightTheLowerLevel) {
   for (const char* name : {"woodenhaptics_v2019", "woodenhaptics_v2015", "polhem_v1"}) {
     const Model& model = *find_model(name);
@@ -135,7 +135,7 @@ TEST(WoodenHapticsKinematics, TheJacobianIsTheDerivativeOfThePosition) {
       const Vec3 angles = 3 * dice.direction();
       worst = std::max(worst, (pose_with(model, angles).jacobian - arm.numeric_jacobian(angles)).cwiseAbs().maxCoeff());
     }
-    EXPECT_LE(worst, 1e-9) << model.name;  // m/rad, of about 0.2
+    EXPECT_LE(worst, 1e-9) << model.name;  // m/rad; the values are about 0.2
   }
 }
 
@@ -171,7 +171,7 @@ TEST(WoodenHapticsKinematics, CurrentsDoTheWorkOfTheForce) {
       const Vec3 torque = amperes.cwiseProduct(arm.per_ampere());
       const Vec3 turn = 1e-4 * dice.direction();
       const Vec3 moved = arm.position_at(pose.angles + turn) - arm.position_at(pose.angles - turn);
-      // Rounding error: 1 mA per motor.
+      // The tolerance is the rounding error of 1 mA per motor.
       const double lost = 1e-3 * arm.per_ampere().cwiseProduct(2 * turn).cwiseAbs().sum();
       ASSERT_NEAR(torque.dot(2 * turn), force.dot(moved), lost + 1e-11);
       const auto given = force_of(model, pose, currents);
@@ -181,7 +181,7 @@ TEST(WoodenHapticsKinematics, CurrentsDoTheWorkOfTheForce) {
   }
 }
 
-// Torque constant, capstan and lengths are published; the arithmetic was done by hand.
+// The torque constant, the capstan and the lengths are published. The arithmetic was done by hand.
 TEST(WoodenHapticsKinematics, ANewtonUpwardsTakesTheCurrentsOfTheDrawings) {
   const Model& model = *find_model("woodenhaptics_v2019");
   const auto pose = pose_at(model, Vec3::Zero());

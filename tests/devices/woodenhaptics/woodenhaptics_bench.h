@@ -34,7 +34,7 @@ class Cable final : public usb::Pipe {
   const bool& full_;
 };
 
-/// Current is allowed once the counters are set.
+/// The motors may only get current after the counters are set.
 struct WoodenHapticsBench : DriverBench<WoodenHapticsBench> {
   explicit WoodenHapticsBench(const FakeWoodenHaptics::Options& options = {}, double max_current = 2)
       : arm(options),

@@ -41,7 +41,7 @@ TEST(WoodenHapticsDevice, FromThePlugToTheForceItTakesEveryStep) {
     ASSERT_TRUE(bench.sample);
     EXPECT_LT(bench.sample->position.norm(), 2 * bench.device.info().position_resolution);
     EXPECT_TRUE(bench.arm.pushes());
-    // Excludes sign and scale errors. One count per joint changes the force by a few thousandths.
+    // This excludes errors of sign and scale. One count per joint changes the force by a few thousandths.
     EXPECT_LT((bench.arm.force() - bench.written).norm(), 0.01 * bench.written.norm());
     EXPECT_GT(bench.written.normalized().dot(kForce.normalized()), 0.999);
   }
@@ -125,7 +125,7 @@ TEST(WoodenHapticsDevice, JointsCarryTheTipAndTurnAsItMoves) {
   }
 }
 
-// The value has 16 bits per revolution of the body. The arm makes two and a half revolutions.
+// The counter has 16 bits per revolution of the body. The arm makes two and a half revolutions.
 TEST(WoodenHapticsDevice, CountersThatWrapAreFollowed) {
   for (const double turns : {2.5, -2.5}) {
     Bench bench;
@@ -155,7 +155,7 @@ TEST(WoodenHapticsDevice, TheSwitchAtTheTipIsButton0) {
   EXPECT_EQ(bench.sample->buttons, 1U);
 }
 
-// A full-speed bus needs one frame per direction, so two reports are in flight.
+// A full-speed bus needs one frame per direction, so there are two reports in flight.
 TEST(WoodenHapticsDevice, EveryPeriodOfAMillisecondHasItsSampleAndItsCommand) {
   Bench bench;
   ASSERT_TRUE(bench.reaches(State::kHomed, 1s));
@@ -204,7 +204,7 @@ TEST(WoodenHapticsDevice, ZeroDoesNotWaitForAnAnswer) {
   EXPECT_FALSE(bench.arm.pushes());
 }
 
-/// If the server is killed, stops or hangs (devices/safety/guardian.h).
+/// This is for a server that is killed, stops or hangs (devices/safety/guardian.h).
 TEST(WoodenHapticsDevice, ThePacketOfTheGuardianEndsTheForceAtOnce) {
   Bench bench;
   bench.home(kForce);

@@ -45,8 +45,9 @@ void go_to(Bench& bench, Place place) {
 
 class WoodenHapticsFault : public testing::TestWithParam<Fault> {};
 
-/// Cost reports but not the device. One corrupted report in three is not harmless, because a byte may signal the
-/// button, which invalidates the calibration. On a real bus the checksum of USB rejects such reports.
+/// These faults cost reports, but they do not stop the device. One corrupted report in three is not harmless, because a
+/// byte may signal the button, which invalidates the calibration. On a real bus, USB rejects such reports because of
+/// their checksum.
 bool is_harmless(Fault fault) { return fault == Fault::kDropsSome || fault == Fault::kBabbles; }
 
 TEST_P(WoodenHapticsFault, EndsInZeroForceAtEveryState) {

@@ -31,7 +31,7 @@ std::string text_of(const std::filesystem::path& file) {
   return text.str();
 }
 
-/// deploy/scenes/falcon.toml after `tendon-identify`, with encrypted sessions.
+/// This is deploy/scenes/falcon.toml after `tendon-identify`, with encrypted sessions.
 std::string falcon_scene() {
   std::string text = text_of(std::filesystem::path(TENDON_SCENES) / "falcon.toml");
   const auto set = [&text](const std::string& key, const std::string& value) {

@@ -18,8 +18,9 @@
 
 namespace tendon::e2e {
 
-/// As in normal use: tendond with deploy/scenes/falcon.toml, a firmware file and a folder of keys; virtual_wall with
-/// its key, over UDP; the real libusb. Only the Falcon is a model, and FarFalcon replaces the kernel's USB.
+/// Runs the server as in normal use: tendond with deploy/scenes/falcon.toml, a firmware file, a folder of keys, and the
+/// real libusb; and virtual_wall with its key, over UDP. Only the Falcon is a model, and FarFalcon replaces the
+/// kernel's USB.
 class FalconStage {
  public:
   struct Config {
@@ -38,11 +39,12 @@ class FalconStage {
   const std::filesystem::path& folder() const noexcept { return folder_.path(); }
   Scene scene() const;
 
-  // Initially the hand rests outside the wall and presses no button. To x, m from the center, at `speed`, m/s. Returns
-  // when it has arrived.
+  // Moves the hand to x (m from the center) at `speed` (m/s), and returns when it has arrived. Initially the hand rests
+  // outside of the wall and presses no button.
   void go_to(double x, double speed = 0.1);
   void home() { homes_ = true; }
-  /// Outside the wall when the lamps are green. Returns after the time of the force ramp.
+  /// Arms the device when its lamps are green, with the hand outside of the wall. Returns after the time of the force
+  /// ramp.
   void arm();
   void arm_and_press();
 
@@ -55,7 +57,7 @@ class FalconStage {
   FarFalcon::Seen wait_for_release();
 
   struct Killed {
-    double pushed_for_ms = 0;          ///< after the signal was sent
+    double pushed_for_ms = 0;          ///< duration of the force after the signal was sent
     double dead_ms = 0;                ///< time from the signal to the exit of the process
     bool pushes = true;                ///< at the end
     std::vector<std::uint8_t> last{};  ///< the last received endpoint and packet
@@ -66,7 +68,7 @@ class FalconStage {
   /// Sends `signal` to the server, or to `process`, and waits until the force is zero. Returns the time in ms.
   double released_after(int signal, std::optional<pid_t> process = {});
 
-  /// A thread of the test or the server was delayed long enough to trip watchdogs.
+  /// Returns whether a thread of the test or the server was delayed long enough to trip watchdogs.
   bool machine_stood_still();
 
   static constexpr double kDeep = 0.002;  ///< m

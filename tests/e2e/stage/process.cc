@@ -27,7 +27,7 @@ struct Pipe {
   int write = -1;
 };
 
-/// O_CLOEXEC: no other program inherits the descriptors.
+/// O_CLOEXEC ensures that no other program inherits the descriptors.
 Pipe make_pipe() {
   std::array<int, 2> ends{};
   if (::pipe2(ends.data(), O_CLOEXEC) != 0) fail(errno, "pipe2");
@@ -49,7 +49,7 @@ Process::Process(const std::filesystem::path& program, const std::vector<std::st
   for (std::string& word : words) argv.push_back(word.data());
   argv.push_back(nullptr);
   std::vector<char*> environment;
-  // The first definition of a name is used.
+  // If a name is defined twice, the first definition is used.
   for (std::string& variable : more_environment) environment.push_back(variable.data());
   for (char** variable = environ; *variable != nullptr; ++variable) environment.push_back(*variable);
   environment.push_back(nullptr);

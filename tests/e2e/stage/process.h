@@ -22,20 +22,21 @@ inline constexpr std::chrono::seconds kPatience{30};
 /// if the wait cannot succeed any more. Thread-safe: no.
 class Process {
  public:
-  /// In `folder`, without standard input. `more_environment`: "NAME=value". Throws std::system_error on failure.
+  /// Starts the program in `folder`, without standard input. `more_environment`: "NAME=value". Throws std::system_error
+  /// on failure.
   Process(const std::filesystem::path& program, const std::vector<std::string>& arguments,
           const std::filesystem::path& folder, std::vector<std::string> more_environment = {});
   ~Process();
   Process(const Process&) = delete;
   Process& operator=(const Process&) = delete;
 
-  /// The next line of stdout or stderr that contains `text`. Later calls search that stream after this line.
+  /// Waits for the next line of stdout or stderr that contains `text`. Later calls search that stream after this line.
   std::string wait_for_line(std::string_view text, std::chrono::nanoseconds patience = kPatience);
 
   void signal(int number);
   pid_t pid() const noexcept { return pid_; }
 
-  /// The exit code, or −N if signal N ended the program.
+  /// Waits for the program. Returns its exit code, or −N if signal N ended it.
   int wait(std::chrono::nanoseconds patience = kPatience);
 
   const std::string& out() const noexcept { return out_.text; }

@@ -31,7 +31,7 @@ class Relay {
   std::vector<Datagram> said() const;
 
   void forge(std::span<const std::byte> datagram);
-  /// Truncates the last byte of the client's next `count` datagrams.
+  /// Truncates the client's next `count` datagrams by one byte.
   void cut_next(int count);
 
  private:

@@ -11,7 +11,7 @@
 
 namespace tendon::e2e {
 
-/// A tmpfs of `size`, unmounted by the destructor. Needs permission to mount.
+/// A tmpfs of `size` bytes that is unmounted by the destructor. Requires the permission to mount.
 class SmallDisk {
  public:
   SmallDisk(std::filesystem::path path, const std::string& size) : path_(std::move(path)) {
@@ -19,7 +19,7 @@ class SmallDisk {
     if (::mount("tendon-test", path_.c_str(), "tmpfs", 0, ("size=" + size).c_str()) != 0) error_ = errno;
   }
   ~SmallDisk() {
-    // Lazy unmount, which works even if a program still writes to it.
+    // A lazy unmount works even if a program is still writing to the file system.
     if (error_ == 0) ::umount2(path_.c_str(), MNT_DETACH);
   }
   SmallDisk(const SmallDisk&) = delete;

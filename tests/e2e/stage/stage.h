@@ -49,7 +49,7 @@ std::uint64_t count_in(std::string_view json, const std::string& key);
 /// The text must not contain escapes.
 std::string text_in(std::string_view json, const std::string& key);
 
-/// Reports its address on port 0. Exits after two minutes in case the test is killed.
+/// A program that prints its address because it uses port 0. It exits after two minutes in case the test is killed.
 class Service {
  public:
   /// The address is `key` of the JSON event `event`.

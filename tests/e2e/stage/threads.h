@@ -11,16 +11,16 @@ namespace tendon::e2e {
 
 std::set<std::string> threads_of(pid_t process);
 
-/// The state from /proc. 'T' means stopped.
+/// Returns the state from /proc. 'T' means that the thread is stopped.
 char state_of(pid_t process);
 
-/// Voluntary context switches. Throws std::runtime_error if there is no such thread.
+/// Returns the number of voluntary context switches. Throws std::runtime_error if there is no such thread.
 std::uint64_t sleeps_of(pid_t process, const std::string& thread);
 
 /// Replaces the number of a name as server/THREADS.md does, for example "haptic-3" by "haptic-N".
 std::string general_name(const std::string& thread);
 
-/// The threads of tendond listed in server/THREADS.md.
+/// Returns the threads of tendond that are listed in server/THREADS.md.
 std::set<std::string> threads_of_the_page();
 
 }  // namespace tendon::e2e

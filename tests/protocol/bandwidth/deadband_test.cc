@@ -20,7 +20,7 @@ TEST(Deadband, PassesWhatDiffersByMoreThanATenthAndHoldsBackTheRest) {
   EXPECT_FALSE(deadband.passes(kStart + milliseconds(1), {2.19, 0, 0}));
   EXPECT_FALSE(deadband.passes(kStart + milliseconds(2), {2, 0.19, 0}));
   EXPECT_TRUE(deadband.passes(kStart + milliseconds(3), {2.21, 0, 0}));
-  // The reference is the last sent value, so slow changes accumulate.
+  // The reference is the last value that was sent, so slow changes accumulate.
   EXPECT_FALSE(deadband.passes(kStart + milliseconds(4), {2.42, 0, 0}));
   EXPECT_TRUE(deadband.passes(kStart + milliseconds(5), {2.44, 0, 0}));
 }
@@ -154,7 +154,7 @@ TEST(HandleDeadband, LeavesOutNoTorqueOrGripForceThatAHandCanTell) {
   EXPECT_FALSE(passes({1, 0, 0}, {}, 0.06));
 }
 
-/// The prediction error for a hand at `position(t)` is at most the velocity band times the silence.
+/// If the hand is at `position(t)`, the prediction error must be at most the velocity band times the silence.
 TEST(StateDeadband, WhatIsPredictedIsOffByAtMostTheBandTimesTheSilence) {
   StateDeadband deadband(kAsked);
   DeviceState believed;

@@ -19,8 +19,8 @@ using std::chrono::seconds;
 
 constexpr LocalTime kStart{seconds(1)};
 
-/// A 1 kHz sender on a FIFO link with limited datagrams per second, a delay of 5 ms each way and an unbounded queue.
-/// The peer answers each datagram immediately.
+/// A 1 kHz sender on a FIFO link that can carry a limited number of datagrams per second. The delay is 5 ms in each
+/// direction, and the queue is unbounded. The peer answers each datagram immediately.
 class NarrowLink {
  public:
   explicit NarrowLink(const RateAdaptation::Config& config = {}) : adaptation_(config, kStart) {}

@@ -11,7 +11,7 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-// After a slow link the timeout can be many seconds. If the next copy is lost, that would be the wait on a fast link.
+// After a slow link, the timeout can be many seconds. On a fast link, this would be the wait if the next copy is lost.
 TEST(OutgoingRequests, AreSentAgainWithinASecondHoweverSlowTheLink) {
   for (const Duration timeout : {Duration(milliseconds(20)), Duration(seconds(1)), Duration(seconds(12))}) {
     OutgoingRequests requests;

@@ -5,7 +5,7 @@
 
 #include <set>
 
-// vectors_test.cc has the known answers.
+// The known answers are in vectors_test.cc.
 
 namespace tendon::crypto_test {
 namespace {

@@ -7,7 +7,7 @@
 
 #include "tests/protocol/examples.h"
 
-// vectors_test.cc has the known answer of cacophony.
+// The known answer of cacophony is in vectors_test.cc.
 
 namespace tendon::noise_test {
 namespace {
@@ -43,7 +43,7 @@ TEST_F(Noise, BothEndsEndWithTheSameKeysAndEachOthersWords) {
 TEST_F(Noise, TheKeysOfSuite2AreBoundToTheWholeHandshake) {
   const auto z = NoiseResponder::read(psk_, prologue_, a_.message());
   const Key ephemeral = random_.next();
-  // The result of Split() does not depend on the second payload; the keys of suite 2 do.
+  // The result of Split() does not depend on the second payload, but the keys of suite 2 do.
   const NoiseSplit one = z->reply(ephemeral, text("welcome"))->split;
   const NoiseSplit other = z->reply(ephemeral, text("welcome to suite 2"))->split;
   ASSERT_EQ(one.initiator_to_responder.bytes(), other.initiator_to_responder.bytes());
@@ -93,7 +93,7 @@ TEST_F(Noise, AnotherKeyOrAnotherPrologueDoesNotOpen) {
 TEST_F(Noise, OneWhoKnowsTheKeyButNotTheEphemeralOnesCannotReadTheAnswer) {
   const auto z = NoiseResponder::read(psk_, prologue_, a_.message());
   const Bytes reply = z->reply(random_.next(), text("welcome"))->message;
-  // The thief has recorded everything and knows the key, but has a different ephemeral key.
+  // The attacker has recorded everything and knows the key, but has a different ephemeral key.
   const NoiseInitiator thief(psk_, random_.next(), prologue_, text("hello"));
   EXPECT_FALSE(thief.read(reply).has_value());
 }

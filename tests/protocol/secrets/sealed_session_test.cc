@@ -5,7 +5,7 @@
 #include "tests/protocol/examples.h"
 #include "tests/protocol/world.h"
 
-// Tests a session in suite 1: authentication, datagrams that are rejected, and the end of the session.
+// Tests a session in suite 1: authentication, rejected datagrams, and the end of the session.
 
 namespace tendon::sealed_session_test {
 namespace {

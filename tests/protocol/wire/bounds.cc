@@ -29,7 +29,7 @@ using google::protobuf::Message;
 struct Range {
   std::string least;      ///< as written
   std::string most;       ///< empty: none
-  bool beyond = false;    ///< `least` itself is out of bounds
+  bool beyond = false;    ///< the value `least` itself is out of bounds
   bool infinity = false;  ///< +infinity is within bounds
   bool zero = false;      ///< 0 is within bounds
 };
@@ -41,7 +41,7 @@ struct Bound {
   std::set<int> too_few_or_many;
 };
 
-/// Parses "[0, 16]" or "{1, 3, 9}" entries: the numbers at the bounds and their neighbors.
+/// Parses the entries "[0, 16]" or "{1, 3, 9}": the numbers at the bounds and their neighbors.
 void take_entries(const std::string& text, Bound& to) {
   static const std::regex kInterval(R"(\[(\d+), (\d+)\])");
   std::smatch found;
@@ -116,7 +116,8 @@ std::int64_t whole(const std::string& text) {
   return std::stoll(text);
 }
 
-/// Fields whose validity also depends on another field. A value that passes its own bound may still be refused.
+/// The validity of these fields also depends on another field. A value that is within its own bound may still be
+/// refused.
 bool is_bound_to_others(const std::string& path) {
   static const std::regex kOthers(R"(.*\.(normal|workspace_min_m|workspace_max_m|operator_from_device|orientation|)"
                                   R"(at_orientation|rotation|turn\.turn)\..*)");
@@ -226,7 +227,7 @@ class Maker {
         });
       };
       constexpr double kInfinity = std::numeric_limits<double>::infinity();
-      // Rounds into the bounds, which need not be exact in single precision.
+      // Rounds a value into its bounds, which may have no exact single-precision representation.
       const auto held = [&](double value) {
         const auto single = static_cast<float>(value);
         if (!is_single) return value;
@@ -294,8 +295,8 @@ class Maker {
     for (const int size : bound.too_few_or_many) resized(size, false);
   }
 
-  /// Zeros, letters or copies of the last entry, with different devices in claims and grants. A new frame is empty, as
-  /// from a newer peer.
+  /// Adds zeros, letters or copies of the last entry. The devices in claims and grants differ. A new frame is empty,
+  /// like a frame from a newer peer.
   static void resize(Message& message, const FieldDescriptor& field, int size) {
     const auto& reflection = *message.GetReflection();
     while (reflection.FieldSize(message, &field) > size) reflection.RemoveLast(&message, &field);

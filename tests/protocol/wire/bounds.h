@@ -8,7 +8,7 @@
 
 namespace tendon::bounds {
 
-/// At a bound of tendon.proto or just beyond it. The rest is an example of examples.h.
+/// One field is at a bound of tendon.proto or just beyond it. The other fields are those of an example in examples.h.
 struct Case {
   std::string message;          ///< of the body: "Datagram", "Hello" or "Answer"
   std::string field;            ///< "DeviceState.position_m.x"
@@ -17,9 +17,9 @@ struct Case {
   std::vector<std::byte> body;  ///< protobuf
 };
 
-/// For all bounds in the comments of `proto` (the text of tendon.proto) and all enum values. Throws
-/// std::invalid_argument if a comment that begins with a bracket breaks the grammar, if no example has a field with a
-/// bound, or if a double, time, text or list has no bound.
+/// Returns the cases for all bounds in the comments of `proto` (the text of tendon.proto) and for all enum values.
+/// Throws std::invalid_argument if a comment that begins with a bracket breaks the grammar, if no example has a field
+/// with a bound, or if a double, time, text or list has no bound.
 std::vector<Case> cases(std::string_view proto);
 
 }  // namespace tendon::bounds

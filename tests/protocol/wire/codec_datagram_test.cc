@@ -16,7 +16,7 @@ namespace {
 
 using examples::data;
 
-/// The sizes include the tag of suite 1 and an echo.
+/// These sizes include the tag of suite 1 and an echo.
 TEST(Codec, APortTakes238BytesAndAtMost609AndFitsBesideAState) {
   const auto sealed = [](const auto&... frames) {
     return data(1'000'000, examples::echo(), frames...).size() + crypto::kTagSize;

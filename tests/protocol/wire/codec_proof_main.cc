@@ -61,7 +61,7 @@ void read(Workplace& place, bool by_hand) {
 
 }  // namespace
 
-/// Neither inlined nor mangled, for callgrind.
+/// This function is neither inlined nor mangled, so callgrind can find it.
 extern "C" [[gnu::noinline]] void in_turn(Workplace& place, bool writes, What what, bool by_hand, int times) {
   static const DeviceState state = examples::state();
   static const ForceCommand force = examples::force();

@@ -19,7 +19,7 @@ using CodecProof = testing::InstructionTest;
 struct Bound {
   std::string what;
   double instructions;  ///< the limit for our codec; this is a few percent above the measured value
-  double times;         ///< protobuf needs at least this factor, with existing objects
+  double times;         ///< protobuf needs at least this factor, even if it reuses its objects
 };
 
 TEST_F(CodecProof, StatesAndForcesCostLessThanByProtobuf) {

@@ -19,7 +19,7 @@ namespace {
 
 using examples::data;
 
-/// Expects that `field` makes the request invalid, and that the state after it is still read.
+/// Expects that `field` makes the request invalid, and that the state after the request is still read.
 void expect_refused(const Request& request, std::string_view field) {
   SCOPED_TRACE(field);
   DataReader reader;
@@ -40,7 +40,7 @@ Message with(Message message, void (*change)(Message&)) {
   return message;
 }
 
-/// The bounds of single fields are in vectors_test.cc.
+/// vectors_test.cc tests the bounds of single fields.
 TEST(Codec, AFrameThatContradictsItselfIsLeftOutAndCountedAndTheNextIsRead) {
   const auto force = [](void (*change)(ForceCommand&)) {
     ForceCommand all = examples::force_with_all();

@@ -15,7 +15,7 @@ namespace {
 
 using examples::data;
 
-/// golden.md has the bytes of the examples, and bounds.json the bounds of each field.
+/// The bytes of the examples are in golden.md, and the bounds of each field are in bounds.json.
 TEST(Codec, AFrameComesOutAsItWentIn) {
   Dice dice(1);
   std::vector<Frame> frames = drawn::others();

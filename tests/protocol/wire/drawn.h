@@ -16,7 +16,7 @@
 #include "tests/protocol/wire/read_back.h"
 #include "tests/support/dice.h"
 
-// Mostly ordinary, some with difficult values.
+// Most of the random values are ordinary, and some are difficult.
 
 namespace tendon::drawn {
 
@@ -100,7 +100,7 @@ inline ForceCommand a_force(Dice& dice) {
   return command;
 }
 
-// Eight bytes for every component, ten for every counter.
+// These values are as long as possible: eight bytes for every component, and ten for every counter.
 
 inline const Vec3 kThirds = Vec3::Constant(-1.0 / 3);
 inline const Mat3 kNineEntries{{1.1, 2.1, 3.1}, {4.1, 5.1, 6.1}, {7.1, 8.1, 9.1}};
@@ -183,7 +183,7 @@ inline std::optional<OutgoingEcho> an_echo(Dice& dice) {
                       .received_mask = static_cast<std::uint32_t>(a_count(dice))};
 }
 
-/// Returns the states of one step for columns, of one, two or all devices. A share `spoilt` is invalid.
+/// Returns the states of one, two or all devices in the same step, for columns. A share `spoilt` of them is invalid.
 inline std::vector<DeviceState> states_of_a_step(Dice& dice, double spoilt) {
   DeviceState common = a_state(dice);
   std::vector<DeviceState> states;
@@ -238,7 +238,7 @@ inline const std::vector<Frame>& others() {
   return all;
 }
 
-/// A few frames. A share `spoilt` of the states and forces is invalid.
+/// Returns a few frames. A share `spoilt` of the states and forces is invalid.
 inline Bytes a_datagram(Dice& dice, double spoilt) {
   std::array<std::byte, kMaxDatagram> buffer{};
   DataWriter writer;

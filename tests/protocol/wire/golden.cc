@@ -132,7 +132,7 @@ class Writer {
     }
   }
 
-  /// Floating-point numbers on separate lines, others together.
+  /// Each floating-point number is on its own line. Other numbers share a line.
   void packed(const FieldDescriptor& about, std::size_t size, int depth, const std::string& words,
               const std::string& head) {
     const Bytes all = rest_.first(std::min(size, rest_.size()));

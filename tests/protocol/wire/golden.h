@@ -9,15 +9,15 @@
 
 namespace tendon::golden {
 
-/// As protocol/vectors/golden.md shows it: one line per field with its bytes in hex and their meaning, with the names
-/// of tendon.proto.
+/// Returns a datagram as shown in protocol/vectors/golden.md: one line per field with its bytes in hex and their
+/// meaning, with the names of tendon.proto.
 std::string block(std::span<const std::byte> datagram);
 
-/// Returns the blocks of a page that start with "```golden NAME". The key is the name.
+/// Returns the blocks of a page that start with "```golden NAME". NAME is the key.
 std::map<std::string, std::string> blocks(std::string_view page);
 
-/// Generates the golden blocks from the examples of these names (examples.h). Throws std::invalid_argument if the sets
-/// of names differ.
+/// Generates the golden blocks from the examples with these names (examples.h). Throws std::invalid_argument if the
+/// sets of names differ.
 std::string rewritten(std::string_view page);
 
 }  // namespace tendon::golden

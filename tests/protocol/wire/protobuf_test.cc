@@ -44,7 +44,7 @@ Bytes bytes_of(const std::string& text) {
   return {begin, begin + text.size()};
 }
 
-/// Parsed and serialized by libprotobuf. Nothing if the body is malformed.
+/// Returns the body after it was parsed and serialized by libprotobuf, or nothing if it is malformed.
 std::optional<Bytes> by_protobuf(const Bytes& body) {
 #if GOOGLE_PROTOBUF_VERSION < 4022000
   const google::protobuf::LogSilencer silence;  // protobuf logs every text that is not UTF-8
@@ -57,7 +57,7 @@ std::optional<Bytes> by_protobuf(const Bytes& body) {
 
 Bytes told_of(const DeviceState& state) { return examples::data(0, {}, state); }
 
-/// Directly, through AnyOrder, and after libprotobuf has rewritten the bytes.
+/// Reads the body directly, through AnyOrder, and after libprotobuf has rewritten the bytes.
 class Readers {
  public:
   ::testing::AssertionResult agree(const Bytes& body) {
@@ -150,7 +150,7 @@ TEST(Protobuf, WhatIsMalformedForProtobufIsMalformedHere) {
   for (const auto& [what, bytes] : cases) EXPECT_TRUE(readers.agree(bytes)) << what;
 }
 
-/// Changes a datagram as a network, an older or newer peer, or an attacker may.
+/// Changes a datagram as a network, an older or newer peer, or an attacker could change it.
 void distort(Dice& dice, Bytes& body) {
   const auto somewhere = [&] { return body.begin() + static_cast<std::ptrdiff_t>(dice.bits() % (body.size() + 1)); };
   switch (body.empty() ? 1 : dice.bits() % 7) {
@@ -171,7 +171,7 @@ void distort(Dice& dice, Bytes& body) {
       body.insert(body.end(), copy.begin(), copy.end());
       break;
     }
-    case 5: {  // a number longer than necessary
+    case 5: {  // a number that is longer than necessary
       auto& byte = body[dice.bits() % body.size()];
       if ((byte & std::byte{0x80}) != std::byte{0}) break;
       byte |= std::byte{0x80};
@@ -193,7 +193,7 @@ TEST(Protobuf, ReadsOfDistortedBytesWhatProtobufDoes) {
   }
 }
 
-/// Allowed by WIRE.md, such as overlong numbers.
+/// WIRE.md allows these encodings, such as overlong numbers.
 TEST(Protobuf, WhatNoWriterOfOursDoesIsPutInOrder) {
   const auto frame = [](const RawProtobuf& state) { return datagram_with(RawProtobuf().message(1, state)); };
   const RawProtobuf usual = RawProtobuf().varint(1, 5).varint(11, 2);
@@ -309,7 +309,7 @@ TEST(Protobuf, AStateWithAPartThatColumnsCannotSayStaysWhole) {
   }
 }
 
-/// If a state is invalid, all states of its frame are dropped. Nothing else is dropped.
+/// If one state is invalid, all states of its frame are dropped, and nothing else.
 TEST(Protobuf, AColumnOfAnotherLengthDropsTheFrame) {
   const auto columns = [](const std::function<void(v1::DeviceStates&)>& change) {
     const Bytes datagram = examples::data_in_columns(1, examples::states_in_columns());

@@ -13,8 +13,8 @@
 
 namespace tendon {
 
-/// Allowed by protobuf, though no encoder does it: shuffles fields, repeats some, splits messages and lists into
-/// pieces, and adds unknown fields.
+/// Protobuf allows the following, although no encoder does it: shuffles fields, repeats some, splits messages and lists
+/// into pieces, and adds unknown fields.
 class Scrambled {
  public:
   explicit Scrambled(Dice& dice) : dice_(dice) {}
@@ -97,7 +97,7 @@ class Scrambled {
     const auto add = [&](const google::protobuf::Message& sub) {
       const std::string whole = (*this)(sub);
       if (field.is_repeated() || dice_.chance(0.7)) return out.push_back(in(number, whole));
-      // Twice. The first copy has no lists, because the receiver would join them.
+      // The message is written twice. The first copy has no lists, because the receiver would join them.
       const auto first = std::unique_ptr<google::protobuf::Message>(sub.New());
       first->CopyFrom(sub);
       drop_lists(*first);

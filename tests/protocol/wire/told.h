@@ -10,7 +10,7 @@
 
 namespace tendon {
 
-/// Bit for bit, including absent fields.
+/// Describes the content bit by bit, including absent fields.
 inline std::string told(const DataContent* content) {
   if (content == nullptr) return "malformed";
   std::string text = std::to_string(content->sent.time_since_epoch().count()) + " invalid " +

@@ -57,7 +57,7 @@ std::string indented(std::string_view text) {
   return out;
 }
 
-/// Fixed order of fields. Values are already JSON.
+/// A JSON object with a fixed order of fields. The values are already JSON.
 class Object {
  public:
   Object& json(std::string_view name, std::string_view value) {
@@ -93,7 +93,7 @@ std::string meaning(std::span<const std::byte> body) {
 
 std::span<const std::byte> text_bytes(std::string_view text) { return std::as_bytes(std::span(text)); }
 
-/// Returns a fixed key, for test vectors only.
+/// Returns a fixed key. It is for test vectors only.
 Key key_of(std::string_view what) { return Key(crypto::sha256({text_bytes("tendon vectors: "), text_bytes(what)})); }
 
 template <std::size_t Size>
@@ -282,7 +282,7 @@ Key renewed(Suite suite, const Key& key) {
   return suite == Suite::kAesGcm ? crypto::AesGcm(key).renewed() : crypto::renewed(key);
 }
 
-/// Returns the example with the token of suite 2, which a client appends and a server puts first.
+/// Returns the example with the token of suite 2. A client appends this token, and a server puts it first.
 Hello offering(Suite suite) {
   Hello hello = examples::hello();
   if (suite == Suite::kAesGcm) hello.features.emplace_back(kFeatureAesGcm);
@@ -323,7 +323,7 @@ std::string sealed_file(Suite suite) {
   const Key next_up = renewed(suite, up);
   const Key next_down = renewed(suite, down);
   std::vector<Shown> all = shown(std::uint64_t{1} << 32);
-  // The Bye stays last. It uses the previous key and is late.
+  // The Bye remains the last datagram. It uses the previous key and is late.
   const std::uint64_t far = (std::uint64_t{1} << 32) + 1;
   all.insert(all.end() - 1,
              {{"force after the first rekey", true, far, 1, examples::data(far, examples::echo(), examples::force())},
@@ -345,7 +345,7 @@ std::string sealed_file(Suite suite) {
                        .str());
   }
 
-  // Dropped by a client directly after the handshake.
+  // A client drops this datagram directly after the handshake.
   Bytes state = examples::data(1, examples::echo(), examples::state());
   state.erase(state.begin(), state.begin() + kHeaderSize);
   const Header good{.connection_id = examples::kConnection, .packet_number = 1};
@@ -378,7 +378,8 @@ std::string sealed_file(Suite suite) {
     const Key& split = welcome.split.responder_to_initiator;
     drop("in suite 1, with the key that Split() gave", "malformed", sealed(Suite::kNoise, split, good, state));
     drop("the key that Split() gave", "forged", sealed(suite, split, good, state));
-    // A reversed number in the nonce, as from a little-endian implementation, under a header with the correct one.
+    // The bytes of the number in the nonce are reversed, as in a little-endian implementation, but the header has the
+    // correct number.
     const auto clear = encode_header({.suite = suite, .connection_id = examples::kConnection, .packet_number = 1});
     Bytes turned(clear.begin(), clear.end());
     turned.resize(kHeaderSize + state.size() + crypto::kTagSize);

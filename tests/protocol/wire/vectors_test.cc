@@ -82,7 +82,8 @@ TEST(Vectors, HmacGivesTheAnswersOfRfc4231) {
   }
 }
 
-/// Returns the packet number of a Noise nonce (four zeros, then the number). Others are for libraries that accept any.
+/// Returns the packet number in a Noise nonce, which is four zeros and the number. Other nonces are for libraries that
+/// accept any nonce.
 std::optional<std::uint64_t> number_in(const Bytes& nonce, Suite suite) {
   if (std::any_of(nonce.begin(), nonce.begin() + 4, [](std::byte b) { return b != std::byte{}; })) return {};
   std::uint64_t number = 0;
@@ -166,7 +167,7 @@ TEST(Vectors, AreAllTested) {
   EXPECT_TRUE(names.empty());
 }
 
-/// Returns true if the codec accepts a body with all its values.
+/// Returns true if the codec accepts a body and keeps all its values.
 bool is_taken(const Json& vector) {
   const Bytes body = bytes(vector, "body");
   if (vector.at("message") == "Hello") return read_hello(body).has_value();
@@ -213,7 +214,7 @@ TEST(Vectors, AFrameAtItsBoundsIsWrittenAgainAsItWasRead) {
     const std::string field = text(vector, "field");
     const std::string value = text(vector, "value");
     if (vector.at("message") != "Datagram" || !vector.at("accepted").get<bool>()) continue;
-    // The writer has shorter forms of lists and of an infinite radius, and writes both numbers of a gripper.
+    // Our writer uses shorter forms of lists and of an infinite radius, and always writes both numbers of a gripper.
     if (field.starts_with("DeviceStates") || field.starts_with("DeviceState.gripper") || value.ends_with("entries") ||
         value == "inf")
       continue;

@@ -8,7 +8,7 @@
 
 #include "core/base/reason.h"
 
-// The specification for other languages must have the code's table of reasons.
+// The specification for other languages must contain the same table of reasons as the code.
 
 namespace tendon::wire_md_test {
 namespace {

@@ -10,8 +10,8 @@
 #include "tests/protocol/wire/golden.h"
 #include "tests/protocol/wire/vectors.h"
 
-// Rewrites protocol/vectors/ after an intended change of the wire format, as a diff. Run by protocol/generate, which
-// also runs protoc for the Python and TypeScript clients.
+// Rewrites protocol/vectors/ after an intended change of the wire format, so that the change is visible as a diff. It
+// is run by protocol/generate, which also runs protoc for the Python and TypeScript clients.
 
 namespace {
 

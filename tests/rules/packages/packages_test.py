@@ -19,7 +19,7 @@ HERE = pathlib.Path(__file__).parent
 def mirror(source, target, hidden):
     """Creates links in `target` to all files in `source` that are not in `hidden`.
 
-    If a folder contains a hidden file, the folder is created and its files are linked."""
+    A folder that contains a hidden file is created, and its other files are linked one by one."""
     target.mkdir(parents=True)
     for entry in os.scandir(source):
         below = [rest for name, _, rest in (path.partition("/") for path in hidden) if re.fullmatch(name, entry.name)]

@@ -14,7 +14,7 @@
 namespace tendon::rooms {
 namespace {
 
-/// A citation when the first folder is a room. A page (.md) always is one.
+/// This is a citation if the first folder is a room. A page (.md) is always a citation.
 const Names kCitedSources = {"*.h",  "*.cc",   "*.py",  "*.ts",    "*.mjs",  "*.proto",
                              "*.sh", "*.toml", "*.csv", "*.cmake", "*.html", "*.css"};
 
@@ -47,7 +47,7 @@ std::string prose_of(const File& file) {
       begin += line.size() + 1;
     }
   }
-  bool front = true;  // only spaces and marks before this character of its line
+  bool front = true;  // the line has only spaces and marks before this character
   for (char& c : prose) {
     if (c == '\n') {
       front = true;
@@ -96,7 +96,7 @@ void check_cited_files(const File& file, std::string_view prose, const Citable& 
       while (name.ends_with('.')) {  // the end of a sentence
         name.remove_suffix(1);
       }
-      // Part of a URL, a variable or a pattern.
+      // It is part of a URL, a variable or a pattern.
       const bool part = (from > 0 && contains(":~@$<>{}*\\", line.substr(from - 1, 1))) ||
                         (to < line.size() && contains("<>{}*$", line.substr(to, 1)));
       from = to;
@@ -111,7 +111,8 @@ void check_cited_files(const File& file, std::string_view prose, const Citable& 
   }
 }
 
-/// `core/PROOFS.md, "Output bound"` and `core/PROOFS.md, "Output bound" and "Late holds"`, also over a line end.
+/// Finds `core/PROOFS.md, "Output bound"` and `core/PROOFS.md, "Output bound" and "Late holds"`, also if they continue
+/// on the next line.
 void check_cited_sections(const File& file, std::string_view prose, const Citable& citable,
                           std::vector<Finding>& findings) {
   constexpr std::string_view kSpace = " \t\n";

@@ -17,7 +17,7 @@ struct Citable {
 
 Citable citable_in(const std::vector<File>& tree);
 
-/// Adds a finding for each file, and each section of core/PROOFS.md, that `file` cites and that does not exist.
+/// Adds a finding for each file, and for each section of core/PROOFS.md, that is cited by `file` but does not exist.
 void check_citations(const File& file, const Citable& citable, std::vector<Finding>& findings);
 
 }  // namespace tendon::rooms

@@ -43,8 +43,9 @@ const Names kAtTheRoot = {".ci",          ".dockerignore",  ".clang-format",    
                           "CHANGELOG.md", "CMakeLists.txt", "CMakePresets.json", "CONTRIBUTING.md", "LICENSE",
                           "README.md"};
 
-/// From every room: control the floating point unit, pass the newest value between threads, find misspelled words,
-/// format the errors of a command line, print without waiting for a reader, and declare the keys of a scene.
+/// Every room may use these headers: control the floating point unit, pass the newest value between threads, find
+/// misspelled words, format the errors of a command line, print without waiting for a reader, and declare the keys of a
+/// scene.
 const Names kForAllRooms = {"core/base/arithmetic.h",   "core/base/nearest_word.h",   "core/exchange/latest.h",
                             "clients/cpp/usage.h",      "server/machine/output.h",    "server/scene/reader.h",
                             "server/scene/reference.h", "server/scene/scene_error.h", "server/scene/values.h"};
@@ -59,7 +60,7 @@ struct Door {
 const std::vector<Door>& front_doors() {
   static const std::vector<Door> kDoors = {
       {"Asio", {"asio.hpp", "asio/"}, {"server/machine/udp_link.cc", "clients/cpp/udp_transport.cc"}},
-      // HTTP and WebSockets, only in processes without a haptic thread.
+      // HTTP and WebSockets may only be used by processes without a haptic thread.
       {"Boost.Beast and Boost.Asio",
        {"boost/"},
        {"clients/dashboard/server_socket.h", "clients/dashboard/web_server.cc",
@@ -74,7 +75,7 @@ const std::vector<Door>& front_doors() {
       {"Eigen's tree of boxes", {"unsupported/Eigen/BVH"}, {"clients/softbody/effects/self_collision.cc"}},
       {"libsodium", {"sodium.h", "sodium/"}, {"protocol/secrets/crypto.cc", "devices/falcon/firmware.cc"}},
       {"libusb", {"libusb.h", "libusb-1.0/"}, {"devices/usb/with_libusb.cc", "tests/devices/usb/far_usbfs.cc"}},
-      // The haptic thread writes no JSON.
+      // The haptic thread must not write JSON.
       {"nlohmann's JSON",
        {"nlohmann/"},
        {"server/commands/", "server/main.cc", "clients/cpp/discovery/list.cc", "clients/cpp/engine/self_test.cc",
@@ -115,13 +116,13 @@ const std::set<std::string_view> kNotForProtocol = {
     "condition_variable", "fcntl.h",   "filesystem",   "fstream", "future",  "iostream", "mutex", "netdb.h", "poll.h",
     "pthread.h",          "semaphore", "shared_mutex", "thread",  "unistd.h"};
 
-/// Headers of the operating system that are not in a folder. C headers have their C++ name (<cmath>).
+/// These headers of the operating system are not in a folder. C headers are included by their C++ names (<cmath>).
 const std::set<std::string_view> kSystemHeaders = {"dlfcn.h",  "elf.h",    "fcntl.h", "ifaddrs.h",
                                                    "malloc.h", "netdb.h",  "poll.h",  "pthread.h",
                                                    "sched.h",  "signal.h", "spawn.h", "unistd.h"};
 const Names kSystemFolders = {"arpa/", "linux/", "net/", "netinet/", "sys/"};
 
-/// The background thread may outlive the model that gave it work, or end earlier, so both share the data.
+/// The background thread may outlive the model that gave it work, or it may end earlier, so both share the data.
 const Names kSharedWithAThread = {"clients/softbody/near/near_model.cc", "clients/softbody/near/near_model.h",
                                   "server/machine/output.cc"};
 
@@ -130,14 +131,14 @@ const Names kSharedWithAThread = {"clients/softbody/near/near_model.cc", "client
 const Names kClockReaders = {
     "server/machine/clock.h", "server/machine/clock.cc", "server/machine/log.cc", "server/server.cc",
     "server/machine/udp_link.cc", "clients/cpp/machine.h", "clients/cpp/machine.cc",
-    // runs in another program's process, whose threads call it
+    // runs in the process of another program, whose threads call it
     "clients/bridge/chai3d/hd_phantom.cc", "clients/softbody/softbody_main.cc", "tests/clients/softbody/bench.cc",
     "tests/clients/softbody/bullet_block.cc", "tests/tools/bench/", "tests/e2e/", "tests/realtime/", "tests/soak/",
     "tests/devices/usb/", "tests/core/base/time_test.cc", "tests/tools/lab/experiments/meter.cc",
     "tests/tools/injector/proxy/real_time.cc", "tests/tools/conformance/udp_wire.cc",
     "tests/tools/conformance/worker_wire.cc", "*_main.cc"};
 
-/// "clients/cpp/" for "clients/cpp/run.cc".
+/// Returns "clients/cpp/" for "clients/cpp/run.cc".
 std::string_view client_folder(std::string_view path) {
   const auto end = path.find('/', path.find('/') + 1);
   return end == std::string_view::npos ? std::string_view() : path.substr(0, end + 1);
@@ -266,7 +267,7 @@ const std::vector<Forbidden>& forbidden_words() {
                      std::regex(R"(\bapp\.parse\s*\()"),
                      "usage::parse() parses command lines: CLI11 takes an empty text for 0",
                      [](std::string_view path) { return path != "clients/cpp/usage.cc"; }});
-    // Statements that print a text field of tendon.proto.
+    // These statements print a text field of tendon.proto.
     words.push_back({{"cout", "cerr"},
                      std::regex(R"(\bstd::(cout|cerr)\b(?!.*\bvisible\().*)"
                                 R"(((\b(hello|welcome|peer)\w*|[^.\w]client\w*)(\.|->)name\b)"

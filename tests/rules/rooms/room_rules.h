@@ -34,14 +34,15 @@ struct Finding {
 /// are in the order of `tree` and by line; those about the whole tree are last.
 std::vector<Finding> check(const std::vector<File>& tree);
 
-/// All files in the order of their paths, without those that git ignores (build folders, caches, packages). Throws
+/// Returns all files, ordered by path, without those that git ignores (build folders, caches, packages). Throws
 /// std::filesystem::filesystem_error if `root` cannot be read.
 std::vector<File> read_tree(const std::filesystem::path& root);
 
 /// Returns `path:line: rule`, which editors and terminals turn into a link.
 std::string to_string(const Finding& finding);
 
-/// They become spaces, so lines and columns stay the same. The file name in #include "…" is kept.
+/// Replaces comments and strings by spaces, so that lines and columns stay the same. The file name in #include "…" is
+/// kept.
 std::string without_comments_and_strings(std::string_view text);
 
 }  // namespace tendon::rooms

@@ -11,7 +11,7 @@ namespace {
 
 using std::chrono::milliseconds;
 
-/// Unencrypted, with 20 devices, "d-0" to "d-19": banks of 16 and 4.
+/// An unencrypted server with 20 devices, "d-0" to "d-19", in banks of 16 and 4.
 class TwoBanks : public SealedServer {
  protected:
   TwoBanks() {
@@ -19,7 +19,7 @@ class TwoBanks : public SealedServer {
     restart_with_many(20, 1);
   }
 
-  /// Returns a force for each state and sends the requests in `asks` once.
+  /// Returns a force for each state, and sends each request in `asks` once.
   struct Outcome {
     std::optional<Connection::Ended> refused{};
     std::optional<Welcome> welcome{};

@@ -13,7 +13,7 @@
 #include "tests/server/clients/place.h"
 #include "tests/support/wire.h"
 
-// Two servers with coupled devices and haptic loops in virtual time, and clients.
+// Two servers with coupled devices, their haptic loops, and clients, in virtual time.
 
 namespace tendon::couple_test {
 namespace {

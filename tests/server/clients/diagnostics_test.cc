@@ -16,7 +16,7 @@ std::uint64_t sum(const LatenessHistogram& lateness) {
   return std::accumulate(lateness.begin(), lateness.end(), std::uint64_t{0});
 }
 
-/// The observer requests all features. Both only send if they are passed to `run`.
+/// The observer requests all features. `a` and `b` only send if they are passed to `run`.
 class Diagnosed : public SealedServer {
  protected:
   Client a = controller(wall_, "192.0.2.1:4000");
@@ -157,7 +157,7 @@ TEST_F(SealedServer, AnEngineReceivesNotOneByteMoreWhereOthersDiagnose) {
   EXPECT_TRUE(to_engine(true) == before);
 }
 
-/// Ours does not request it as a controller.
+/// Our own client never requests this feature as a controller.
 TEST_F(SealedServer, AControllerIsNotGrantedTheFeatureAndIsToldNothingOfIt) {
   restart_without_keys();
   wanted_ = Vec3(3, 0, -4);
@@ -181,7 +181,7 @@ TEST_F(TwoDevices, AnObserverIsToldOfItsDeviceAndOfEachEngineThere) {
   Client left = controller(wall_, "192.0.2.1:4000", {.device = "left", .channel = "main"});
   Client right = controller(other_, "192.0.2.2:4000", {.device = "right", .channel = "tissue", .take_lease = true});
   Client waits = controller(wall_, "192.0.2.5:4000",
-                            {.device = "right", .channel = "tissue"});  // holds no lease, so it appears in no
+                            {.device = "right", .channel = "tissue"});  // holds no lease, so it is in no report
   Client watches_left = observer(screen_, "192.0.2.3:4000", {.device = "left", .diagnostics = true});
   Client watches_right = observer(screen_, "192.0.2.4:4000", {.device = "right", .diagnostics = true});
   measured_ = true;

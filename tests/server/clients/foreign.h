@@ -10,7 +10,7 @@
 
 namespace tendon {
 
-/// Unencrypted; says what ForceClient cannot.
+/// An unencrypted client that can send what ForceClient never sends.
 class Foreign {
  public:
   Foreign(Wire& wire, const std::string& address, const Address& server, const Hello& hello, LocalTime now)
@@ -31,7 +31,7 @@ class Foreign {
     }
     connection_.flush(now);
   }
-  /// Null if there is no session.
+  /// Returns null if there is no session.
   Session* session() { return connection_.session(); }
 
   End end;

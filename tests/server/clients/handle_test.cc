@@ -13,7 +13,7 @@ namespace {
 
 using std::chrono::milliseconds;
 
-/// Four buttons and axes. The observer receives one of 20 states.
+/// A handle with four buttons and axes. The observer receives one of 20 states.
 class Handle : public SealedServer {
  protected:
   Handle() {
@@ -27,7 +27,8 @@ class Handle : public SealedServer {
                     [&seen](const DeviceState& state, const LinkStats&) { seen.push_back(state.buttons); });
   }
 
-  /// Runs a foreign observer with `feature` (none if empty) and calls `see` for each state. Returns their number.
+  /// Runs a foreign observer that requests `feature` (none if it is empty), and calls `see` for each state. Returns the
+  /// number of states.
   template <class See>
   std::size_t for_each_state_seen(std::string_view feature, Duration length, const See& see) {
     std::vector<std::string> features;
@@ -169,7 +170,7 @@ TEST_F(Handle, ColumnsAreSentOnlyToThoseThatNamedTheFeature) {
   }
 }
 
-/// For other clients, the states have the same size as before.
+/// For clients that did not request the feature, the states have the same size as before.
 TEST_F(Handle, JointsAreToldToThoseThatNamedTheFeature) {
   for (const bool asks : {false, true}) {
     handle_ = HandleDescription{.buttons = {"right"}, .joints = {"upper", "lower"}};

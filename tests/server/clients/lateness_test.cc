@@ -11,7 +11,7 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-/// 100 Hz, a round trip of 40 ms and a force validity of 30 ms.
+/// The engine answers at 100 Hz. The round trip is 40 ms, and a force is valid for 30 ms.
 class Engine {
  public:
   explicit Engine(bool same_machine = false) { lateness.begin(now_, same_machine); }
@@ -100,7 +100,7 @@ TEST(Lateness, OnlyTheSilenceOfALocalEngineIsItsFault) {
   }
 }
 
-/// Time stamps `apart`, then a force with a long round trip.
+/// There is a gap of `apart` between two time stamps, and then a force with a long round trip.
 Lateness::Report after_silence(Duration apart, std::uint64_t lost) {
   Engine engine;
   engine.answer_times(200);
@@ -122,7 +122,7 @@ TEST(Lateness, ASilenceWithLossesOrTooShortAStandstillIsOfTheNetwork) {
   EXPECT_EQ(after_silence(milliseconds(150), 0).late_network, 1U) << "explains little of the delay";
 }
 
-/// The forces are in time, and there is a state in each millisecond. Then our process is stopped for `pause`.
+/// The forces are in time, and there is a state in each millisecond. Then our own process is stopped for `pause`.
 Engine stopped(Duration pause, bool same_machine) {
   Engine engine(same_machine);
   for (int i = 0; i < 200; ++i) {

@@ -15,7 +15,7 @@ using std::chrono::seconds;
 
 constexpr Vibration kPulse{.amplitude = 0.5, .frequency = 200, .duration = milliseconds(40)};
 
-/// The device "right" has two channels and three outputs: a lamp, a vibrator and another lamp.
+/// The device "right" has two channels and three outputs, which are a lamp, a vibrator and another lamp.
 class OutputsOfADevice : public TwoDevices {
  protected:
   OutputsOfADevice() {

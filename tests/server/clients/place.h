@@ -24,7 +24,7 @@ namespace tendon {
 
 /// Runs a server with one device in virtual time.
 struct Place {
-  /// `key`: of the connection between both servers.
+  /// `key` protects the connection between both servers.
   Place(Wire& wire, const Scene& the_scene, std::uint64_t epoch, LocalTime now, const std::optional<Key>& key = {})
       : scene(the_scene), end(wire, scene.network.listen), device(scene.simulated()) {
     Assembly::Config config{.now = now,
@@ -59,7 +59,7 @@ struct Place {
   }
 
   Mailboxes& mail() { return server->devices().front().mail; }
-  /// Coupling record of a channel in the newest step; channel 0 if the device has one coupling.
+  /// The coupling record of a channel in the newest step. If the device has only one coupling, it is in channel 0.
   const PortRecord& newest(std::uint32_t channel = 0) { return ports_[channel]; }
   PortPhase phase(std::uint32_t channel = 0) { return newest(channel).sent.phase; }
   bool said(const std::string& words) const {
@@ -105,7 +105,7 @@ class Viewer : public Foreign {
   std::optional<Session::RequestAnswered> answer;
 };
 
-/// Two or three, with coupled devices and haptic loops in virtual time, and clients.
+/// Runs two or three servers with coupled devices, their haptic loops and clients, in virtual time.
 class Places : public ::testing::Test {
  protected:
   std::unique_ptr<Place> place(const Scene& scene, std::uint64_t epoch, const std::optional<Key>& key = {}) {

@@ -37,8 +37,8 @@ TEST_F(SealedServer, TellsControllersAloneOnceASecondHowTheirForcesFare) {
   EXPECT_FALSE(b->report().has_value());
 }
 
-/// 20 ms in each direction. One end is preempted for 36 ms in the middle of a turn; a datagram that arrives meanwhile
-/// is handled with the time at the beginning of the turn.
+/// The delay is 20 ms in each direction. One end is preempted for 36 ms in the middle of a turn. A datagram that
+/// arrives meanwhile is handled with the time at the beginning of the turn.
 class InterruptedTurn : public SealedServer, public testing::WithParamInterface<bool> {};
 
 TEST_P(InterruptedTurn, MakesNoWayLookShort) {
@@ -91,7 +91,7 @@ TEST_F(SealedServer, SaysByNumbersAndInWordsThatTheNetworkWasLate) {
 TEST_F(SealedServer, APauseOfItsOwnIsBlamedOnNobodyElse) {
   Client a = controller(wall_, "192.0.2.1:4000");
   run(milliseconds(1500), {&a});
-  for (int ms = 0; ms < 200; ++ms) {  // SIGSTOP: datagrams of the engine wait in the socket
+  for (int ms = 0; ms < 200; ++ms) {  // SIGSTOP: datagrams for the engine wait in its socket
     now_ += milliseconds(1);
     a->turn(now_);
   }

@@ -14,8 +14,8 @@
 #include "tests/server/clients/foreign.h"
 #include "tests/server/servers.h"
 
-// Network loops with real clients and forgers, in virtual time on a perfect network. No haptic loops: the test sets the
-// states and reads the forces from the mailboxes.
+// Network loops with real clients and forgers, in virtual time on a perfect network. There are no haptic loops: the
+// test writes the states into the mailboxes and reads the forces from them.
 
 namespace tendon {
 
@@ -86,7 +86,7 @@ class SealedServer : public Servers {
     return join(key, address, config, std::move(watch));
   }
 
-  /// 1 ms and one device step at a time. `on_the_way` may change or drop datagrams.
+  /// Advances by 1 ms and one device step at a time. `on_the_way` may change or drop datagrams.
   template <class OnTheWay>
   void run(Duration length, const std::vector<Client*>& clients, const OnTheWay& on_the_way) {
     for (const LocalTime end = now_ + length; now_ < end; now_ += std::chrono::milliseconds(1)) {
@@ -106,7 +106,7 @@ class SealedServer : public Servers {
   void run(Duration length, const std::vector<Client*>& clients) {
     run(length, clients, [](Datagram&) { return true; });
   }
-  /// The x position of device i is i.
+  /// Device i is at the x position i.
   void put_states() {
     tick_ += tick_step_;
     ++health_.steps;
@@ -127,7 +127,8 @@ class SealedServer : public Servers {
   void turn() {
     for (std::size_t i = 0; i < shards_; ++i) assembly_->turn_network(i, now_);
   }
-  /// Like UdpLink::several: data to the shard that owns the connection, other datagrams to the first.
+  /// Distributes datagrams like UdpLink::several: data to the shard that owns the connection, and other datagrams to
+  /// the first shard.
   void deliver(const Address& from, const Bytes& bytes) {
     const auto header = decode_header(bytes);
     const bool of_session = header && header->type == DatagramType::kData;
@@ -144,7 +145,7 @@ class SealedServer : public Servers {
       });
     }
   }
-  /// Answers each state with a valid force changed by `spoil`. Returns its newest report.
+  /// Answers each state with a valid force that is changed by `spoil`. Returns the newest report on it.
   template <class Spoil>
   std::optional<LinkReport> run_foreign(Duration length, const Spoil& spoil) {
     Foreign client(wire_, "127.0.0.1:4000", server_, foreign_, now_);

@@ -15,7 +15,8 @@ using std::chrono::milliseconds;
 
 constexpr std::uint32_t kDevices = 40;
 
-/// Sealed, with two shards and 40 devices, "d-0" to "d-39": one bank in the first shard, two in the second.
+/// An encrypted server with two shards and 40 devices, "d-0" to "d-39". One bank is in the first shard, and two are in
+/// the second.
 class Shards : public SealedServer {
  protected:
   Shards() { restart_with_many(kDevices, 2); }

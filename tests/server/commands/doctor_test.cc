@@ -108,7 +108,7 @@ TEST(Doctor, OfWhatTheKernelDoesNotSayItClaimsNothing) {
 }
 
 TEST(Doctor, MeasuresLatenessAgainstTheScheduleNotTheLastWakeUp) {
-  // Wake-up n is n µs late, from 0 to 99. The last one also has a pause.
+  // Wake-up n is n µs late, from 0 to 99. The last one also includes a pause.
   LocalTime now{5s};
   int sleeps = 0;
   LocalTime first_due{};

@@ -24,7 +24,7 @@ std::function<Duration()> ticking() {
   return [now = Duration{}]() mutable { return now += 1us; };
 }
 
-/// Device effects, tables, and one key.
+/// Returns the effects of a device, the tables, and one key.
 std::set<std::string> optional_parts() {
   std::set<std::string> keys = {
       "device.hand", "device.environment", "device.rotation", "device.gripper",     "loop.max_speed_m_per_s", "safety",
@@ -35,7 +35,7 @@ std::set<std::string> optional_parts() {
     if (line.starts_with('[')) table = line.substr(1, line.find(']') - 1);
     const bool part = line.starts_with('[') && (table.starts_with("safety.") || table.starts_with("limiter.") ||
                                                 table.starts_with("force.") || table.starts_with("device.effects."));
-    // The bounds of a handle belong to its motors.
+    // The bounds of a handle belong to its motors, so they are not optional.
     const bool bounds = table == "limiter.rotation" || table == "limiter.gripper";
     if (part && !bounds) keys.insert(table);
     const bool key = line.starts_with("  ") && line.find_first_of(" ", 2) == std::string::npos;
@@ -104,8 +104,8 @@ TEST(Explain, SaysHowACouplingIsFeltByEachMethod) {
 }
 
 TEST(Explain, ACostIsTheDifferenceToTheSceneWithoutThePart) {
-  // One tick in each round of 200 steps, but none in the first trial without a part, the one without viscous friction.
-  // So the cost of this part is the cost of a whole step.
+  // The clock advances by one tick in each round of 200 steps, except in the first trial without a part, which is the
+  // one without viscous friction. So this part seems to cost as much as a whole step.
   const Scene scene = shipped("demo_parts.toml");
   std::size_t looks = 0;
   const std::size_t trials =

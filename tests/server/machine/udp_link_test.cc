@@ -21,7 +21,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-/// A test only waits this long if it fails.
+/// A test only waits for this long if it fails.
 constexpr Duration kForever = 10s;
 
 constexpr Address kAnyPort4 = {.ip = {0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0xff, 0xff, 127, 0, 0, 1}, .port = 0};
@@ -149,7 +149,7 @@ TEST(UdpLink, OnAllAddressesOfIpv6ItHearsBothFamilies) {
   EXPECT_EQ(to_string(answered_from(four, parse_address("127.0.0.2" + port), link, link)), "127.0.0.2" + port);
 }
 
-// Another link than the first, which receives each Hello, may answer.
+// The answer may come from another link than the first one, which receives each Hello.
 TEST(UdpLink, SeveralOnAllAddressesKnowWhereAPeerHasAskedOneOfThem) {
   for (const char* all : {"0.0.0.0:0", "[::]:0"}) {
     const auto links = UdpLink::several(parse_address(all), Reach::kAnywhere, 2);
@@ -185,7 +185,7 @@ TEST_P(UdpLinkTest, SeveralOnOneAddressEachGetTheDataOfTheirConnections) {
   const auto links = UdpLink::several(GetParam(), Reach::kThisMachine, 4);
   ASSERT_EQ(links.size(), 4U);
   for (const auto& link : links) EXPECT_EQ(link->local_address(), links[0]->local_address());
-  // The kernel would distribute datagrams by sender.
+  // Otherwise the kernel would distribute datagrams by sender.
   std::vector<std::unique_ptr<UdpLink>> clients;
   for (int i = 0; i < 8; ++i) clients.push_back(std::make_unique<UdpLink>(GetParam()));
   for (const std::uint32_t id : {4U, 5U, 6U, 7U, 0x12345602U, 0xFFFFFFFFU}) {

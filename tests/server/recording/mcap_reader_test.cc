@@ -17,7 +17,7 @@
 namespace tendon::mcap_reader_test {
 namespace {
 
-/// Two chunks of three messages, "0" to "5", with their number as the time in ns.
+/// The file has two chunks of three messages, "0" to "5". The number of a message is its time in ns.
 std::string sample_file() {
   MemorySink sink;
   McapWriter writer("lib", sink);
@@ -85,8 +85,8 @@ TEST(McapReader, GivesTheWholeChunksOfAFileCutAnywhere) {
   EXPECT_EQ(seen, 6U);
 }
 
-/// In `sample_file`, see McapWriter.WritesTheBytesOfTheSpecification. A chunk has three messages of 32 bytes, and its
-/// index three entries of 16 bytes.
+/// In `sample_file` (see McapWriter.WritesTheBytesOfTheSpecification), a chunk has three messages of 32 bytes, and its
+/// index has three entries of 16 bytes.
 constexpr std::size_t kFirstChunk = 8 + 20 + 26 + 28;
 constexpr std::size_t kChunk = 9 + 40 + 3 * 32;
 constexpr std::size_t kSecondChunk = kFirstChunk + kChunk + 9 + 6 + 3 * 16;
@@ -96,7 +96,7 @@ std::string outside_of(std::size_t from, std::size_t to) {
   return std::string(whole(kFirstChunk) ? "012" : "") + (whole(kSecondChunk) ? "345" : "");
 }
 
-/// The messages in `least`, and only complete chunks.
+/// It must contain the messages in `least`, and only complete chunks.
 void expect_at_least(const Outcome& outcome, const std::string& least) {
   EXPECT_EQ(outcome.error, "");
   for (const std::string& chunk : {std::string("012"), std::string("345")}) {
@@ -197,7 +197,7 @@ TEST(McapReader, NamesFileBytesAndTimesOfDamage) {
                                    ": the CRC of a chunk does not match; 145 bytes are skipped, after 0.000 s");
 }
 
-// A recorded datagram may contain a chunk, which must not be used if the length of the outer one is damaged.
+// A recorded datagram may itself contain a chunk. It must not be used if the length of the outer chunk is damaged.
 TEST(McapReader, ReadsNoChunkWithinAChunkWhoseLengthIsDamaged) {
   const std::string whole = sample_file();
   MemorySink sink;

@@ -41,7 +41,7 @@ class FailingSink final : public ByteSink {
   int calls = 0;
 };
 
-// Hand-written from https://mcap.dev/spec, with CRCs of Python's zlib.crc32.
+// This was written by hand from https://mcap.dev/spec. The CRCs were computed by Python's zlib.crc32.
 TEST(McapWriter, WritesTheBytesOfTheSpecification) {
   MemorySink sink;
   McapWriter writer("lib", sink);

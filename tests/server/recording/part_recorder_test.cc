@@ -163,7 +163,7 @@ TEST_F(PartRecorderTest, AFileThatIsDeletedAsItClosesIsMissing) {
   EXPECT_FALSE(recorder.status().complete());
 }
 
-/// Ten steps per second, with a fault from `first_fault` to `last_fault` (s).
+/// There are ten steps per second, with a fault from `first_fault` to `last_fault` (s).
 void record_seconds(PartRecorder& recorder, int from, int until, int first_fault = -1, int last_fault = -1) {
   for (int tick = 10 * from; tick < 10 * until; ++tick) {
     StepRecord step = sample_step(static_cast<std::uint64_t>(100 * tick));
@@ -354,7 +354,7 @@ TEST_F(PartRecorderTest, HoldsNoMoreMemoryAfterADayThanAfterTwoHours) {
     if (quarter == std::int64_t{8} * 3600 - 10) after_two_hours = held();
   }
   EXPECT_GE(recorder.status().parts, 23U);
-  // At the end of an hour. The index of a chunk has about 150 bytes.
+  // This is at the end of an hour. The index of a chunk has about 150 bytes.
   EXPECT_NEAR(held(), after_two_hours, 100e3);
 }
 

@@ -24,7 +24,7 @@ using testing::sample_config;
 using testing::sample_datagram;
 using testing::sample_step;
 
-/// A disk of `capacity` bytes that, like FileSink, writes only complete pieces.
+/// A disk of `capacity` bytes. Like FileSink, it only writes complete pieces.
 class SmallDisk final : public ByteSink {
  public:
   explicit SmallDisk(std::size_t capacity) : capacity_(capacity) {}
@@ -150,7 +150,7 @@ TEST(Recorder, LeavesAReadableFileAndAnHonestCountOnADiskOfAnySize) {
     recorder.close();
   }
   ASSERT_GE(endless.borders.size(), 8U);
-  // On both sides of the end of each piece, where alone the result can change.
+  // The capacities are on both sides of the end of each piece, because the result can only change there.
   std::vector<std::size_t> capacities = {0};
   for (const std::size_t border : endless.borders) {
     capacities.push_back(border - 1);

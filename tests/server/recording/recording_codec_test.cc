@@ -55,7 +55,7 @@ TEST(RecordingCodec, TheSchemaStandsAlone) {
     EXPECT_NE(pool.FindMessageTypeByName(std::string(kind.schema)), nullptr) << kind.schema;
 }
 
-// PlotJuggler would take it for the time in seconds and treat it as a double.
+// PlotJuggler would use this field as the time in seconds and convert it to a double.
 TEST(RecordingCodec, NoFieldIsCalledTimestamp) {
   const auto* file = pb::Step::descriptor()->file();
   for (int m = 0; m < file->message_type_count(); ++m)

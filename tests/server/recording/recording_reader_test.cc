@@ -294,7 +294,7 @@ Chunked chunked() {
   return file;
 }
 
-// A flipped bit, a sector of zeros or of random bytes, or missing bytes.
+// The damage is a flipped bit, a sector of zeros or of random bytes, or missing bytes.
 RC_GTEST_PROP(RecordingReader, DamageLosesOnlyTheStepsOfTheChunksThatItMeets, ()) {
   static const Chunked file = chunked();
   RC_PRE(file.chunks.size() >= 4U);

@@ -33,7 +33,8 @@ inline Recorder::Config sample_config() {
   return config;
 }
 
-/// Step `tick` of a hand oscillating at 1 Hz, one per millisecond. Every field differs from its default.
+/// Returns step `tick` of a hand that oscillates at 1 Hz, with one step per millisecond. No field has its default
+/// value.
 inline StepRecord sample_step(std::uint64_t tick) {
   const auto t = static_cast<double>(tick) * 1e-3;
   const LocalTime due = ms(static_cast<std::int64_t>(tick));
@@ -102,7 +103,7 @@ inline DatagramRecord sample_datagram(LocalTime at, std::uint32_t size, bool in)
   return datagram;
 }
 
-/// Records `steps` steps, with one datagram in each direction at every tenth.
+/// Records `steps` steps. Every tenth step has one datagram in each direction.
 inline void record_samples(Recorder& recorder, std::uint64_t steps) {
   for (std::uint64_t tick = 0; tick < steps; ++tick) {
     recorder.record(sample_step(tick));
@@ -160,7 +161,7 @@ struct Contents {
   std::vector<LossRecord> losses;
   bool truncated = false;
   std::vector<std::string> damage;
-  std::string error;  ///< exception of the reader
+  std::string error;  ///< the exception that the reader throws
 
   std::size_t records() const { return scenes.size() + steps.size() + datagrams.size() + losses.size(); }
 };

@@ -13,7 +13,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-/// `more` continues the table [teleoperation], and `what` the table [teleoperation.coupling].
+/// `more` is appended to the table [teleoperation], and `what` to the table [teleoperation.coupling].
 std::string coupled(const std::string& role, const std::string& what, const std::string& more = {}) {
   return "[teleoperation]\nrole = \"" + role + "\"\n" + more +
          "[teleoperation.coupling]\nstiffness_n_per_m = 400\ndamping_n_s_per_m = 4\n" + what;
@@ -225,7 +225,7 @@ TEST(SceneTeleoperation, SaysWhatCannotBeTogether) {
             "s.toml:10: teleoperation.clutch: expected no clutch for a follower: only the leader has a clutch");
 }
 
-/// Ten lines after kMinimal, so the rest begins at line 14.
+/// This adds ten lines to kMinimal, so the rest begins at line 14.
 const std::string kTwoLeaders =
     "[[channel]]\nname = \"trainer\"\n[[channel]]\nname = \"trainee\"\n" + coupled("follower", kTank);
 

@@ -11,11 +11,11 @@
 
 namespace tendon {
 
-/// Three lines, so the rest begins at line 4.
+/// This has three lines, so the rest begins at line 4.
 extern const std::string_view kMinimal;
-/// Four lines, so the rest begins at line 5.
+/// This has four lines, so the rest begins at line 5.
 extern const std::string_view kWithoutProfile;
-/// Nine lines. The motion of the hand begins in the last one.
+/// This has nine lines. The table with the motion of the hand begins in the last one.
 extern const std::string_view kHand;
 
 /// Reads `text` as the file s.toml.
@@ -24,7 +24,7 @@ Scene minimal_and(const std::string& more);
 /// Reads deploy/scenes/`file`.
 Scene shipped(const std::string& file, const std::vector<std::string>& settings = {});
 
-/// A setting "TABLE.KEY=VALUE" of a scene, and the value that it must have in SI units (1 for true).
+/// A setting "TABLE.KEY=VALUE" of a scene, and the value that the scene must then have in SI units (1 for true).
 using S = const Scene&;
 struct Setting {
   const char* text;
@@ -33,7 +33,7 @@ struct Setting {
 };
 void expect_made(const std::string& text, const std::vector<Setting>& settings);
 
-/// Returns the error message, or "no error".
+/// Returns the error message, or "no error" if there is none.
 std::string error_of(const std::string& text, const std::filesystem::path& directory = {});
 std::string error_of_minimal_and(const std::string& more);
 

@@ -24,7 +24,7 @@ ScriptedMotion::Recorded load(const std::string& text, const RecordedMotionFile&
   return load_recorded_motion(csv, file);
 }
 
-/// hand.csv with a header and its positions in the column x.
+/// A file hand.csv with a header and its positions in the column x.
 std::string complaint(const std::string& text) {
   return thrown_by<std::runtime_error>([&] { load(text, {.path = "hand.csv", .position = "x"}); });
 }
@@ -71,7 +71,7 @@ TEST(RecordedMotion, RefusesAScaleThatWouldMakeThePositionVanish) {
 }
 
 TEST(RecordedMotion, AHumanHandOnAFoamDrivesTheDevice) {
-  // The recording cannot be distributed: 4.4 s of an operator at 2 kHz, lever arm 0.075 m.
+  // The recording cannot be distributed. It contains 4.4 s of an operator at 2 kHz with a lever arm of 0.075 m.
   const char* data = std::getenv("TENDON_DATA");  // NOLINT(concurrency-mt-unsafe): one thread
   if (data == nullptr) GTEST_SKIP() << "TENDON_DATA is not set: the recorded human motion is not there";
 

@@ -9,8 +9,8 @@
 
 namespace tendon::bench {
 
-/// The baseline of a fleet. The same number of datagrams with the same sizes, but without content, is sent in both
-/// directions between a socket and one socket for each session in another process.
+/// The baseline of a fleet. It sends the same number of datagrams with the same sizes but without content, in both
+/// directions, between one socket and another process that has one socket for each session.
 struct BareTraffic {
   std::size_t sessions = 0;
   Duration period = std::chrono::milliseconds(1);

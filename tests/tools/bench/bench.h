@@ -50,7 +50,7 @@ struct Section {
   void (*measure)(Run& run);
 };
 
-// In the order of the table. Each function may fork, and starts and returns with a single thread.
+// The sections in the order of the table. Each function may fork. It starts and returns with a single thread.
 void measure_steps(Run& run);       ///< steps.cc
 void measure_datagrams(Run& run);   ///< datagrams.cc
 void measure_round_trip(Run& run);  ///< round_trip.cc
@@ -62,10 +62,11 @@ void measure_sessions(Run& run);    ///< sessions.cc
 void measure_512(Run& run);         ///< sessions.cc
 const std::vector<Section>& sections();
 
-/// Call in a child right after fork(): the kernel kills it when its parent dies.
+/// Call this in a child right after fork(). The kernel then kills the child when its parent dies.
 void end_with_parent();
 
-/// Sets the calling thread's real-time priority and removes its timer slack. 0: does nothing.
+/// Sets the real-time priority of the calling thread and removes its timer slack. If the priority is 0, it does
+/// nothing.
 class AtPriority {
  public:
   /// Throws std::system_error if the kernel refuses.

@@ -8,8 +8,8 @@
 
 namespace tendon::bench {
 
-/// Plots cost against number of devices, from the rows with more than one. Writes `stem`.svg and `stem`.png and returns
-/// their names. Throws std::runtime_error if there are no such rows or gnuplot is missing.
+/// Plots the cost against the number of devices, from the rows with more than one device. Writes `stem`.svg and
+/// `stem`.png and returns their names. Throws std::runtime_error if there are no such rows or if gnuplot is missing.
 std::vector<std::filesystem::path> draw_devices(const std::filesystem::path& stem, const Circumstances& circumstances,
                                                 const std::vector<Row>& rows);
 

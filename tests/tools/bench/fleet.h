@@ -48,7 +48,7 @@ struct FleetResult {
   injector::DurationHistogram state_age;  ///< receive time in the client's kernel − sample time
   std::uint64_t states_owed = 0;
   std::uint64_t states_received = 0;
-  /// Steps whose force answers the motion of the previous step: it is less than 1.5 periods old.
+  /// The number of steps whose force answers the motion of the previous step, which is less than 1.5 periods old.
   std::uint64_t answered_in_time = 0;
   std::uint64_t steps_owed = 0;
   std::uint64_t out_datagrams = 0;  ///< server → clients
@@ -64,7 +64,7 @@ struct FleetResult {
 };
 
 /// Throws std::runtime_error if the system refuses sockets, processes or memory, or if there is no `tendond` next to
-/// this program. Forks: call it while there is one thread.
+/// this program. It forks, so it must be called while there is only one thread.
 FleetResult run_fleet(const Fleet& fleet);
 
 }  // namespace tendon::bench

@@ -26,7 +26,7 @@ inline double quantile(std::vector<double> values, double q) {
   return *nth;
 }
 
-/// Times of two calls that alternate, so that other load affects both equally.
+/// Measures two calls that alternate, so that other load affects both equally.
 struct Turns {
   std::size_t n = 0;          ///< calls of each
   std::vector<double> times;  ///< the time per call in ns for each block

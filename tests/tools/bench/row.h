@@ -50,13 +50,13 @@ struct Circumstances {
   std::string command;
 };
 
-/// Describes this machine and build; load, times and options are left empty.
+/// Describes this machine and this build. Load, times and options are left empty.
 Circumstances look_around();
 double load();
 
 inline constexpr std::string_view kPageBegins = "# What things cost";
 
-/// Heading and row of the table for a terminal; a note gets its own line.
+/// Returns the heading and the row of the table for a terminal. A note gets its own line.
 std::string heading();
 std::string to_text(const Row& row);
 std::string to_text(const Circumstances& circumstances);

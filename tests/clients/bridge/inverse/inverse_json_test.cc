@@ -18,7 +18,7 @@ namespace {
 
 using nlohmann::json;
 
-/// Signed permutations, each positive sign both written and omitted.
+/// All signed permutations. Each positive sign is tested both written and omitted.
 std::vector<std::string> every_permutation() {
   std::vector<std::string> all;
   for (const std::string letters : {"XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX"}) {
@@ -53,7 +53,7 @@ TEST(InverseBasis, EveryPermutationTurnsAllThereAndBack) {
     EXPECT_EQ(view.base_position(view.position(base)), base) << permutation;
     EXPECT_EQ(view.base_force(view.force(base)), base) << permutation;
     EXPECT_EQ(view.base_torque(view.torque(base)), base) << permutation;
-    // A point of the rotated handle has one position in the base frame.
+    // A point that is fixed to the rotated handle has only one position in the base frame.
     const Mat3 seen = view.orientation(quaternion_of(turned));
     EXPECT_NEAR(seen.determinant(), 1, 1e-12) << permutation;
     const Vec3 point = frame.position(Vec3(1, 2, 3));  // in the handle frame, whose axes are the operator's

@@ -34,7 +34,7 @@ test("a page of this machine pushes the hand, one from elsewhere may not", async
   await near.locator("#said", { hasText: "pushed up" }).waitFor();
   assert.ok(bridge.lines.some((line) => line.includes("client 1 controls the force")));
 
-  // The same page under the name of another host.
+  // This is the same page under the name of a different host.
   const url = "http://evil.example/";
   const before = (page) => page.route(url, (route) => route.fulfill({ contentType: "text/html", body }));
   const far = await visit(t, url, { before });

@@ -53,7 +53,7 @@ if (process.argv[2] === "echo") {
   run.after(() => child.kill());
   const echo = await open(`ws://127.0.0.1:${await new Promise((resolve) => child.once("message", resolve))}`);
 
-  // Request to reply, alternating with the echo at 1 kHz.
+  // The time from a request to the reply. Requests alternate with those to the echo, at 1 kHz.
   const ours = [];
   const floor = [];
   const time = async (one, text, into) => {
@@ -70,7 +70,8 @@ if (process.argv[2] === "echo") {
   console.log(`request to reply     ${us(ours.slice(100))}`);
   console.log(`  a plain echo       ${us(floor.slice(100))}`);
 
-  // From a force request to the state after the step that applies it. The limiter does not change forces this small.
+  // The time from a force request to the first state in which the force is reported as applied. The limiter does not
+  // change forces this small.
   const felt = [];
   for (let i = 0; i < 500; ++i) {
     const wanted = 0.1 + 0.01 * (i % 10) + (i % 2) * 0.05;

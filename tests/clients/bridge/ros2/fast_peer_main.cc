@@ -105,7 +105,8 @@ class Reader {
   virtual void write(ordered_json& line, bool last) = 0;
 };
 
-/// The events awaited on `wrench`: the toggled force along y, and zero force after the last command.
+/// The events on `wrench` that the peer waits for: the toggled force along y, and a force of zero after the last
+/// command.
 struct Awaited {
   std::mutex mutex;
   double value = 0;

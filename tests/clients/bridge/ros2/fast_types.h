@@ -14,7 +14,8 @@
 
 namespace tendon::fast {
 
-// From the definitions in the ROS packages, independently of clients/bridge/ros2. `each` visits fields in wire order.
+// These types were written from the definitions in the ROS packages, independently of clients/bridge/ros2. `each`
+// visits the fields in the order of the wire format.
 
 struct Header {
   std::int32_t sec = 0;

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The client's side of VRPN, written from clients/bridge/vrpn/VRPN.md alone. As a program it is a program of old:
+"""The client side of VRPN, written from clients/bridge/vrpn/VRPN.md alone. If it is run as a program, it behaves like
+an old VRPN program:
 
     vrpn_client.py ADDRESS wall|plane|press|watch [--stiffness-n-per-m 1000] [--rate-hz 1000] [--tcp] [--name Phantom0]
 """
@@ -79,7 +80,7 @@ def host_and_port(address: str) -> tuple[str, int]:
 
 
 class Client:
-    """A VRPN client. With `by_hello` the server connects to the client."""
+    """A VRPN client. If `by_hello` is true, the server connects to the client."""
 
     TYPES = ("vrpn_ForceDevice Force_Field", "vrpn_ForceDevice Plane")
 

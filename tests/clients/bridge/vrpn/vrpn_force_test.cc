@@ -55,7 +55,7 @@ TEST(VrpnPlane, PushesOutAlongItsNormalOnlyAndAnyLengthOfItIsTheSame) {
       const Vec3 normal = sign * Vec3::Unit(axis);
       for (const double length : {1.0, 0.1, 7.0}) {
         Drawing drawing;
-        // The hand is outside if n·x + d > 0. This one is 10 mm outside along the normal.
+        // The hand is outside if n·x + d > 0. This hand is 10 mm outside along the normal.
         ASSERT_TRUE(drawing.draw(Plane{.normal = length * normal, .offset = -0.01 * length, .spring = 0.5}));
         const Touch touch = felt(drawing, 0.008 * normal + Vec3(0.1, 0.2, 0.3) - 0.1 * (axis == 0) * Vec3::UnitX() -
                                               0.2 * (axis == 1) * Vec3::UnitY() - 0.3 * (axis == 2) * Vec3::UnitZ());

@@ -214,7 +214,7 @@ TEST_F(VrpnPeer, ANumberMeansWhatItWasDescribedAsLast) {
   comes(Program::all_types());
   comes(Program::draw(ForceField{.force = Vec3(1, 0, 0), .radius = 1}));
   EXPECT_FALSE(peer_.drawing(1).empty());
-  // All type numbers move by one, so the former plane is now a field. The sender changes as well.
+  // All type numbers are shifted by one, so the former plane is now a field. The sender number changes as well.
   comes(Program::all_types(Program::kFirstType + 1));
   comes(Program::description(Program::kSender, kSenderDescription, "Phantom0"));
   comes(Program::message(Program::kSender, Program::kFirstType + static_cast<std::int32_t>(Type::kPlane),

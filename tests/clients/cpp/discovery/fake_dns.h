@@ -23,7 +23,7 @@ inline constexpr std::uint16_t kSrv = 33;
 std::string two(unsigned value);
 /// Labels are separated by '/': "falcon at 3/_tendon/_udp/example/org".
 std::string name(std::string_view labels);
-/// Belongs to the name in the question.
+/// This record is for the name in the question.
 std::string record(std::uint16_t type, const std::string& data);
 std::string srv(unsigned priority, unsigned weight, unsigned port, const std::string& target);
 

@@ -15,7 +15,7 @@
 namespace tendon::conversation_test {
 namespace {
 
-/// No round numbers, so rounding would be visible.
+/// These are not round numbers, so that rounding would be visible.
 DeviceState odd_state(std::uint64_t tick) {
   const double t = 0.1 * static_cast<double>(tick);
   DeviceState hand;

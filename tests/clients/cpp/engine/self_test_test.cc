@@ -92,7 +92,7 @@ TEST(SelfTest, OfAnElasticBodyWantsBackWhatAWayHasCost) {
   const auto& press = damped.findings.at(1);
   EXPECT_EQ(press.what, "returns the stored energy: press and release, 0.025 m/s");
   EXPECT_GT(press.value, press.bound);
-  // Snaps to another equilibrium at the end of the slide. Only the check on the sideways motion fails.
+  // This engine jumps to another equilibrium at the end of the slide. Only the check of the lateral motion fails.
   const SelfTest snaps = self_test(
       [snapped = false](const DeviceState& hand) mutable -> Touch {
         const double depth = std::max(hand.position.x(), 0.0);
@@ -106,7 +106,7 @@ TEST(SelfTest, OfAnElasticBodyWantsBackWhatAWayHasCost) {
 }
 
 TEST(SelfTest, AllowsForWhatFewStatesASecondMakeOfAForceThatBends) {
-  // Conservative, even if the hand moves up to 2 mm between states at 50 Hz.
+  // This engine is conservative, even if the hand moves up to 2 mm between two states at 50 Hz.
   SelfTestScript script;
   script.rate_hz = 50;
   script.work_tolerance = 1e-5;
@@ -131,7 +131,7 @@ TEST(SelfTest, IsFailedByAForceThatPushesOnWithTheHand) {
 }
 
 TEST(SelfTest, IsFailedByAForceThatIsLate) {
-  // A delay of 10 states turns the wall's hysteresis around, so it generates energy.
+  // A delay of 10 states reverses the hysteresis of the wall, so it generates energy.
   const SelfTest result = self_test([late = std::vector<Vec3>(10, Vec3::Zero())](const DeviceState& hand) mutable {
     late.insert(late.begin(), Vec3(-kK * std::max(hand.position.x(), 0.0), 0, 0));
     const Touch touch = late.back();
@@ -188,7 +188,8 @@ TEST(SelfTest, DoesNotJudgeAStiffnessWhereASurfaceIsWithinAStep) {
   EXPECT_TRUE(result.passed()) << result.text();
 }
 
-/// The rest position creeps towards the hand with time: passive, but the force is no function of position.
+/// The rest position creeps towards the hand over time. This is passive, but the force is not a function of the
+/// position.
 struct Creeping {
   Vec3 rest = Vec3::Zero();
   Vec3 saved = Vec3::Zero();
@@ -204,7 +205,7 @@ TEST(SelfTest, JudgesTheStiffnessOfAnEngineThatGoesOnOnlyWithSaveAndRestore) {
   Creeping engine;
   const Physics physics = [&](const DeviceState& hand) { return engine.answer(hand); };
   SelfTestScript script;
-  script.work_tolerance = 1;  // the energy stored before the path begins is released on it
+  script.work_tolerance = 1;  // the path releases energy that was stored before it began
   const SelfTest without = self_test(physics, script);
   EXPECT_EQ(count(without, kNotJudged, "stiffness"), 4) << without.text();
   EXPECT_NE(without.text().find("provide save and restore"), std::string::npos) << without.text();

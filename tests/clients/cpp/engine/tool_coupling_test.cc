@@ -9,7 +9,7 @@
 namespace tendon::tool_coupling_test {
 namespace {
 
-/// In front of a wall at x = 0, with semi-implicit Euler as in a typical engine.
+/// A tool in front of a wall at x = 0. It is integrated by the semi-implicit Euler method, as in a typical engine.
 struct Tool {
   double mass;
   double step;

@@ -15,7 +15,7 @@ using namespace tendon;
 
 namespace {
 
-/// In its own process group, like the ranks of Open MPI; ignores all signals it can ignore.
+/// It runs in its own process group, like the ranks of Open MPI, and ignores all signals that can be ignored.
 void leave_a_child() {
   if (::fork() != 0) return;
   ::setsid();

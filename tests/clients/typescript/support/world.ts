@@ -58,11 +58,11 @@ export interface ServerConduct {
   refuse: Refused | undefined;
   features: string[];
   grants: readonly Grant[];
-  /** The key of the session; undefined: suite 0. */
+  /** The key of the session. Undefined means suite 0. */
   key: Uint8Array | undefined;
   /** Use suite 2 if the client offers it. */
   aes: boolean;
-  /** When the server renews its key. */
+  /** The number of datagrams, or the time, after which the server renews its key. */
   renewAfter: { datagrams: bigint; time: Nanoseconds };
   state: (tick: bigint) => DeviceState;
   /** One tick in this many is sent. */

@@ -14,7 +14,7 @@ import descriptor from "protobufjs/ext/descriptor/index.js";
 
 const kMagic = Buffer.from([0x89, 0x4d, 0x43, 0x41, 0x50, 0x30, 0x0d, 0x0a]);
 
-/** The decoder of a channel, from the schema that the file carries. */
+/** Returns the decoder of a channel for the schema in the file. */
 function decoderOf(channel, schema) {
   if (channel.messageEncoding !== "protobuf" || schema?.encoding !== "protobuf")
     throw new Error(`${channel.topic} is not protobuf`);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// A version without the functions that tendon-bridge uses.
+// This version does not have the functions that tendon-bridge uses.
 typedef int dds_entity_t;
