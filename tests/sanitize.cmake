@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-# Compiler and linker flags of the sanitizers and of libFuzzer, for all that is compiled after this.
+# Compiler and linker flags for the sanitizers and libFuzzer, which are used for everything that is compiled after this.
 set(TENDON_SANITIZE "" CACHE STRING "Sanitizers, as -fsanitize= takes them (see the presets asan and tsan)")
 option(TENDON_SANITIZE_ALL "With sanitizers: build and test also what is outside of the rooms that a server is made of" OFF)
 option(TENDON_FUZZ "Build the fuzz targets (clang)" OFF)

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The table in SESSION.md, "When forces stop coming", agrees with the constants of the code.
+// The table in SESSION.md, "When forces stop coming", must agree with the constants of the code.
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -154,7 +154,7 @@ TEST(HapticController, TheIntervalAfterAnUnseenStepIsBookedAtItsWorst) {
   bench.now += milliseconds(1);
   const Step unseen = bench.controller.step_unseen(LocalTime(bench.now), bench.applied);
   ASSERT_EQ(unseen.force, Vec3::Zero());
-  // The command is zero, but the previous force is held for one more interval.
+  // The command is zero, but the device holds the previous force for one more interval.
   bench.applied = before.force;
   const Step seen = bench.move_to(0.02);
   EXPECT_NEAR(seen.energy, unseen.energy - 1e-3 * std::pow(before.force.norm() - 0.05, 2) / (4 * 0.26), 1e-12);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// For every hand motion and every remote force with any delay, the ledger stays nonnegative, the force within its
-// bound, and no NaN reaches the device. ctest asks RapidCheck for 10 000 seeds (see CMakeLists.txt). tests/tools/worlds
-// adds the network.
+// For every motion of the hand and for every remote force with any delay, the ledger must not be negative, the force
+// must be within its bound, and NaN must not reach the device. ctest tests 10 000 seeds (see CMakeLists.txt).
+// tests/tools/worlds also includes the network.
 #include <gtest/gtest.h>
 #include <rapidcheck.h>
 
@@ -25,7 +25,7 @@ namespace {
 
 struct Outcome {
   double least_energy = 0;
-  double worst_shortfall = 0;  // J, the amount below the minimum for this hold
+  double worst_shortfall = 0;  // J, by which the energy is below the minimum for this hold
   double worst_excess = 0;     // N above the bound
   bool all_finite = true;
 };
@@ -157,7 +157,7 @@ struct Gene {
   double follow = 0;           // factor on the worst motion of eq. (7)
   Vec3 move = Vec3::Zero();    // m, added motion
   Vec3 wanted = Vec3::Zero();  // N
-  double late = 1;             // ratio of the previous hold to the configured one
+  double late = 1;             // previous hold / configured hold
 };
 
 class Search {
@@ -165,8 +165,8 @@ class Search {
   Search(Law law, double bound_scale, std::uint64_t seed, bool late = false)
       : law_(law), bound_scale_(bound_scale), late_(late), dice_(seed) {}
 
-  /// Returns the lowest objective relative to the ledger's peak. A negative value means that the ledger was below zero,
-  /// or below the minimum for a late hold.
+  /// Returns the lowest objective relative to the ledger's peak. If it is negative, the ledger was below zero, or below
+  /// the minimum for a late hold.
   double worst() {
     double worst = 0;
     for (int start = 0; start < 20; ++start) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Exit code 2 if the command line or the scene is wrong, 1 if a file or a port cannot be used.
+// The exit code must be 2 if the command line or the scene is wrong, and 1 if a file or a port cannot be used.
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The network thread never sleeps. Counts sleeps instead of measuring times.
+// With `busy`, the network thread must never sleep. The test counts sleeps instead of measuring times.
 #include <gtest/gtest.h>
 
 #include <cstdint>

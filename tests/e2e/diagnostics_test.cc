@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// For an observer: the server, the network and the device. No upper bounds of times.
+// Tests the reports on the server, the network and the device that an observer receives. Times have no upper bounds.
 #include <gtest/gtest.h>
 
 #include <algorithm>

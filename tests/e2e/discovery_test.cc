@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// With a fake Avahi. deploy/discovery/drill uses a real one.
+// These tests use a fake Avahi. deploy/discovery/drill uses a real one.
 #include <gtest/gtest.h>
 
 #include <chrono>

@@ -83,7 +83,7 @@ class Report {
   std::ostringstream words_;
 };
 
-/// Moves the hand into the wall, within the wall and out again.
+/// Moves the hand into the wall, moves it within the wall, and moves it out again.
 void use(FalconStage& stage, double duration_s) {
   for (const LocalTime end = clock::now() + from_seconds(duration_s); clock::now() < end;) {
     stage.arm();

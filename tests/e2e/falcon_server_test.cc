@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// tendond with a Falcon model through the real libusb, and a remote wall in its own process, judged by the motor
-// commands at the end of the cable.
+// Runs tendond with a model of a Falcon through the real libusb, and a remote wall in a separate process. The results
+// are checked with the motor commands that arrive at the end of the cable.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -125,7 +125,7 @@ TEST(FalconServer, StoppedInMidForceItLetsGoAndPushesAgainOnlyAfterArming) {
       EXPECT_EQ(stage.falcon().seen().pushes_begun, pushes_begun) << "before it was armed\n"
                                                                   << stage.server().process().err();
       stage.arm();
-      // More than one press may be necessary, because the ledger assumes that the force was held during the whole
+      // It may be necessary to press more than once, since the ledger assumes that the force was held during the whole
       // pause.
       const auto pushed = [&stage] {
         stage.go_to(-0.015);

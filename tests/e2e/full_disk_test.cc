@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Pauses the recording, not the run. It continues once there is room, and the exit code reports the gap.
+// If the disk is full, only the recording must be paused. The recording must continue when there is space again, and
+// the exit code must report the gap.
 #include <gtest/gtest.h>
 
 #include <cstddef>

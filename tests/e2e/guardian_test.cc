@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A driver process streams forces to a socket and dies. For usbfs, this program's ioctl() writes endpoint and bytes to
-// it.
+// A driver process sends forces to a socket and is killed. In this program, ioctl() writes the endpoint and the bytes
+// to the socket instead of usbfs.
 #include "devices/safety/guardian.h"
 
 #include <fcntl.h>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Invalid datagrams are only counted. The counters are compared with the recorded datagrams, so drops by the kernel do
-// not matter.
+// Invalid datagrams must only be counted. The counters are compared to the recorded datagrams, so it does not matter if
+// the kernel drops some of them.
 #include <gtest/gtest.h>
 
 #include <algorithm>

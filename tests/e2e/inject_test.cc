@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Between two programs unrelated to Tendon. No test measures a time.
+// Tests tendon-inject between two programs that do not use Tendon. No times are measured.
 #include <gtest/gtest.h>
 #include <poll.h>
 
@@ -29,7 +29,7 @@ std::vector<std::string> with(std::vector<std::string> arguments, const std::vec
   return arguments;
 }
 
-/// Sends `count` datagrams to `proxy` at intervals of 10 ms. The server echoes each datagram that arrives.
+/// Sends `count` datagrams to `proxy` at intervals of 10 ms. If a datagram arrives, the server sends it back.
 void send_through(UdpBatch& server, const std::string& proxy, int count) {
   UdpBatch client = UdpBatch::connected(parse_address(proxy));
   UdpBatch::Inbox inbox;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The server as a job of an interactive shell: Ctrl-Z, bg, fg, and `stty tostop`.
+// Runs the server as a job of an interactive shell: Ctrl-Z, bg, fg, and `stty tostop`.
 #include <fcntl.h>
 #include <gtest/gtest.h>
 #include <poll.h>

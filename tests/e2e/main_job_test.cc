@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Each part runs in its own process, and one of them is killed. No test measures a time, because virtual machines
-// pause; the claims are checked in the recordings.
+// Each part runs in its own process, and one of the processes is killed. Times are not measured, because virtual
+// machines pause. Instead, the recordings are checked.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -67,7 +67,7 @@ TEST(MainJob, AHandFeelsALateLossyRemoteWallAndTheDeviceNeverGivesOutEnergy) {
     ASSERT_GE(step.loop_age, 2 * std::chrono::milliseconds(15)) << "tick " << step.tick;
   }
   EXPECT_GT(peak, 1);
-  // The claim holds for all of these steps. On a busy machine, only some of the 3000 steps qualify.
+  // This must be true for all of these steps. On a busy machine, only some of the 3000 steps qualify.
   EXPECT_GT(in_time, 100U);
 
   EXPECT_FALSE(recording.truncated);

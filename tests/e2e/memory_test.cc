@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Bounds about 25 % above the measured values; for the whole server the goal of 12 MB, which depends on the listed
-// libraries.
+// The bounds are about 25 % above the measured values. The goal for the whole server is 12 MB, which depends on the
+// listed libraries.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -39,7 +39,7 @@ std::int64_t faults(pid_t process) {
   return std::stoll(word);
 }
 
-/// Returns the shared libraries of a process without their versions, for example "libz".
+/// Returns the names of the shared libraries of a process, without the version. For example, "libz".
 std::set<std::string> libraries(pid_t process) {
   std::set<std::string> names;
   std::ifstream maps("/proc/" + std::to_string(process) + "/maps");

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Preloaded: refuses the n-th call of pthread_create, n = TENDON_REFUSED_THREAD.
+// A library for LD_PRELOAD that lets the n-th call of pthread_create fail, where n is TENDON_REFUSED_THREAD.
 #include <dlfcn.h>
 #include <pthread.h>
 

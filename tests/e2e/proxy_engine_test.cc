@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tendon-fem serve with a hand and with faulty workers. No test measures a time.
+// Tests `tendon-fem serve` with a hand and with faulty workers. No times are measured.
 #include <gtest/gtest.h>
 #include <signal.h>
 

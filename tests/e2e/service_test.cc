@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The test receives the datagrams of sd_notify(3).
+// The test receives the datagrams that are sent by sd_notify(3).
 #include <gtest/gtest.h>
 #include <sys/socket.h>
 #include <sys/un.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// From a full pipe, or from a terminal stopped with Ctrl-S.
+// The reader of the output is a full pipe, or a terminal that was stopped with Ctrl-S.
 #include <fcntl.h>
 #include <gtest/gtest.h>
 #include <poll.h>

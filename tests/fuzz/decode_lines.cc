@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reads datagrams, one per line in hexadecimal digits, and prints the values that C++ decodes, to compare with clients
-// in other languages (tests/clients/python/differential.py). Integers are decimal, floating-point numbers the 16
-// hexadecimal digits of their bits, strings and bytes hexadecimal digits, vectors and matrices row by row. "-" means
-// rejected.
+// Reads one datagram per line in hexadecimal digits, and prints the values that C++ decodes. This is compared to
+// clients in other languages (tests/clients/python/differential.py). Integers are decimal. Floating-point numbers are
+// the 16 hexadecimal digits of their bits. Strings and bytes are hexadecimal digits. Vectors and matrices are printed
+// row by row. "-" means that the datagram was rejected.
 #include <bit>
 #include <cstddef>
 #include <cstdint>

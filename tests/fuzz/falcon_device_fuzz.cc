@@ -5,8 +5,8 @@
 #include "devices/falcon/falcon_device.h"
 #include "tests/fuzz/target.h"
 
-// The input decides what a Falcon's cable returns, when it accepts data and when it is disconnected. Torque is sent
-// only to a homed device and within the motor limits, and the result of `apply` is finite.
+// The input decides which data the cable of a Falcon returns, when it accepts data, and when it is disconnected. Torque
+// must only be sent if the device is homed, and must be within the motor limits. The result of `apply` must be finite.
 
 using namespace tendon;
 

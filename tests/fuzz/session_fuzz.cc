@@ -6,8 +6,9 @@
 #include "protocol/session.h"
 #include "tests/fuzz/target.h"
 
-// Two sessions over a network that loses, repeats, reorders, damages or delays. Received data was sent by the peer,
-// requests arrive once and in order, and a session only ends due to a timeout, a Bye or its age.
+// Two sessions use a network that loses, repeats, reorders, damages or delays datagrams. Received data must be the same
+// as the data that was sent by the peer, requests must arrive once and in order, and a session must only end because of
+// a timeout, a Bye or its age.
 
 using namespace tendon;
 

@@ -10,7 +10,7 @@
 #include <streambuf>
 #include <string_view>
 
-// A violated property aborts the process, and libFuzzer reports it.
+// If a property is violated, the process is aborted, and libFuzzer reports this.
 
 namespace tendon::fuzz {
 

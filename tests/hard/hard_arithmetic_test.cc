@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Rounding, compiler optimizations, denormals, and NaN.
+// Tests rounding, compiler optimizations, denormals, and NaN.
 #include <gtest/gtest.h>
 
 #include <array>

@@ -40,7 +40,7 @@ Observed estimator_blow_up(std::uint64_t seed, bool bounds, bool limiter) {
   estimator.model = OutputEstimator::Model::kOutputError;
   if (!bounds) estimator.max_stiffness = estimator.max_force = 1e9;
   if (!limiter) set.let_all_through();
-  // For two seconds the environment fits no model structure; then it is the wall.
+  // For two seconds, the environment does not fit any of the model structures. After that, it is the wall.
   set.physics = [wall = set.physics, n = set.into, dice = Dice(seed)](const DeviceState& hand) mutable -> Touch {
     if (hand.tick < 1000 || hand.tick > 3200) return wall(hand);
     return Vec3((dice.within(-8000, 8000) * hand.position.dot(n) + dice.within(-20, 20)) * n + dice.direction());
@@ -104,8 +104,8 @@ Observed wind_up(std::uint64_t seed, double prior_variance) {
   return bench.seen();
 }
 
-// Oracle: passive, bounded, quiet, and within 1 N of the wall's force. A clamped hand is still for 30 s (750 answers
-// with 0.05 N of noise, a forgetting half-life of 14 answers) and then moves 10 mm between two answers.
+// Oracle: passive, bounded, quiet, and within 1 N of the force of the wall. A clamped hand is still for 30 s (750
+// answers with 0.05 N of noise, a forgetting half-life of 14 answers) and then moves 10 mm between two answers.
 TEST(HardLoop, AnEstimatorThatHasLongSeenNothingNewDoesNotWindUp) {
   constexpr Duration kWithin = seconds(1);
   const double prior = OutputEstimator::Config{}.prior_variance;
@@ -179,7 +179,7 @@ Observed wrap(std::uint64_t seed, bool guarded) {
   if (guarded) set.control().max_speed = 10;
   Bench bench(set);
   bench.run(milliseconds(1200));
-  // The encoder wraps where the hand leaves the wall.
+  // The encoder wraps around at the position where the hand leaves the wall.
   bench.encoder.range = 0.2;
   bench.encoder.middle = Vec3(0.105, 0, 0);
   bench.run(milliseconds(2100));
@@ -232,9 +232,9 @@ Observed stuck(std::uint64_t seed, bool limiter) {
   return bench.seen();
 }
 
-// Oracle: passive except for hidden motion. While the encoder is stuck the hand gains at most ‖F‖ · travel = 64 mJ. The
-// ledger books this as debt when the encoder moves again and recovers it within 1.5 s, except for 5.1 mJ that the jump
-// counts as viscous friction. Bounded, quiet.
+// Oracle: passive except for hidden motion. While the encoder is stuck, the hand can gain at most ‖F‖ · travel = 64 mJ.
+// When the encoder moves again, the ledger books this as a debt. The debt must be recovered within 1.5 s, except for
+// 5.1 mJ of the jump that are booked as viscous friction. Bounded, quiet.
 TEST(HardLoop, AnEncoderThatSticksOwesWhatItHidAndPaysItBack) {
   constexpr Duration kWithin = seconds(1);
   const Observed seen = kept(kWithin, [](std::uint64_t seed) { return stuck(seed, true); });
@@ -300,10 +300,10 @@ Observed clock_goes_back(std::uint64_t seed, bool decay) {
   return bench.seen();
 }
 
-// Oracle: passive, bounded, quiet. An engine whose clock is set back waits for that time while its force fades. It then
-// returns immediately, or after it has detected that the session has ended. The server has only one clock,
-// CLOCK_MONOTONIC (server/machine/clock.cc; tests/rules/rooms forbids reading others), which cannot be set. Time stamps
-// of a device that go back change no force.
+// Oracle: passive, bounded, quiet. If the clock of an engine is set back, the engine waits for that time, and its force
+// fades. After that, it returns immediately, or when it has detected that the session has ended. The server has only
+// one clock, CLOCK_MONOTONIC (server/machine/clock.cc; tests/rules/rooms forbids reading others), which cannot be set.
+// If the time stamps of a device go back, this must not change any force.
 TEST(HardLoop, AClockThatIsSetBackKicksNobody) {
   constexpr Duration kWithin = seconds(5);
   const Observed seen = kept(kWithin, [](std::uint64_t seed) { return clock_goes_back(seed, true); });
@@ -316,7 +316,7 @@ TEST(HardLoop, AClockThatIsSetBackKicksNobody) {
 
 /// Energy (J) that an active burst of 2 s extracts after a calm phase of dissipation.
 double burst_after(Duration calm, bool capped, Observed& seen) {
-  constexpr double kDrag = 2;  // N·s/m, of the environment
+  constexpr double kDrag = 2;  // N·s/m, of the environment, which dissipates energy
   Case set(1);
   set.device.max_substep = milliseconds(2);
   set.device.hand->motion = ScriptedMotion(ScriptedMotion::Sine{.amplitude = 0.02, .frequency = 1.5});
@@ -353,8 +353,8 @@ double burst_after(Duration calm, bool capped, Observed& seen) {
   return before - least;
 }
 
-// Oracle: a hand dissipates energy for an hour by moving through drag. A burst that then pushes it extracts at most the
-// 5 mJ of the energy cap plus the energy that the last contact may have stored.
+// Oracle: for an hour, a hand dissipates energy because it moves through drag. If it is then pushed by a burst, the
+// burst can extract at most the 5 mJ of the energy cap, plus the energy that may have been stored by the last contact.
 TEST(HardLoop, AnHourOfDissipationPaysForNoBurst) {
   constexpr double kMostOut = 0.025;  // J
   Observed seen;

@@ -102,7 +102,7 @@ Observed restart(std::uint64_t seed, bool ramp) {
   return bench.seen();
 }
 
-// Oracle: passive, bounded, quiet; the force returns over 100 ms although the hand has sunk in meanwhile.
+// Oracle: passive, bounded, quiet. The force must return over 100 ms although the hand has moved deeper into the wall.
 TEST(HardLoop, AnEngineKilledInContactAndRestartedDoesNotKick) {
   constexpr Duration kWithin = seconds(1);
   const Observed seen = kept(kWithin, [](std::uint64_t seed) { return restart(seed, true); });
@@ -191,7 +191,7 @@ TEST(HardLoop, ContactThatChattersOnAnEdgeStaysPassive) {
 
 Observed pull_through(std::uint64_t seed, bool limiter) {
   Case set(seed);
-  // A plate of 8 mm, which pushes toward the nearer side. A hand that has touched it sticks to it up to a distance of 5
+  // A plate of 8 mm, which pushes toward the nearer side. If a hand has touched it, it is held up to a distance of 5
   // mm.
   set.physics = [n = set.into, k = set.stiffness, stuck = false](const DeviceState& hand) mutable -> Touch {
     const double depth = hand.position.dot(n);

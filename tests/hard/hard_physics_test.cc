@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Soft bodies: element, solver and time step. Figures of other programs refer to B1
+// Tests the elements, the solver and the time step of soft bodies. The values of other programs are for B1
 // (tests/clients/softbody/pressed_block.h).
 #include <gtest/gtest.h>
 
@@ -229,7 +229,7 @@ TEST(HardPhysics, StiffnessesAMillionTimesApartAreSolvedAsAnotherSolverDoes) {
   const Solid whole = pressed_block(Element::kTet4, 8, 0.45);
   SymmetricMatrix stiffness = whole.pattern();
   whole.stiffness(VectorXd::Zero(whole.size()), Elastic::Curvature::kExact, stiffness);
-  // The half x > 0 is a million times as stiff: its elements count 999 999 times more.
+  // The half x > 0 is a million times as stiff, so the stiffness of its elements is added 999 999 more times.
   Mesh half = whole.mesh();
   half.elements.clear();
   for (int e = 0; e < whole.mesh().element_count(); ++e) {

@@ -40,7 +40,7 @@ using simulation::World;
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-constexpr Friction kFriction{.coulomb = 0.3, .viscous = 0.8};  // of the device and in the limiter's configuration
+constexpr Friction kFriction{.coulomb = 0.3, .viscous = 0.8};  // for the device and the limiter's configuration
 constexpr double kMaxForce = 8;                                // N
 constexpr double kMaxSlew = 1000;                              // N/s
 constexpr double kQuiet = 0.005;                               // m/s
@@ -80,7 +80,7 @@ class Encoder final : public Device {
   }
   Vec3 apply(const Vec3& force) noexcept override { return truth_.apply(force); }
 
-  std::optional<double> range;  ///< m, range of its counter on each axis around `middle`; the counter wraps there
+  std::optional<double> range;  ///< m, range of the counter on each axis about `middle`, where it wraps around
   Vec3 middle = Vec3::Zero();   ///< m
   bool stuck = false;
   Duration behind{};  ///< delay of its time stamps
@@ -98,7 +98,7 @@ struct Observed {
   double most_rate = 0;     ///< N/s
   Duration noisy_for{};     ///< after the end of the disturbance
   bool felt = false;
-  double figure = 0;   ///< measured value of the case, in its own unit
+  double figure = 0;   ///< the value that was measured in this case, in its own unit
   std::string also{};  ///< a violated additional promise of the case
 
   void add(const Observed& other) {
@@ -149,7 +149,7 @@ inline Observed kept(Duration quiet_within, Run run) {
   return worst;
 }
 
-/// Runs a case without its protection and returns the promise that breaks; one must.
+/// Runs a case without its protection. Returns the promise that is violated. It is an error if there is none.
 template <class Run>
 inline std::string without(const std::string& what, Duration quiet_within, Run run) {
   Observed worst;
@@ -192,7 +192,7 @@ struct Case {
   }
   static simulation::Network::Weather fair() { return weather("delay=uniform(1ms,3ms)", "delay=uniform(1ms,3ms)"); }
 
-  /// The hand moves in, out and along the wall; after this time it rests 12 mm deep.
+  /// The hand moves into the wall, out of it and along it. After this time, it is at rest at a depth of 12 mm.
   ScriptedMotion restless(Duration time) {
     ScriptedMotion::MinimumJerk reach;
     reach.back_and_forth = false;
@@ -282,8 +282,8 @@ class Bench {
   std::function<std::string(const StepRecord&)> promise_;
 };
 
-/// An engine that has been silent this long exerts no force: its force is valid for 500 ms, the safe stop follows 250
-/// ms later, and the slew limit needs 8 ms.
+/// If an engine has been silent for this time, there must not be any force. The force is valid for 500 ms, the safe
+/// stop is 250 ms later, and the slew limit needs 8 ms.
 constexpr Duration kSilence = milliseconds(500 + 250 + 10);
 
 inline std::function<std::string(const StepRecord&)> no_force_from(LocalTime when) {

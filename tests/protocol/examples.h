@@ -64,7 +64,7 @@ inline ForceCommand force() {
           .valid_for = std::chrono::milliseconds(20)};
 }
 
-/// All fields are set. The tool is 2 mm deep in a surface with the normal −x, and the table has the forces at other
+/// All fields are set. The tool is 2 mm deep in a surface with the normal −x. The table contains the forces at other
 /// depths.
 inline ForceCommand force_with_all() {
   ForceCommand all = force();
@@ -127,7 +127,7 @@ inline DeviceState state_with_wanted() {
   return diagnosed;
 }
 
-/// It was armed before and has tripped now. Three steps were not counted.
+/// The device was armed and has tripped. Three steps were not counted.
 inline DeviceReport device_report() {
   DeviceReport report{.number = 7,
                       .until = PeerTime{Duration{1'000'000'000}},
@@ -244,7 +244,8 @@ inline DeviceState state_with_buttons() {
   return state;
 }
 
-/// All parts are present: the handle is rotated by 106° about y and is moving, and the fingers close on something soft.
+/// All of the parts are set. The handle is rotated by 106° about y and is moving. The fingers are closing on a soft
+/// object.
 inline DeviceState state_with_handle() {
   DeviceState state = examples::state();
   state.buttons = 1;
@@ -256,7 +257,7 @@ inline DeviceState state_with_handle() {
   return state;
 }
 
-/// This is sent to a client with the feature "joints". There are three joints, and two of them move.
+/// This is sent to a client with the feature "joints". Two of the three joints are moving.
 inline DeviceState state_with_joints() {
   DeviceState state = examples::state();
   state.joints = Joints::three({0.5, -0.25, 1.5}, {0.125, 0, -2});
@@ -287,7 +288,7 @@ inline HandleDescription handle_description() {
           .hand = Hand::kRight};
 }
 
-/// This is sent to a client with the feature "joints". The joints are those of a Phantom.
+/// This is sent to a client with the feature "joints". The device is a Phantom.
 inline ControlAck joints_described(std::uint32_t id) {
   ControlAck ack{.id = id, .code = Code::kOk, .detail = {}};
   ack.handle = HandleDescription{.device = 1, .joints = {"turntable", "upper arm", "forearm"}};
@@ -344,7 +345,7 @@ inline PortFrame port_in_contact() {
   return port;
 }
 
-/// A follower that uses one of the other methods. It has found a floor, and waves have been sent.
+/// A follower that uses one of the other methods. A floor was found, and waves were sent.
 inline PortFrame port_by_model() {
   PortFrame port = port_in_contact();
   port.surface = {.normal = {0, 0.6, 0.8}, .offset = -0.125, .stiffness = 500};
@@ -353,7 +354,7 @@ inline PortFrame port_by_model() {
   return port;
 }
 
-/// The motion of the other end is scaled by 1/2 and rotated by 106° about y.
+/// The motion of the other end is scaled by 1/2, and it is rotated by 106° about y.
 inline Couple couple() {
   return {.device = 1,
           .channel = 1,

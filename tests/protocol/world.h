@@ -53,7 +53,7 @@ class BadNetwork {
 /// A is the client and Z is the server, which uses a different clock. Virtual time jumps to the next event that is due.
 class World {
  public:
-  /// The difference between the clocks of Z and A. No result may depend on it.
+  /// The difference between the clocks of Z and A. The results must not depend on it.
   static constexpr Duration kClockOffset = std::chrono::hours(1234) + Duration{56789};
 
   explicit World(const Weather& weather, std::uint64_t seed = 1, const Session::Config& config = {})
@@ -81,7 +81,7 @@ class World {
   LocalTime now{std::chrono::seconds(100)};
   std::function<void(const Session::Event&)> on_a = [](const Session::Event&) {};
   std::function<void(const Session::Event&)> on_z = [](const Session::Event&) {};
-  /// The next event of the owners, in addition to those of the sessions. LocalTime::max() means that there is none.
+  /// The next event of the owners, in addition to those of the sessions. If there is none, this is LocalTime::max().
   LocalTime wake = LocalTime::max();
   Session a;
   Session z;

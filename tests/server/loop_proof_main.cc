@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// For loop_proof_test.cc, with one line each. Callgrind counts within `step_in_turn` and writes a file at each return.
+// This program is used by loop_proof_test.cc. It prints one line for each case. Callgrind counts within `step_in_turn`
+// and writes a file each time the function returns.
 #include <iostream>
 #include <memory>
 #include <string_view>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Callgrind instructions of a haptic step: a point, for which the features of other handles must be nearly free, a
-// handle that rotates and grips, and a point that reports its joints.
+// Counts the callgrind instructions of a haptic step for three handles: a point, for which the features of other
+// handles must be nearly free, a handle that rotates and grips, and a point that reports its joints.
 #include <gtest/gtest.h>
 
 #include <iostream>

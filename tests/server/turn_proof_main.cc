@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// For turn_proof_test.cc: a state from its mailbox to an engine and the force back, through the network loop of the
-// server and a client, busy-polling, unencrypted and without sockets. Prints clock readings, link polls and datagrams
-// of the longer run. Callgrind counts within `exchange_in_turn` and writes a file at each return.
+// This program is used by turn_proof_test.cc. A state is sent from its mailbox to an engine and the force is sent back,
+// through the network loops of the server and a client. They are busy-polling, unencrypted and without sockets. It
+// prints the clock readings, link polls and datagrams of the longer run. Callgrind counts within `exchange_in_turn` and
+// writes a file each time the function returns.
 #include <algorithm>
 #include <array>
 #include <cstdlib>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// From a state in its mailbox to the force in the other one: callgrind instructions, clock readings, and link polls,
-// each of which would be a system call.
+// Counts callgrind instructions, clock readings, and link polls from a state in its mailbox to the force in the other
+// mailbox. With real sockets, each poll would be a system call.
 #include <gtest/gtest.h>
 
 #include <cstdint>

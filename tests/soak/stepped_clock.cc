@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// LD_PRELOAD: offsets a program's wall clock by the nanoseconds (text) in the file that TENDON_CLOCK_STEP names.
+// A library for LD_PRELOAD that adds an offset to the wall clock of a program. The offset is in nanoseconds (text) in
+// the file that is named by TENDON_CLOCK_STEP.
 #include <fcntl.h>
 #include <sys/syscall.h>
 #include <unistd.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Rotations as unit quaternions w, x, y, z, and row-major matrices; same names as core/base/rotation.h.
+// Rotations as unit quaternions w, x, y, z, and as row-major matrices. The names are those of core/base/rotation.h.
 import type { Quat } from "tendon-client";
 import type { Triple } from "./contact_force.js";
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A page as the physics engine: a wall at x = 0, over tendon-bridge. `npm run page` shows it.
+// A page that is a physics engine. It renders a wall at x = 0, and uses the WebSocket bridge. Use `npm run page` to see
+// it.
 import { connect, parseKeyFile, webSocket, type DeviceState, type Guest } from "tendon-client";
 import { draw } from "./picture.js";
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Prints the position of the hand, the force on it, and the network's round-trip time. An observer.
+// Prints the position of the hand, the force on it, and the round-trip time of the network. This is an observer.
 import { commandLine, run, type Vec3 } from "tendon-client/node";
 
 const { options } = commandLine("Print the motion of the hand, the force on it, and the round-trip time of the network.", {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The picture in browser.html: the hand, the force on it, and the last seconds of both.
+// Draws the picture in browser.html: the hand, the force on it, and the last seconds of both.
 import { reasonNames, type ClientStats, type DeviceState } from "tendon-client";
 
 const kFrames = 300;

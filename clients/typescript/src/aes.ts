@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// AES-256-GCM of suite 2, only in Node. WebCrypto is asynchronous, and AES in plain JavaScript leaks the key through
-// timing. Therefore pages use suite 1.
+// AES-256-GCM of suite 2, which is only available in Node. WebCrypto is asynchronous, and AES in plain JavaScript leaks
+// the key through timing, so pages use suite 1.
 import { concat } from "./datagram.js";
 
 /** Node 20.16 or newer; undefined elsewhere. */

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Result of a haptic function, its validation, and the part that a server supports.
+// The result of a haptic function, its validation, and the part of it that a server supports.
 import { isBounded, isError, isRadius, isStiffness, isVec3 } from "./bounds.js";
 import { isContact } from "./codec.js";
 import {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// For all runtimes. "tendon-client/node" adds UDP and the command line.
+// Exports for all runtimes. "tendon-client/node" adds UDP and the command line.
 export { connect, type ConnectConfig, type Guest, type OpenTransport, type Transport } from "./connect.js";
 export type { ClientConfig, ClientStats, Phase } from "./config.js";
 export { ForceClient, type Physics, type Watch } from "./force_client.js";

@@ -18,8 +18,8 @@
 
 namespace tendon::bridge {
 
-/// A server with a shipped scene, and its bridges, on virtual time. The haptic loop runs at 1 kHz, and `delay`
-/// applies in each direction. Only the simulated device is random.
+/// A server with one of the shipped scenes and its bridges, in virtual time. The haptic loop runs at 1 kHz, and `delay`
+/// is the delay in each direction. Only the simulated device is random.
 class World {
  public:
   explicit World(const std::string& scene_file, const std::vector<std::string>& settings = {}, int delay_ms = 0)
@@ -29,7 +29,7 @@ class World {
   World(const World&) = delete;
   World& operator=(const World&) = delete;
 
-  /// Each BridgedDevice has two sessions, as two clients of the server.
+  /// Each BridgedDevice has two sessions, so the server sees two clients.
   BridgedDevice& add_bridged(BridgedDevice::Config config = {}) {
     config.new_seed = [this] {
       Seed seed;
@@ -62,7 +62,7 @@ class World {
     }
   }
 
-  /// Stops the server without a Bye. A new server does not know its sessions.
+  /// Stops the server without a Bye. If a new server is started, it does not know the sessions of the old one.
   void kill_server() { assembly_.reset(); }
   void open_server() {
     ++epoch_;

@@ -25,7 +25,7 @@ namespace tendon::a_and_z {
 inline const Address a_address = parse_address("127.0.0.2:50000");
 inline const Address z_address = parse_address("127.0.0.1:47100");
 
-/// The jitter reorders datagrams. The delay must be above zero.
+/// The jitter reorders datagrams. The delay must be positive.
 struct Weather {
   double loss = 0.05;
   Duration delay = std::chrono::milliseconds(5);
@@ -98,7 +98,7 @@ class Server {
   std::uint64_t press_every = 0;  ///< button 1 is pressed in one of this many states; 0: never
 
   std::vector<Code> lease_answers;  ///< the answers to take_lease, followed by kOk
-  int snatches = 0;                 ///< leases that another client takes as soon as they are granted
+  int snatches = 0;                 ///< leases that are taken by another client immediately
 
   std::vector<LocalTime> attempts;  ///< contains an entry for each Hello with a valid cookie
   std::vector<Hello> hellos;
@@ -128,7 +128,7 @@ class Server {
   LocalTime next_state_{};
 };
 
-/// Advances A, Z and the network in the order of their next wake-ups.
+/// Runs A, Z and the network in virtual time. The one with the earliest wake-up is always next.
 class World {
  public:
   explicit World(std::uint64_t seed, Weather weather = {})
@@ -154,7 +154,7 @@ class World {
  private:
   void turn();
   LocalTime next() const;
-  /// Advances to the next wake-up. Throws std::logic_error if it is not later than now.
+  /// Advances the time to the next wake-up. Throws std::logic_error if that is not later than now.
   void advance();
 
   Network network_;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tendon-dash between a tendond and regular or hostile web clients.
+// Tests tendon-dash between a tendond and web clients, which are regular or hostile.
 import assert from "node:assert/strict";
 import { once } from "node:events";
 import { truncateSync, writeFileSync } from "node:fs";
@@ -21,7 +21,7 @@ async function open(test, url, options = {}) {
   return socket;
 }
 
-/** Returns the status with which a WebSocket is refused; 101: accepted. */
+/** Returns the HTTP status if a WebSocket is refused, or 101 if it is accepted. */
 async function refusal(url, options = {}) {
   const socket = new WebSocket(url, options);
   socket.on("error", () => {});
@@ -153,7 +153,7 @@ it("refuses who is not what it says, and stays for the others", async (test) => 
   assert.equal((await fetch(`${url}/metrics`)).status, 200);
 });
 
-/** Opens connections from one address that send `words` and read nothing. */
+/** Opens connections from the same address. Each of them sends `words` and does not read anything. */
 async function crowd(test, address, count, words) {
   const [host, port] = address.split(":");
   const sockets = Array.from({ length: count }, () => connect(Number(port), host).on("error", () => {}));

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Measures the latency from a state's sample to Foxglove's client. The reference is half the round trip of a
-// WebSocket ping on the same connection. Run foxglove-latency by hand; it is not part of CI.
+// Measures the time from the sample of a state until it arrives at the client of Foxglove. The reference is half of the
+// round trip of a WebSocket ping on the same connection. This test is not part of CI: use foxglove-latency to run it.
 import { readFileSync } from "node:fs";
 import { it } from "node:test";
 import { Viewer } from "./foxglove_client.mjs";

@@ -147,7 +147,7 @@ TEST(FoxgloveMessage, ReportsAreAsOnTheWire) {
 }
 
 TEST(FoxgloveMessage, TheOperatorsRightIsTheWorldsRightAndUpIsUp) {
-  // The base frame of a Falcon: x to the user, y right, z up.
+  // In the base frame of a Falcon, x points to the user, y to the right, and z up.
   const Quat falcon{.w = 0.5, .x = -0.5, .y = -0.5, .z = -0.5};
   ASSERT_LT((rotated(falcon, Vec3::UnitZ()) - Vec3::UnitY()).norm(), 1e-12) << "z is up";
   const std::array devices = {Drawn{.name = "a", .operator_from_device = Quat{}, .state = full_state()},

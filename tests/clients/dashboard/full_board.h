@@ -6,7 +6,7 @@
 
 namespace tendon::dash {
 
-/// The scales are 1. The follower has received 25 mJ of the 30 mJ that were given by the leader.
+/// The scales are 1. The leader has given 30 mJ, and the follower has received 25 mJ of it.
 inline Board::Ports both_ends() {
   Board::Ports ports;
   PortFrame& leader = ports.own;

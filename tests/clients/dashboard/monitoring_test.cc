@@ -45,7 +45,7 @@ std::map<std::string, std::set<std::string>> exported() {
   return names;
 }
 
-/// Metrics of PromQL, and labels that it selects or groups by.
+/// The metrics that are used in PromQL, and the labels that are used to select or group them.
 std::set<std::string> expect_exported(const std::string& expression) {
   static const std::map<std::string, std::set<std::string>> known = exported();
   static const std::regex metric(R"((tendon_[a-z_]+)(\{([^}]*)\})?)");

@@ -9,7 +9,7 @@
 
 #include "tests/server/servers.h"
 
-// The observer and the network loop of a server in virtual time, over a network without loss.
+// Runs the observer and the network loop of a server in virtual time. The network does not lose datagrams.
 
 namespace tendon::dash::observer_test {
 namespace {

@@ -183,7 +183,7 @@ it("shows the force by its components when the legend is told to", async (test) 
   await until("they are gone again", async () => (await keys()) === 3);
 });
 
-/** Writes a recording of `count` steps at 1 kHz, which repeats the steps of another recording. */
+/** Writes a recording with `count` steps at 1 kHz. The steps of another recording are repeated. */
 async function lengthen(from, to, count) {
   const reader = new McapStreamReader();
   reader.append(readFileSync(from));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests the 3-D view: the figure that it computes for a state, then the page in a browser.
+// Tests the 3-D view: first the shapes that it computes for a state, and then the page in a browser.
 import assert from "node:assert/strict";
 import { mkdirSync, readFileSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
@@ -31,7 +31,7 @@ const kSample = { t: 0, x: 0.1, y: 0.2, z: 0.3, wx: NaN, wy: NaN, wz: NaN, ax: 1
 
 it("turns everything of a device into the frame of who looks at it", async (test) => {
   const { figureOf, product, rotated } = await modules(test, "space/figure");
-  // x to the user, y right, z up.
+  // x points to the user, y to the right, and z up
   const handle = { ...kHandle, operator_from_device: kTurnedFrame };
   const half = Math.SQRT1_2;
   const pose = { position: [1, 2, 3], orientation: [half, 0, 0, half], force: [1, 0, 0], wanted: [0, 1, 0], torque: [0, 0, 1], hand: [0, 0, -1], buttons: 0, contact: { normal: [0, 0, 1], gap: -0.5 } };
@@ -43,8 +43,8 @@ it("turns everything of a device into the frame of who looks at it", async (test
   near(figure.hand, [0, -1, 0], "hand");
   near(figure.plane.normal, [0, 1, 0], "normal");
   near(figure.plane.at, [2, 3.5, 1], "the surface is half a metre above a tool pressed in as deep");
-  // The handle is rotated by 90° about the base's z axis (up): its −z axis points down and its x axis along the
-  // base's y axis.
+  // The handle is rotated by 90° about the z axis of the base, which points up. The −z axis of the handle then points
+  // down, and its x axis points along the y axis of the base.
   const [x, y, z, w] = figure.quaternion;
   near(rotated([w, x, y, z], [0, 0, -1]), [0, -1, 0], "where it points");
   near(rotated([w, x, y, z], [1, 0, 0]), [1, 0, 0], "its x");

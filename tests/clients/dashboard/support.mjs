@@ -97,8 +97,8 @@ export async function startDash(test, server, ...more) {
 }
 
 /**
- * Opens a UDP socket in place of a server and collects the Data datagrams. The dashboard's own observer never
- * connects, so it sends none.
+ * Opens a UDP socket that replaces a server, and collects the Data datagrams. Since the observer of the dashboard never
+ * connects, it does not send any.
  */
 export async function fakeServer(test) {
   const socket = createSocket("udp4");

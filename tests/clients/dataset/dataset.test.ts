@@ -19,7 +19,8 @@ function scratch(test: TestContext): string {
 
 const scene = (map: string): string => `[teleoperation]\nrole = "leader"\n[teleoperation.map]\n${map}`;
 
-/** Six seconds at 1 kHz, engaged from 1 to 3 s and again from 4 to 6 s. The leader moves along its x axis. */
+/** The recording contains six seconds at 1 kHz. It is engaged from 1 to 3 s and from 4 to 6 s. The leader moves along
+ * its x axis. */
 function coupling({ contact = true, map = "" } = {}): Coupling {
   const leader = { steps: [], ports: [] } as Coupling["leader"];
   const follower = { steps: [], ports: [] } as Coupling["follower"];
@@ -123,8 +124,8 @@ describe("readCoupling", () => {
 });
 
 /**
- * 100 Hz. Engaged from tick 51 on, clutched from 151 to 200; the target moves by 0.5/4096 m per tick. A test in
- * tests/clients/python writes the same bytes.
+ * The recording has 100 Hz. The follower is engaged from tick 51 on, and clutched from tick 151 to tick 200. The target
+ * moves by 0.5/4096 m per tick. A test in tests/clients/python writes the same bytes.
  */
 const kDemonstration = join(kRoot, "tests/clients/demonstration.jsonl");
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Real processes: a hand leads the device of another server, both servers record, and the recordings become a
-// dataset.
+// This test runs real processes. A hand moves the device of another server, both servers record, and the recordings are
+// converted to a dataset.
 import assert from "node:assert/strict";
 import { execFileSync, spawnSync } from "node:child_process";
 import { mkdtempSync, rmSync } from "node:fs";

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Real processes: tendond with a simulated device and hand, and MuJoCo. TENDON_PROGRAMS is tendond's folder.
+// This test runs tendond with a simulated device and hand, and MuJoCo. TENDON_PROGRAMS is the folder of tendond.
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import { join } from "node:path";

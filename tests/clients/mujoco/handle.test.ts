@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A tool that rotates with the handle and returns force, torque and both stiffnesses.
+// Tests a tool that rotates with the handle and returns a force, a torque and both stiffnesses.
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import { join } from "node:path";
@@ -106,7 +106,8 @@ describe("a held tool", () => {
       const { torque, angularStiffness: k } = settle(fixed, kOrigin, about(axis, degrees));
       const angle = (degrees * Math.PI) / 180;
       near(list(torque!), axis.map((value) => -0.5 * Math.sin(angle) * value), 0.003, `${degrees}°`);
-      // −∂τ/∂θ about the same axis. Beyond 90° it is negative, and a negative stiffness is not sent.
+      // This is −∂τ/∂θ about the same axis. It is negative if the angle is above 90°, and a negative stiffness must not
+      // be sent.
       const along = toScene(k!, axis).reduce((sum, value, i) => sum + value * axis[i]!, 0);
       near([along], [Math.max(0.5 * Math.cos(angle), 0)], 0.01, `stiffness at ${degrees}°`);
     }
@@ -185,7 +186,7 @@ describe("the stiffness", () => {
     near(pressed.stiffness!, n.flatMap((a) => n.map((b) => 1000 * a * b)), 20, "K");
     near(pressed.angularStiffness!, Array(9).fill(0), 1e-6, "a smooth ball turns freely");
     near([pressed.validRadius!], [0.002], 1e-4, "so far back it lets go");
-    // The hand moves there: 0.5 mm deeper and 0.3 mm sideways.
+    // The hand moves to this position, which is 0.5 mm deeper and 0.3 mm to the side.
     const [a, b, c] = n.map((value, i) => -0.0005 * value + 0.0003 * cross(n, [1, 0, 0])[i]!) as [number, number, number];
     const there = settle(held, { x: x + a, y: y + b, z: z + c }, kHeld);
     const predicted = list(pressed.force).map((f, i) => f - toScene(pressed.stiffness!, [a, b, c])[i]!);
@@ -244,7 +245,8 @@ describe("the stiffness", () => {
 describe("a scene whose z points up", () => {
   it("has the operator's right at x and what points to the operator at −y", () => {
     near(toScene(zUp(), [1, 2, 3]), [1, -3, 2], 1e-12, "x right, y up, z to the user");
-    // The device's x axis points to the user, y right, z up; the operator's axes are its y, z and x.
+    // The x axis of the device points to the user, y points to the right, and z points up. The axes of the operator are
+    // y, z and x of the device.
     const operatorFromDevice = { w: 0.5, x: -0.5, y: -0.5, z: -0.5 };
     near(toScene(zUp(operatorFromDevice), [1, 2, 3]), [2, -1, 3], 1e-12, "x to the user, y right, z up");
   });

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Real processes: a simulated stylus with six motors, and the peg in MuJoCo behind 20 ± 5 ms of delay and 2 % loss.
-// TENDON_PROGRAMS is the folder of tendond, tendon-inject and tendon-report.
+// This test runs real processes: a simulated stylus with six motors, and the peg in MuJoCo behind a network with a
+// delay of 20 ± 5 ms and a loss of 2 %. TENDON_PROGRAMS is the folder of tendond, tendon-inject and tendon-report.
 import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
 import { mkdtempSync, rmSync } from "node:fs";
@@ -45,7 +45,7 @@ async function run(test: TestContext, ...options: readonly string[]) {
 it("without the limiter the far peg shakes the hand: rotation is active", async (test) => {
   const report = await run(test, "--without-limiter");
   if (!report) return;
-  // energy_given_out_j is the complete ledger with friction; torque_work_j is the work of the torques alone.
+  // energy_given_out_j is the complete ledger, including friction. torque_work_j is the work of the torques alone.
   assert.ok(report.energy_given_out_j > 0.3 && report.torque_work_j > 0.3, JSON.stringify(report));
 });
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Block B1 under the patch of clients/softbody, to compare the models.
+// Presses on block B1 with the patch of clients/softbody, to compare the models.
 import assert from "node:assert/strict";
 import type { TouchableScene } from "../../../clients/mujoco/src/index.js";
 

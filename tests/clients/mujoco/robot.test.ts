@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Real processes: a simulated hand, and an arm in MuJoCo that follows it and touches a table, behind 50 ± 10 ms of
-// delay and 2 % loss. Then the network fails and recovers. TENDON_PROGRAMS is the folder of tendond, tendon-inject
-// and tendon-report.
+// This test runs real processes: a simulated hand, and an arm in MuJoCo that follows it and touches a table. The
+// network has a delay of 50 ± 10 ms and a loss of 2 %. It then fails and recovers. TENDON_PROGRAMS is the folder of
+// tendond, tendon-inject and tendon-report.
 import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
 import { createSocket } from "node:dgram";

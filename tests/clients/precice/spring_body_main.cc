@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// spring_body CONFIG: the participant Body of clients/precice/precice-config.xml, 500 N/m in total.
+// spring_body CONFIG: the participant Body of clients/precice/precice-config.xml. Its total stiffness is 500 N/m.
 #include <cstdio>
 #include <exception>
 #include <precice/precice.hpp>

@@ -8,7 +8,7 @@ PAGE = Path(__file__).resolve().parents[3] / "protocol" / "vectors" / "golden.md
 
 
 def golden_datagrams(page: str) -> dict[str, bytes]:
-    """Returns the bytes by name. `00 x9` is nine zeros; a semicolon begins a comment."""
+    """Returns the bytes by name. `00 x9` means nine zeros, and a semicolon is the beginning of a comment."""
     datagrams = {}
     for name, block in re.findall(r"^```golden (\S+)\n(.*?)^```", page, re.MULTILINE | re.DOTALL):
         datagram = bytearray()

@@ -75,7 +75,7 @@ class Proxy:
 
 
 def mpirun(*command: str | Path) -> list[str]:
-    """Returns a command line that runs `command` on two ranks, on a machine that may be busy."""
+    """Returns a command line that runs `command` on two ranks. The machine may be busy."""
     if shutil.which("mpirun") is None or find_spec("mpi4py") is None:
         pytest.skip("no openmpi-bin or python3-mpi4py")
     words = ["mpirun", "--oversubscribe", "--mca", "mpi_yield_when_idle", "1", "-n", "2", *command]

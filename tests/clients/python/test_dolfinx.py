@@ -40,7 +40,7 @@ pytestmark = pytest.mark.skipif(
 
 
 def pressed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, *command: str | Path, depth: float = 1e-3) -> list[float]:
-    """Returns the stiffness at each place, N/m. The forces must be those of a linear spring."""
+    """Returns the stiffness at each place, N/m. The forces must be consistent with a linear spring."""
     proxy = Proxy("unix", tmp_path)
     monkeypatch.setenv("TENDON_WORKER_ADDRESS", proxy.address)
     monkeypatch.setenv("TENDON_WORKER_SECRET", SECRET)

@@ -112,7 +112,7 @@ def test_the_table_carries_and_slips_at_coulombs_limit(physics_of):
     table = physics_of("friction_surface")
     normal = table(hand((0, 0, 0))).force[1]
     assert normal == pytest.approx(2)
-    assert table(hand((0.0001, 0, 0))).force[0] == pytest.approx(-0.05)  # sticks: a spring of 500 N/m
+    assert table(hand((0.0001, 0, 0))).force[0] == pytest.approx(-0.05)  # sticks like a spring of 500 N/m
     for i in range(100):
         force = table(hand((0.0001 * i, 0, 0.0002 * i))).force
         assert hypot(force[0], force[2]) <= 0.5 * normal * (1 + 1e-12)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Workers in Python: with a proxy in Python, on several ranks, and under tendon-conformance."""
+"""Tests workers in Python with a proxy in Python, on several ranks, and with tendon-conformance."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def proxy(request, tmp_path, monkeypatch):
 
 
 class Running(threading.Thread):
-    """Runs run() in a thread. `end()` returns its exception or None."""
+    """Runs run() in a thread. `end()` returns the exception that was raised, or None."""
 
     def __init__(self, answer, comm=None):
         super().__init__(daemon=True)
@@ -351,7 +351,7 @@ def failed_checks(verdicts: dict[str, str]) -> list[str]:
 
 @pytest.fixture(scope="module")
 def of_an_endless_worker(tmp_path_factory):
-    """A worker that hangs when its second stream ends. The timeout of 10 s runs while the others are tested."""
+    """This worker hangs when its second stream ends. The timeout of 10 s runs while the others are tested."""
     folder = tmp_path_factory.mktemp("endless")
     program = "run(lambda hand: None)\nif os.environ['TENDON_WORKER_ADDRESS'].startswith('tcp:'): time.sleep(100)\n"
     (folder / "broken.py").write_text(BROKEN + program, encoding="utf-8")

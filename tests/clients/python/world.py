@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A client, a server and a bad network between them on virtual time, which advances to the next event."""
+"""A client, a server and a bad network in virtual time. The time is always advanced to the next event."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ SECOND = 1000 * MS
 
 @dataclass
 class Weather:
-    """Delay, jitter and loss of one direction of the network."""
+    """The delay, jitter and loss of the network in one direction."""
 
     delay: int = 20 * MS
     jitter: int = 10 * MS  # uniform in [0, jitter), so datagrams are reordered

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tendon-bridge between WebSockets and a UDP socket of the test.
+// Tests the WebSocket bridge of the package between WebSockets and a UDP socket of the test.
 import assert from "node:assert/strict";
 import { createSocket, type RemoteInfo, type Socket } from "node:dgram";
 import { once } from "node:events";

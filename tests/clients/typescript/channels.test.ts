@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Devices, channels and leases of a ForceClient, with a server on virtual time.
+// Tests the devices, channels and leases of a ForceClient, with a server in virtual time.
 import assert from "node:assert/strict";
 import { describe, it } from "node:test";
 import { ChannelRule, Code, Hand, Role, type DeviceDescription, type HandleDescription, type Request } from "../../../clients/typescript/src/messages.js";
@@ -192,7 +192,7 @@ describe("devices and channels", () => {
     assert.equal(asked(world, "takeLease"), 2);
     world.runMs(600);
     const often = asked(world, "takeLease");
-    assert.ok(often >= 9 && often <= 13, `${often}`); // 50 ms and the round trip each
+    assert.ok(often >= 9 && often <= 13, `${often}`); // 50 ms and the round-trip time each
     assert.equal(seen.length, 0);
     answer = ok;
     world.runMs(100);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reports on devices and engines of a ForceClient that observes, with a server on virtual time.
+// Tests the reports that a ForceClient receives as an observer, with a server in virtual time.
 import assert from "node:assert/strict";
 import { describe, it } from "node:test";
 import { decodeData } from "../../../clients/typescript/src/codec.js";

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Real processes: tendond, the compiled examples, and the bridge. TENDON_PROGRAMS is tendond's folder.
+// This test runs tendond, the compiled examples, and the bridge. TENDON_PROGRAMS is the folder of tendond.
 import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
 import { createSocket } from "node:dgram";
@@ -97,7 +97,7 @@ describe("of several", () => {
     if (!tendond) return;
     let silent = false;
     const first = guest(test, connect(udp(tendond.address), { channel: "tissue" }, {
-      physics: (hand) => (silent ? { x: NaN, y: 0, z: 0 } : wall(hand)), // a force that is not finite is not sent
+      physics: (hand) => (silent ? { x: NaN, y: 0, z: 0 } : wall(hand)), // a force is not sent if it is not finite
     }));
     await until("the first holds it", () => first.holds && first.stats().forces > 0);
     const options = ["--server", tendond.address, "--channel", "tissue", "--take-lease"];

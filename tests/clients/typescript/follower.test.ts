@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The cases in tests/clients/follower_cases.json, which the Python and C++ clients run as well.
+// Runs the cases in tests/clients/follower_cases.json. The Python and C++ clients run the same cases.
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import { join } from "node:path";

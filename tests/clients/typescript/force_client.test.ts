@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// ForceClient with a server on virtual time, over a network with seeded loss and delay.
+// Tests ForceClient with a server in virtual time, over a network whose loss and delay depend on a seed.
 import assert from "node:assert/strict";
 import { describe, it } from "node:test";
 import { kHasAes } from "../../../clients/typescript/src/aes.js";

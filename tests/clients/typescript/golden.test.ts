@@ -22,7 +22,7 @@ import { PlainSeal } from "../../../clients/typescript/src/seal.js";
 import { toHex } from "./support/bytes.js";
 import { kRoot } from "./support/paths.js";
 
-/** Parses the golden blocks: "00 x9" is nine zeros, ";" begins a comment. */
+/** Parses the golden blocks. "00 x9" means nine zeros, and ";" is the beginning of a comment. */
 function goldenDatagrams(page: string): Map<string, Uint8Array> {
   const found = new Map<string, Uint8Array>();
   for (const [, name, block] of page.matchAll(/^```golden (\S+)\n([\s\S]*?)^```$/gm)) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Orientation, torque and gripper of a handle.
+// Tests the orientation, the torque and the gripper of a handle.
 import assert from "node:assert/strict";
 import { describe, it } from "node:test";
 import { Deadband, predict } from "../../../clients/typescript/src/deadband.js";

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Host names as server addresses: known names, unknown names, and names with several addresses.
+// Tests host names as server addresses: known names, unknown names, and names with several addresses.
 import assert from "node:assert/strict";
 import { createSocket } from "node:dgram";
 import { describe, it, type TestContext } from "node:test";
@@ -37,8 +37,8 @@ describe("the name of a server", () => {
     const way = udp(`LOCALHOST:${port}`)((datagram) => came.push(datagram[0]!), assert.fail);
     test.after(() => way.close());
     for (let i = 0; i < 20; ++i) way.send(Uint8Array.of(i));
-    // The system may resolve the name to ::1 first. No server answers there, so the next address is tried, as in a
-    // session.
+    // If the system resolves the name to ::1 first, the next address must be tried, because there is no server at this
+    // address.
     for (let round = 0; came.length === 0 && round < 50; ++round) {
       await new Promise((resolve) => setTimeout(resolve, 100));
       if (came.length > 0) break;

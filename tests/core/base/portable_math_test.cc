@@ -56,7 +56,7 @@ TEST(PortableMath, Expm1AndTanhKeepTheirPrecisionNearZero) {
   EXPECT_TRUE(std::isnan(tanh(kNan)));
 }
 
-/// Returns eˣ (or eˣ − 1). Each operation is rounded once, in the order of the definition.
+/// Returns eˣ (or eˣ − 1). The operations are in the order of the definition, and each of them is rounded.
 double defined(double x, bool less_one) {
   const std::int64_t k = round(x / std::numbers::ln2);
   const auto whole = static_cast<double>(k);

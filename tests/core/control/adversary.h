@@ -86,7 +86,8 @@ World<N> delayed(World<N> world, int periods) {
   };
 }
 
-/// The demand is huge, tiny, zero or NaN. It acts along or against the motion, and its stiffness changes.
+/// The demand can be huge, tiny, zero or NaN. It can be in the direction of the motion or in the opposite direction,
+/// and its stiffness can change.
 template <int N>
 World<N> hostile_world(Dice& dice) {
   return [&dice, last = Vec<N>(Vec<N>::Zero())](const Vec<N>& x) mutable {
@@ -123,8 +124,8 @@ World<N> hostile_world(Dice& dice) {
   };
 }
 
-/// This is an operator who knows the law and the force and who tries to extract energy. The motion is random and of all
-/// sizes, or the worst motion of eq. (7), or a slow entry that is followed by a fast exit.
+/// This is an operator that uses its knowledge of the law and the force to extract energy. The motion is random and of
+/// all sizes, or it is the worst motion of eq. (7), or it is a slow entry that is followed by a fast exit.
 struct Adversary {
   Friction friction;  ///< true friction of the device
   Duration longest_hold = std::chrono::milliseconds(1);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The lists of laws and of AOL+ parts agree with each other and with core/control/README.md.
+// The lists of laws and of AOL+ parts must agree with each other and with core/control/README.md.
 #include <gtest/gtest.h>
 
 #include <fstream>

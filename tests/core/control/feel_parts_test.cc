@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// AOL+ parts that reduce vibration. aol_plus_test.cc tests their passivity.
+// Tests the parts of AOL+ that reduce vibration. aol_plus_test.cc tests whether they are passive.
 #include <gtest/gtest.h>
 
 #include <algorithm>

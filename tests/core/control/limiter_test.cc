@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// core_passivity_test covers passivity.
+// Passivity is tested by core_passivity_test.
 #include "core/control/limiter.h"
 
 #include <gtest/gtest.h>

@@ -152,7 +152,7 @@ void expect_definite() {
 TEST(RecursiveLeastSquares, UdStaysDefiniteInFloat32) { expect_definite<float>(); }
 TEST(RecursiveLeastSquares, UdStaysDefiniteInFloat64) { expect_definite<double>(); }
 
-/// In 1200 of 2000 samples, only one of two directions is excited. `error` is the largest error of θ after both are
+/// In 1200 of 2000 samples, only one of two directions is excited. `error` is the maximum error of θ when both are
 /// excited again.
 struct Return {
   double trace;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// For every motion and demand, the common account of force and torque and that of the gripper must stay nonnegative.
-// Both are recomputed from the equations and the true motion.
+// For every motion and every demand, the common account of force and torque and the account of the gripper must not be
+// negative. Both are recomputed from the equations and the true motion.
 #include <gtest/gtest.h>
 #include <rapidcheck.h>
 
@@ -169,7 +169,8 @@ TEST_P(HandlePassivity, NoHandAndNoEngineMakesItsAccountsNegative) {
 INSTANTIATE_TEST_SUITE_P(Laws, HandlePassivity, ::testing::Values(Law::kAol, Law::kAolPlus),
                          [](const auto& test) { return test.param == Law::kAol ? "Aol" : "AolPlus"; });
 
-/// Fills the account, then moves along a wrench that is `scale` times the permitted one. Returns the minimum energy, J.
+/// Fills the account, and then moves along a wrench. `scale` is the ratio to the permitted wrench. Returns the minimum
+/// energy, J.
 double after_a_wrench(double scale, double share_of_torque) {
   const std::array friction{Friction{0.02, 0.26}, Friction{1e-4, 1e-3}};
   WrenchPort port({.law = Law::kAol, .friction = friction, .longest_hold = kLongest});

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The energy-sharing theorem of energy_tank.h for two ports that rotate or grip, over a network that delays, loses,
-// repeats and reorders. The accounts and the sum of both ledgers, computed from the true motion, must not fall below −1
-// nJ, even on a closed loop in SO(3).
+// Tests the energy-sharing theorem of energy_tank.h for two ports that rotate or grip, over a network that delays,
+// loses, repeats and reorders messages. The accounts and the sum of both ledgers are computed from the true motion.
+// They must not be below −1 nJ, even on a closed loop in SO(3).
 #include <gtest/gtest.h>
 
 #include <algorithm>

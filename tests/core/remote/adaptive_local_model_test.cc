@@ -76,8 +76,8 @@ TEST(AdaptiveLocalModel, NothingJumpsWhenAnAnswerArrivesEvenInABlend) {
   }
 }
 
-/// Returns the energy (J) of a hand that moves by 1 mm in a soft or a stiff spring, whichever is worse after each
-/// reversal.
+/// Returns the energy (J) that a hand can extract if it moves by 1 mm. At each reversal, the answer switches between a
+/// soft and a stiff spring, which is the worst case.
 double handed_out(const AdaptiveLocalModel::Config& config) {
   AdaptiveLocalModel model(config);
   double energy = 0;

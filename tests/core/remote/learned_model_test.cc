@@ -28,7 +28,7 @@ struct Link {
   int late = 30;   ///< ms of delay
 };
 
-/// The model extrapolates late answers. `see` is called with time, prediction and position.
+/// The model extrapolates late answers. `see` is called with the time, the prediction and the position.
 void follow(LearnedModel& model, const Object& object, const std::function<Vec3(double)>& motion, const Link& link,
             int length_ms, const std::function<void(double, const Vec3&, const Vec3&)>& see) {
   for (int n = 0; n < length_ms; ++n) {
@@ -155,7 +155,7 @@ TEST(LearnedModel, AHandAtRestTeachesNothingHoweverNoisyTheAnswersAre) {
 }
 
 TEST(LearnedModel, DoesNotLeadAForceFarBeyondWhatFrictionLimitsItTo) {
-  // A wall of 8000 N/m that slides at 1 N. It is stiff between two answers, but not over the delay.
+  // This is a wall of 8000 N/m that slides at 1 N. It is stiff between two answers, but not over the delay.
   const auto slides = [] {
     return [foot = 0.0](double, const Vec3& x) mutable {
       foot = std::clamp(foot, x.x() - 1.0 / 8000, x.x() + 1.0 / 8000);

@@ -65,7 +65,7 @@ class FakeFalcon final : public UsbModel {
   void plug() override { plugged_ = true, ++times_plugged_; }
   void unplug() override;
   void move_to(const Vec3& position) { position_ = position; }  ///< m, device frame
-  /// Moves the grip all the way out and in, as a user does to home it. This has no effect unless the host has requested
+  /// Moves the grip out and in to its stops, which homes the device. This has no effect unless the host has requested
   /// it.
   void pull_through();
   void press(std::uint8_t buttons) { buttons_ = buttons; }

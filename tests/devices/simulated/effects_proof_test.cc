@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Effects that a scene does not list must cost nothing: callgrind instructions of each read and apply in a hand without
-// effects, and in a build without the effects (see CMakeLists.txt).
+// If a scene does not list an effect, the effect must not cost anything. The test compares the callgrind instructions
+// of each read and apply in a hand without effects to those of a build that does not contain them (see CMakeLists.txt).
 #include <gtest/gtest.h>
 
 #include <iomanip>

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// For effects_proof_test.cc: device-proof none, without optional effects; device-proof each, with one at a time. Prints
-// the name of each effect. Callgrind counts within `live_in_turn` and writes a file at each return.
+// This program is used by effects_proof_test.cc. `device-proof none` runs without optional effects, and `device-proof
+// each` with one effect at a time. It prints the name of each effect. Callgrind counts within `live_in_turn` and writes
+// a file each time the function returns.
 #include <iostream>
 #include <string_view>
 

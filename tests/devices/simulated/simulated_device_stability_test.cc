@@ -34,7 +34,7 @@ double exact_k_max(double m, double b, double t) {
   return b * (1 - delta) / (m * (1 - delta) / b - t * delta);
 }
 
-/// Returns the spectral radius of one period of the closed loop, which is computed from two periods with unit states.
+/// Returns the spectral radius of one period of the closed loop. It is computed from two periods with unit states.
 double spectral_radius(double m, double b, double stiffness) {
   Eigen::Matrix2d period;
   for (Eigen::Index i = 0; i < 2; ++i) {

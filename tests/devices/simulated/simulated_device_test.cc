@@ -329,7 +329,7 @@ TEST(Amplifier, FollowsAStepAsAFirstOrderLag) {
   for (int i = 1; i <= 50; ++i) {
     bench.wait(100us);
     const double t = 1e-4 * i;
-    // The impulse is exact. The force is the mean over the last 50 µs.
+    // The impulse is exact. The force is the average over the last 50 µs.
     ASSERT_NEAR(bench.truth().velocity.x(), 2 / m * (t - tau * (1 - std::exp(-t / tau))), 1e-13);
     ASSERT_NEAR(bench.truth().device_force.x(), 2 * (1 - std::exp(-(t - 25e-6) / tau)), 2e-3);
   }
@@ -338,7 +338,8 @@ TEST(Amplifier, FollowsAStepAsAFirstOrderLag) {
 TEST(Watchdog, TakesTheForceAwayAfterExactlyItsTime) {
   auto config = bare(0.075);
   config.watchdog = 5ms;
-  // The intervals end when the watchdog does, before it, or long after it. The impulse is always force × 5 ms.
+  // An interval can end at the same time as the watchdog, before it, or long after it. The impulse is always force × 5
+  // ms.
   for (const Duration interval : {Duration(5ms), Duration(1700us), Duration(333'333), Duration(1s)}) {
     Bench bench(config);
     bench.device().apply({0.3, -0.6, 0.6});

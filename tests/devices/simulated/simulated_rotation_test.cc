@@ -122,7 +122,8 @@ TEST(SimulatedRotation, AHandBringsItWhereItWantsFromAnySide) {
 }
 
 TEST(SimulatedRotation, AHandThatTurnsAboutChangingAxesIsFollowed) {
-  // The damper alone moves the handle, with the script's angular velocity. The rate of the rotation vector would drift.
+  // Only the damper moves the handle, at the angular velocity of the script. The rate of the rotation vector would
+  // drift.
   auto config = free_handle();
   config.inertia = 1e-7;
   const ScriptedMotion motion(

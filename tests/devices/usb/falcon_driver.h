@@ -21,7 +21,7 @@ bool comes_true(const Holds& holds) {
   return holds();
 }
 
-/// Called at 1 kHz in real time, as the haptic thread does.
+/// This must be called at 1 kHz in real time, like the haptic thread does.
 struct FalconDriver {
   explicit FalconDriver(std::unique_ptr<usb::Pipe> pipe) : device({.firmware = fake_firmware(4096)}, std::move(pipe)) {}
 
@@ -60,7 +60,7 @@ struct FalconDriver {
   }
 
   FalconDevice device;
-  Device* turned = &device;  ///< the device itself, or a wrapper around it
+  Device* turned = &device;  ///< or the wrapper of the device
   std::optional<PositionSample> sample;
   Vec3 written = Vec3::Zero();
   std::chrono::steady_clock::time_point due = std::chrono::steady_clock::now();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The real libusb in this process, so that the heap calls of a step can be counted. tests/e2e/falcon_server_test.cc
-// runs the complete server.
+// Uses the real libusb in this process, so that the heap calls of a step can be counted.
+// tests/e2e/falcon_server_test.cc runs the complete server.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -89,7 +89,8 @@ TEST(FalconLoop, AWallIsFeltThroughTheRealLibraryWithoutAHeapCallInTheLoop) {
   loop.stop();
   EXPECT_EQ(heap_calls, 0U);
   EXPECT_GT(pushed, 0U);  // a sign error would pull
-  // After a late step, the hand and the legs have moved. A reply that has timed out answers the next request.
+  // After a late step, the hand and the levers have moved. If a reply has timed out, it is used as the answer to the
+  // next request.
   EXPECT_LE(at_odds, loop.stats().overruns + loop.stats().unseen);
 }
 

@@ -24,7 +24,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-/// The priority is higher than that of the server, because this thread stands in for hardware.
+/// The priority must be higher than that of the server, because this thread simulates hardware.
 constexpr int kPriority = kHapticPriority + 15;
 constexpr Duration kRound = 1ms;
 

@@ -51,19 +51,19 @@ class FarFalcon {
   void unplug();
 
   struct Seen {
-    bool open = false;                 ///< a process has the node open
-    std::uint64_t by_node = 0;         ///< packets through the node itself, from a guardian
+    bool open = false;                 ///< whether a process has opened the node
+    std::uint64_t by_node = 0;         ///< number of packets that a guardian has written to the node
     std::vector<std::uint8_t> last{};  ///< newest packet: endpoint and bytes
     std::optional<LocalTime> let_go;   ///< when the motor torque last became zero
     std::uint64_t pushes_begun = 0;    ///< transitions from zero to nonzero torque
-    Duration longest_gap{};            ///< the maximum time between two periods
+    Duration longest_gap{};            ///< maximum time between two periods
   };
   Seen seen() const;
 
  private:
   struct Session {
-    int cable = -1;   ///< −1: closed by the process that opened it
-    int master = -1;  ///< −1: closed by every process
+    int cable = -1;   ///< −1 if it was closed by the process that had opened it
+    int master = -1;  ///< −1 if it was closed by all processes
     int slave = -1;   ///< used as a gate
     std::unique_ptr<socket_cable::Plug> plug;
     std::uint64_t said = 0;

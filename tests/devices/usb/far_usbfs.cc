@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// LD_PRELOAD for a program that uses libusb, such as an unmodified tendond: replaces the kernel's part of USB with one
-// plugged-in Falcon, which FarFalcon simulates in another process, and device enumeration, because test machines may
-// have neither udev nor sysfs. Has no thread: FarFalcon wakes libusb by opening the gate of the node after sending.
+// A library for LD_PRELOAD that is used with programs that use libusb, such as an unmodified tendond. It replaces the
+// USB of the kernel by a single Falcon, which FarFalcon simulates in another process. It also replaces device
+// enumeration, because there may be neither udev nor sysfs on a test machine. It has no thread: FarFalcon wakes libusb
+// by opening the gate of the node after sending.
 #include <dlfcn.h>
 #include <fcntl.h>
 #include <libusb.h>

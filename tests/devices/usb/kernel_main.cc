@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Models of a Falcon and a SpaceMouse in the real kernel, through its usbfs and the real libusb
-// (deploy/test-usb-kernel, in an emulated machine). Measured times appear on the device pages; the limits are relative
-// to the round trip in the same run.
+// Connects models of a Falcon and a SpaceMouse to the real kernel, through its usbfs and the real libusb
+// (deploy/test-usb-kernel, in an emulated machine). The limits of times are relative to the round trip that is measured
+// in the same run.
 #include <fcntl.h>
 #include <gtest/gtest.h>
 #include <linux/usbdevice_fs.h>
@@ -135,7 +135,8 @@ TEST(UsbKernel, FromThePlugToTheForce) {
                                  Vec3::Zero()));
 }
 
-/// Returns the times of a packet and its reply, measured by a single thread that uses blocking calls.
+/// Returns the time from a packet to its reply for each of the packets. A single thread uses blocking calls to measure
+/// this.
 std::vector<double> bare_round_trips_ms(const std::string& node, int count) {
   const int file = open(node.c_str(), O_RDWR | O_CLOEXEC);
   unsigned interface = 0;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// In real time, on a model of the kernel and a Falcon. No test depends on the speed of the machine.
+// These tests run in real time, with a model of the kernel and a model of a Falcon. They do not depend on the speed of
+// the machine.
 #include <gtest/gtest.h>
 
 #include <algorithm>

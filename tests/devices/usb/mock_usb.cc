@@ -55,7 +55,7 @@ void check(bool done, GError* error) {
 struct Unref {
   void operator()(UMockdevIoctlData* data) const { umockdev_ioctl_data_unref(data); }
 };
-/// A copy of the memory of the ioctl's caller. What is written to it reaches the caller when the ioctl ends.
+/// A copy of the memory of the ioctl's caller. Changes of this copy are visible to the caller when the ioctl ends.
 using Data = std::unique_ptr<UMockdevIoctlData, Unref>;
 
 Data resolve(UMockdevIoctlData* in, std::size_t at, std::size_t size) {

@@ -33,7 +33,8 @@ class MockUsb {
 /// One port of the machine and its device model, in real time. Thread-safe.
 class MockPort {
  public:
-  /// Creates port `number` of bus 1, from 1 to 9, with nothing plugged in. `usb` and `model` must outlive this object.
+  /// Creates port `number` of bus 1, which must be from 1 to 9. There is no device in the port. `usb` and `model` must
+  /// outlive this object.
   MockPort(MockUsb& usb, int number, UsbModel& model);
   ~MockPort();
   MockPort(const MockPort&) = delete;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Real libusb and libudev on a machine simulated by umockdev.
+// Tests the real libusb and libudev on a machine that is simulated by umockdev.
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 #include <unistd.h>

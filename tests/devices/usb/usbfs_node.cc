@@ -64,8 +64,8 @@ void UsbfsNode::set_file(int slave) {
   gate(false);
 }
 
-// This is not thread-safe if several threads write to the terminal. Nothing is written while this process has the node.
-// NOLINTNEXTLINE(concurrency-mt-unsafe)
+// tcflow() is not thread-safe if several threads write to the terminal, but nothing else is written to it while this
+// process has the node.
 void UsbfsNode::gate(bool open) const { tcflow(file_, open ? TCOON : TCOOFF); }
 
 void UsbfsNode::finish(usbdevfs_urb* urb, int status, int size) {
@@ -205,7 +205,8 @@ off_t UsbfsNode::seek(off_t to) {
 
 }  // namespace tendon
 
-// libusb's calls resolve to these before the C library, because the program exports them or they are preloaded.
+// The functions of this file are used by libusb instead of those of the C library, because the program exports them or
+// they are preloaded.
 extern "C" {
 
 int ioctl(int file, unsigned long request, ...) noexcept {

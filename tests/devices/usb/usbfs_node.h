@@ -52,7 +52,7 @@ class UsbfsNode {
   virtual bool request(std::uint8_t request, std::uint16_t value) = 0;
   virtual Taken write(std::span<const std::uint8_t> bytes) = 0;
   virtual void awaited() = 0;
-  /// libusb has called poll, but no transfer has ended.
+  /// Called when libusb has called poll, but no transfer has ended.
   virtual void look() {}
 
   // For the derived class, with mutex_ held. Takes ownership of the slave end and closes the previous one.

@@ -10,7 +10,7 @@
 
 namespace tendon {
 
-/// A FakeFalcon with a usbfs node in this process, in real time. Thread-safe.
+/// A FakeFalcon that uses a usbfs node in this process, in real time. Thread-safe.
 class UsbfsShim final : public UsbfsNode {
  public:
   explicit UsbfsShim(const FakeFalcon::Options& options);

@@ -106,7 +106,7 @@ void FakeWoodenHaptics::frame(LocalTime at) {
   if (at >= *boots_ && fault_ != Fault::kHangs) run(at);
 }
 
-// One iteration of the firmware loop per frame: sends a report, then waits for the next one.
+// Runs one iteration of the firmware loop per frame. It sends a report, and then waits for the next one.
 void FakeWoodenHaptics::run(LocalTime at) {
   if (in_buffer_) return;
   if (begun_) {

@@ -125,7 +125,7 @@ TEST(WoodenHapticsDevice, JointsCarryTheTipAndTurnAsItMoves) {
   }
 }
 
-// The counter has 16 bits per revolution of the body. The arm makes two and a half revolutions.
+// The counter has 16 bits per revolution of the body. The arm rotates by two and a half revolutions.
 TEST(WoodenHapticsDevice, CountersThatWrapAreFollowed) {
   for (const double turns : {2.5, -2.5}) {
     Bench bench;

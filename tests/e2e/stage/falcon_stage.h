@@ -48,7 +48,7 @@ class FalconStage {
   void arm();
   void arm_and_press();
 
-  /// Throws std::runtime_error after kPatience.
+  /// Throws std::runtime_error if this takes longer than kPatience.
   void wait_until(const std::function<bool(const FakeFalcon&)>& what, const std::string& name);
   void wait_for_commands(int count);
   static bool pushed_out(const FakeFalcon& falcon) { return falcon.force().x() < -0.5; }

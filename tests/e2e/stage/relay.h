@@ -16,8 +16,8 @@ namespace tendon::e2e {
 
 using Datagram = std::vector<std::byte>;
 
-/// A man in the middle between one client and the server. Stores the client's datagrams, and can forge others in its
-/// name. Thread-safe: yes. It has its own thread.
+/// A man in the middle that is between one client and the server. It stores the datagrams of the client, and can be
+/// used to forge datagrams of the client. Thread-safe: yes. It has its own thread.
 class Relay {
  public:
   explicit Relay(const Address& server);
@@ -31,7 +31,7 @@ class Relay {
   std::vector<Datagram> said() const;
 
   void forge(std::span<const std::byte> datagram);
-  /// Truncates the client's next `count` datagrams by one byte.
+  /// Removes the last byte from the next `count` datagrams that are sent by the client.
   void cut_next(int count);
 
  private:

@@ -18,8 +18,8 @@ std::filesystem::path program(const std::string& name);
 
 std::filesystem::path demo_scene();
 
-/// In this scene, the hand moves into the wall and holds its position. Forces are held and fade for longer than a
-/// machine pauses, so that every stage of the age policy occurs.
+/// In this scene, the hand moves into the wall and stays there. The times for which forces are held and faded are
+/// longer than the pauses of a machine, so that every stage of the age policy is used.
 inline constexpr std::string_view kPressingHand = R"([device]
 kind = "simulated"
 profile = "falcon"

@@ -12,7 +12,8 @@
 #include "tests/support/property_cases.h"
 #include "tests/support/refusal.h"
 
-// Tests the handshake in suite 1: which clients are admitted, which ones get no answer, and what this costs.
+// Tests the handshake in suite 1. The tests check which clients are admitted, which of them do not get an answer, and
+// what this costs.
 
 namespace tendon::sealed_handshake_test {
 namespace {
@@ -239,7 +240,7 @@ TEST_F(SealedHandshake, NoReplyIsEverLongerThanWhatItAnswers) {
   }
 }
 
-const Suites kOld = {Suite::kNoise};  ///< a peer without suite 2, or without hardware AES
+const Suites kOld = {Suite::kNoise};  ///< the peer does not support suite 2, or has no hardware support for AES
 const Suites kNew = all_suites();
 const Suites kAesOnly = {Suite::kAesGcm};
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// For codec_proof_test.cc: a state, a force, and 16 states in columns, each written and read, by us and by libprotobuf.
-// Prints one line each. Callgrind counts within `in_turn` and writes a file at each return.
+// This program is used by codec_proof_test.cc. It writes and reads a state, a force, and 16 states in columns, with our
+// codec and with libprotobuf, and prints one line for each. Callgrind counts within `in_turn` and writes a file each
+// time the function returns.
 #include <array>
 #include <cstdlib>
 #include <iostream>

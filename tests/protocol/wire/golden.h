@@ -16,8 +16,8 @@ std::string block(std::span<const std::byte> datagram);
 /// Returns the blocks of a page that start with "```golden NAME". NAME is the key.
 std::map<std::string, std::string> blocks(std::string_view page);
 
-/// Generates the golden blocks from the examples with these names (examples.h). Throws std::invalid_argument if the
-/// sets of names differ.
+/// Generates the golden blocks from the examples in examples.h that have these names. Throws std::invalid_argument if
+/// the sets of names differ.
 std::string rewritten(std::string_view page);
 
 }  // namespace tendon::golden

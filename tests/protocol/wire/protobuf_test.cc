@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The Writer produces libprotobuf's bytes, and the DataReader reads the same values in any order of the fields. The
-// fuzz target `payload` does this with random bytes.
+// The Writer must produce the same bytes as libprotobuf, and the DataReader must read the same values for any order of
+// the fields. The fuzz target `payload` does this with random bytes.
 #include <google/protobuf/message.h>
 #include <google/protobuf/stubs/common.h>
 #include <gtest/gtest.h>
@@ -171,7 +171,7 @@ void distort(Dice& dice, Bytes& body) {
       body.insert(body.end(), copy.begin(), copy.end());
       break;
     }
-    case 5: {  // a number that is longer than necessary
+    case 5: {  // the encoding of the number is longer than necessary
       auto& byte = body[dice.bits() % body.size()];
       if ((byte & std::byte{0x80}) != std::byte{0}) break;
       byte |= std::byte{0x80};

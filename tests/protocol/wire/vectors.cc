@@ -282,7 +282,8 @@ Key renewed(Suite suite, const Key& key) {
   return suite == Suite::kAesGcm ? crypto::AesGcm(key).renewed() : crypto::renewed(key);
 }
 
-/// Returns the example with the token of suite 2. A client appends this token, and a server puts it first.
+/// Returns the example with the token of suite 2. A client adds the token at the end, and a server adds it at the
+/// beginning.
 Hello offering(Suite suite) {
   Hello hello = examples::hello();
   if (suite == Suite::kAesGcm) hello.features.emplace_back(kFeatureAesGcm);

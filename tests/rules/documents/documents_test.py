@@ -98,7 +98,7 @@ def debian_has_the_packages():
 
 @functools.lru_cache(maxsize=None)
 def wrong_python(line, root):
-    """Returns what is wrong with a command that starts a Python program, or an empty string."""
+    """Returns the error in a command that starts a Python program. The result is empty if there is none."""
     named = [word for word in line if re.match(r"^(clients|tests|deploy)/.*\.py$", word)]
     if not named:
         return WHOSE if len(line) > 1 and line[0] in ("python", "python3", "pip") and "venv" not in line else ""
@@ -111,7 +111,7 @@ def wrong_python(line, root):
         return f"{named[0]} is not executable"
     if not is_example or "worker.run(" in script.read_text(encoding="utf-8"):
         return "" if line[0] in (named[0], "/usr/bin/python3") else WHOSE
-    # A virtual environment only exists after the reader has made it.
+    # The virtual environment does not exist until it is created by the reader.
     if "venv" in line[0] or not debian_has_the_packages():
         return ""
     shell = {"env": foreign_shell(root), "cwd": root, "capture_output": True, "text": True}
@@ -134,7 +134,7 @@ def left_out(build):
 
 
 def wrong(command, root, folders):
-    """Returns what is wrong with a command of this project, or an empty string."""
+    """Returns the error in a command of this project. The result is empty if there is none."""
     found = words(command)
     if not found:
         return ""

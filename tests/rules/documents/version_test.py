@@ -16,7 +16,7 @@ import sys
 PROJECT = re.compile(r"^project\(tendon VERSION (\d+\.\d+\.\d+)", re.M)
 RELEASE = re.compile(r"^## \[(\d\S*)\] - \d{4}-\d\d-\d\d$", re.M)
 PAGES = r"(?!CHANGELOG).*\.(?:md|cmake\.in)"
-# Name, files, and pattern of each place in a text. Each of them must be found at least once.
+# The name, the files, and the pattern of each place in a text. Each of them must be found at least once.
 PLACES = (
     ("wheel", r"clients/python/pyproject\.toml", re.compile(r'^version = "(.*)"', re.M)),
     ("citation", r"CITATION\.cff", re.compile(r"^version: (.*)", re.M)),
@@ -46,7 +46,7 @@ def found(path, text):
 
 
 def same(name, version, project):
-    """find_package() needs the first two numbers only: SameMinorVersion in deploy/packaging/package.cmake."""
+    """find_package() only needs the first two numbers because of SameMinorVersion in deploy/packaging/package.cmake."""
     return version == project or name == "find_package" and version == project.rpartition(".")[0]
 
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The last test checks this tree. Each of the others passes a small tree in which one rule is broken.
+// The last test checks this tree. Each of the other tests checks a small tree in which one rule is violated.
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// recording_sample FOLDER: two seconds as FOLDER/whole.mcap, and killed during a write as FOLDER/killed.mcap, for
-// third-party readers.
+// recording_sample FOLDER: records two seconds for third-party readers. FOLDER/whole.mcap is complete, and
+// FOLDER/killed.mcap was killed during a write.
 
 #include <exception>
 #include <filesystem>

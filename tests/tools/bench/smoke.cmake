@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-# `tendon-lab bench --quick` measures each line, says so in JSON and on its page, and every section is there. No time is
-# asserted.
+# Checks that `tendon-lab bench --quick` measures each line and reports it in JSON and on its page, and that every
+# section is present. Times are not checked.
 execute_process(COMMAND ${LAB} bench --quick --json --write ${OUT}/quick.md OUTPUT_VARIABLE lines RESULT_VARIABLE code)
 if(NOT code EQUAL 0)
   message(FATAL_ERROR "tendon-lab bench: exit ${code}")

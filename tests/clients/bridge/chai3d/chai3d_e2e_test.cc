@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// chai3d_program, libhdPhantom.so, tendon-bridge, tendond.
+// Runs chai3d_program with libhdPhantom.so, tendon-bridge and tendond.
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <unistd.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The threads of libhdPhantom.so in this process, with shared memory of the test.
+// Tests the threads of libhdPhantom.so in this process, with shared memory that belongs to the test.
 #include <dlfcn.h>
 #include <fcntl.h>
 #include <gtest/gtest.h>
@@ -20,7 +20,7 @@
 namespace tendon::bridge::chai3d::hd_phantom_test {
 namespace {
 
-/// The longest time for which the library waits for a state.
+/// The maximum time that the library waits for a state.
 constexpr auto kLongestPace = std::chrono::milliseconds(2);
 
 /// The library searches for devices once per process, so there is only one instance.

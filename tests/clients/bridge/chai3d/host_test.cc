@@ -47,7 +47,8 @@ struct Theatre {
   HandNow hand;
 };
 
-// WoodenHaptics' base frame: x forward, y left, z up. CHAI3D: x to the user, y right, z up.
+// In the base frame of WoodenHaptics, x points forward, y to the left, and z up. In CHAI3D, x points to the user, y to
+// the right, and z up.
 const Quat kWooden = quaternion_of(operator_from_device("right=-y up=z user=-x"));
 const std::vector<std::string> kDirections = {"[1, 0, 0]", "[0, 1, 0]", "[0, 0, 1]"};
 const std::vector<Vec3> kSeen = {Vec3(-1, 0, 0), Vec3(0, -1, 0), Vec3(0, 0, 1)};
@@ -93,7 +94,7 @@ TEST(Chai3dHost, ATorqueGoesToADeviceThatHasMotorsForIt) {
   for (const double most : {0.0, 0.2}) {
     Theatre theatre("peg.toml", {}, {1, 0, 0, 0}, most);
     theatre.asks = true;
-    theatre.asked.torque = {0, 0, 0.01};  // about CHAI3D's z axis, upward
+    theatre.asked.torque = {0, 0, 0.01};  // about the z axis of CHAI3D, which points up
     theatre.run(600);
     ASSERT_TRUE(theatre.bridged.state());
     ASSERT_TRUE(theatre.bridged.state()->torque_applied);

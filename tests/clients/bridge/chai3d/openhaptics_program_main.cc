@@ -1,4 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-// Linked to libHD.so.
+// This program is linked to libHD.so.
 int hdInitDevice();  // NOLINT(readability-identifier-naming): OpenHaptics' name
 int main() { return hdInitDevice(); }

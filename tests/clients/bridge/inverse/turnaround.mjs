@@ -84,7 +84,7 @@ if (process.argv[2] === "echo") {
   }
   console.log(`force until felt     ${us(felt)} (a haptic step is 1000 µs)`);
 
-  // The maximum rate of one client, and of the echo.
+  // Measures the maximum rate of one client and of the echo.
   for (const [name, one] of [["turns of one client", client], ["  of a plain echo", echo]]) {
     let turns = 0;
     const begin = performance.now();
@@ -95,7 +95,8 @@ if (process.argv[2] === "echo") {
     console.log(`${name.padEnd(20)} ${(turns / (performance.now() - begin) * 1000).toFixed(0)} a second`);
   }
 
-  // CPU time of the bridge: one silent client, one client at 1 kHz, and eight at 500 Hz.
+  // Measures the CPU time of the bridge with one silent client, with one client at 1 kHz, and with eight clients at 500
+  // Hz.
   const paced = async (one, hz, into) => {
     const begin = performance.now();
     for (let i = 1; performance.now() - begin < 1000 * seconds; ++i) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The DDS side of `tendon-bridge ros2` alone: publishes known values on every topic at 1 kHz, stamped when sent, and
-// copies each wrench_command to `wrench`. For tests of the message types and the latency of DDS.
+// The DDS side of `tendon-bridge ros2` alone. It publishes known values with time stamps on every topic at 1 kHz, and
+// copies each wrench_command to `wrench`. It is used to test the message types and to measure the latency of DDS.
 #include <poll.h>
 
 #include <array>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A real tendond and programs with Fast DDS (fast_peer).
+// Tests a real tendond with programs that use Fast DDS (fast_peer).
 #include <arpa/inet.h>
 #include <gtest/gtest.h>
 #include <netinet/in.h>
@@ -30,8 +30,8 @@ namespace {
 using std::chrono::milliseconds;
 using tendon::testing::ScratchFolder;
 
-/// A stylus oscillates along the operator's right, with torque motors, a gripper, and a button from 1 s on. It has a
-/// Falcon's base frame.
+/// Simulates a stylus that oscillates to the right and left of the operator. It has torque motors, a gripper, and a
+/// button that is pressed after 1 s. The base frame is that of a Falcon.
 constexpr std::string_view kScene = R"([device]
 kind = "simulated"
 profile = "touch"

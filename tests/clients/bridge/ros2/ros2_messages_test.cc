@@ -19,9 +19,10 @@ namespace {
 
 constexpr double kQuarter = std::numbers::pi / 2;
 
-/// A Falcon's axes are the operator's: x right, y up, z to the user. REP 103: x forward, y left, z up.
+/// The axes of a Falcon are those of the operator, so x points to the right, y up, and z to the user. In REP 103, x
+/// points forward, y to the left, and z up.
 const std::optional<Quat> kFalcon = Quat{};
-/// WoodenHaptics' axes are those of REP 103.
+/// The axes of WoodenHaptics are the same as in REP 103.
 const std::optional<Quat> kWooden = quaternion_of(operator_from_device("right=-y up=z user=-x"));
 
 DeviceState at(const Vec3& position) {

@@ -41,7 +41,7 @@ inline Buffer plane_payload(const Plane& plane) {
   return out;
 }
 
-/// Has its own numbering: it is sender 5, and its types start at 100 in the order of `Type`.
+/// This sender has its own numbering. It is sender 5, and its types start at 100 in the order of `Type`.
 class Program {
  public:
   static constexpr std::int32_t kSender = 5;

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests tendon-bridge vrpn with a client that was written from VRPN.md alone, over real sockets."""
+"""Tests tendon-bridge vrpn over real sockets. The client was written from VRPN.md alone."""
 
 from __future__ import annotations
 

@@ -127,7 +127,7 @@ TEST(VrpnPlane, FrictionSticksAtTheStaticCoefficientAndSlipsAtTheOther) {
 }
 
 TEST(VrpnForce, IsTurnedIntoTheDevicesOwnFrame) {
-  // The device's x axis points up, y to the user, z right.
+  // The x axis of the device points up, y points to the user, and z points to the right.
   const View view(*find_frame("openhaptics"), quaternion_of(operator_from_device("right=z up=x user=y")));
   Drawing drawing;
   drawing.draw(Plane{.normal = Vec3::UnitY(), .spring = 1});

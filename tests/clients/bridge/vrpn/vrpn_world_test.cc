@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// VRPN programs, the logic of tendon-bridge vrpn, and the loops of the server on virtual time.
+// Tests VRPN programs with the logic of tendon-bridge vrpn and the loops of the server, in virtual time.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -105,7 +105,7 @@ struct Stage {
 };
 
 TEST(VrpnWorld, AForceAlongEachAxisPushesThatWayAndTheHandsMotionIsSeenThere) {
-  // The device's x axis points to the user, y right, z up.
+  // The x axis of the device points to the user, y points to the right, and z points up.
   for (const std::string axes : {"", "right=y up=z user=x", "right=-y up=z user=-x"}) {
     for (int axis = 0; axis < 3; ++axis) {
       Stage stage("left.toml", kStill);
@@ -240,7 +240,8 @@ TEST(VrpnWorld, ASecondProgramIsToldAndTakesOverWhenTheFirstLeaves) {
 
 /// Returns the energy (J) with 20 ms of delay in each direction and the force of a wall for each pose.
 double given_out(bool limited, bool as_plane) {
-  // The same simulated hand. The parts of the first scene's limiter cannot be used without a limiter.
+  // The hand is the same as in the first scene. The limiter parts of that scene are removed, because they cannot be
+  // used without a limiter.
   Stage stage(limited ? "demo_parts.toml" : "left.toml",
               limited ? std::vector<std::string>{} : std::vector<std::string>{"limiter.kind=\"none\""}, 20);
   World& world = stage.world;

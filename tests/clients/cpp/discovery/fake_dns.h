@@ -40,7 +40,7 @@ std::string answer(const Question& question, const std::vector<std::string>& rec
 /// A name server on loopback with UDP and TCP on the same port. It has its own thread.
 class FakeDns {
  public:
-  /// Returns the answer; empty: no answer.
+  /// Returns the answer. If it is empty, there is no answer.
   using Answer = std::function<std::string(const dns::Question&, bool tcp)>;
   explicit FakeDns(Answer answer);
   ~FakeDns();

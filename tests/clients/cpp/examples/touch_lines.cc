@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// touch_lines EXAMPLE [ARGUMENT…]: a rendering example, linked unchanged, without a server. For each input line "DEVICE
-// X Y Z U V W" (m, m/s), prints "FX FY FZ" in N and, if the example sends a stiffness, its nine elements in N/m by
-// rows.
+// touch_lines EXAMPLE [ARGUMENT…]: runs a rendering example, which is linked unchanged, without a server. For each
+// input line "DEVICE X Y Z U V W" (m, m/s), it prints "FX FY FZ" in N and, if the example sends a stiffness, its nine
+// elements in N/m by rows.
 #include <cstdio>
 #include <cstring>
 #include <iostream>

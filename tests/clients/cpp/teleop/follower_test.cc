@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/clients/follower_cases.json, which the Python and TypeScript clients run as well.
+// Runs the cases in tests/clients/follower_cases.json. The Python and TypeScript clients run the same cases.
 #include "clients/cpp/teleop/follower.h"
 
 #include <gtest/gtest.h>

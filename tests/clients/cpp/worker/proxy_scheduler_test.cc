@@ -116,7 +116,7 @@ TEST(Scheduler, TheDeadlineIsThreeTimesTheMedian) {
   EXPECT_EQ(played.scheduler.stats().median, milliseconds(40));
 }
 
-/// Answers are fast without contact, but take 100 ms with contact. The hand must feel every tap.
+/// An answer is fast if there is no contact, but takes 100 ms if there is contact. The hand must feel every tap.
 TEST(Scheduler, QuickAnswersWithoutAForceDoNotMakeSlowOnesLate) {
   Played played;
   played.open();
@@ -156,7 +156,7 @@ TEST(Scheduler, AnAnswerOfAQuickBodyHoldsAsLongAsTheClientSays) {
   }
 }
 
-/// For 180 000 unknowns on two ranks, the first contact takes 0.8 s and the others take 0.2 s.
+/// If there are 180 000 unknowns on two ranks, the first contact takes 0.8 s, and the others take 0.2 s.
 TEST(Scheduler, ASlowFirstTouchIsWaitedForAndTenTimesTheMedianAfterIt) {
   Played played;
   played.open();

@@ -62,10 +62,10 @@ export interface ServerConduct {
   key: Uint8Array | undefined;
   /** Use suite 2 if the client offers it. */
   aes: boolean;
-  /** The number of datagrams, or the time, after which the server renews its key. */
+  /** The server renews its key after this number of datagrams or after this time. */
   renewAfter: { datagrams: bigint; time: Nanoseconds };
   state: (tick: bigint) => DeviceState;
-  /** One tick in this many is sent. */
+  /** The number of ticks for each state that is sent. */
   every: bigint;
   answer: (request: Request) => Omit<ControlAck, "id">;
 }
@@ -97,7 +97,7 @@ export class Server {
   readonly hellos: { readonly datagram: HelloDatagram; readonly hello: Hello }[] = [];
   readonly forces: { readonly at: Nanoseconds; readonly command: ForceCommand }[] = [];
   readonly requests: Request[] = [];
-  /** Answers to the server's own requests. */
+  /** The answers to the requests that are sent by the server. */
   readonly answers: { readonly code: Code; readonly detail: string }[] = [];
   session: Session | undefined;
   #nextId = 1;
