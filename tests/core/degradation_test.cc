@@ -74,12 +74,12 @@ class Walk : public ::testing::Test {
   static constexpr Duration kValid = milliseconds(60);
   static constexpr double kSlew = 200;  // N/s: 0.2 N in a step of 1 ms
   static constexpr double kStiffness = 1000;
-  static constexpr int kSilent = 1000;  // ms; the last force is sent in the period before this
+  static constexpr int kSilent = 1000;  // ms; this is the period after the last force
   static constexpr int kBack = 2000;
 
   Walk() {
     HapticController::Config config;
-    config.limiter.law = Law::kNone;  // a limiter would cut the force afterwards
+    config.limiter.law = Law::kNone;  // otherwise the limiter would reduce the force
     config.limiter.longest_hold = milliseconds(1);
     config.max_force = 10;
     config.max_slew = kSlew;

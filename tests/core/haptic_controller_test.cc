@@ -154,7 +154,7 @@ TEST(HapticController, TheIntervalAfterAnUnseenStepIsBookedAtItsWorst) {
   bench.now += milliseconds(1);
   const Step unseen = bench.controller.step_unseen(LocalTime(bench.now), bench.applied);
   ASSERT_EQ(unseen.force, Vec3::Zero());
-  // The command is zero, but the device holds the previous force for one more interval.
+  // The command is zero, but the device will hold the previous force for one more interval.
   bench.applied = before.force;
   const Step seen = bench.move_to(0.02);
   EXPECT_NEAR(seen.energy, unseen.energy - 1e-3 * std::pow(before.force.norm() - 0.05, 2) / (4 * 0.26), 1e-12);
@@ -203,7 +203,7 @@ TEST(HapticController, APauseBeyondTheWatchdogIsChargedTheWorstNoMore) {
   bench.move_freely(100);
   bench.want(-6);
   const Step before = bench.move_to(0.02);
-  const Step after = bench.move_to(0.07, milliseconds(60));  // a long motion without a force does not fill the account
+  const Step after = bench.move_to(0.07, milliseconds(60));  // if there is no force, a long motion must not be credited
   EXPECT_TRUE(after.reasons.has(Reason::kWatchdog));
   EXPECT_NEAR(after.energy, before.energy - 5e-3 * std::pow(before.force.norm() - 0.05, 2) / (4 * 0.26), 1e-12);
 }
@@ -493,7 +493,7 @@ TEST(HapticController, AnAdmittanceDevicePushesTheHandleAfterTheTool) {
   controller.step({LocalTime(milliseconds(1)), Vec3::Zero(), Vec3::Zero()}, Vec3::Zero(), Vec3::Zero());
   const Vec3 push(3, 0, 0);
   const Step step = controller.step({LocalTime(milliseconds(2)), Vec3::Zero(), Vec3::Zero()}, Vec3::Zero(), push);
-  // A force of 3 N accelerates the tool for 1 ms to 1.5 mm/s while the handle is at rest.
+  // If the tool is accelerated by a force of 3 N for 1 ms, its speed is 1.5 mm/s, and the handle is at rest.
   EXPECT_NEAR(step.force.x(), 100 * 3 * 1e-3 / 2, 1e-9);
   EXPECT_EQ(step.hand_force, push);
 }

@@ -25,7 +25,7 @@ namespace {
 
 struct Outcome {
   double least_energy = 0;
-  double worst_shortfall = 0;  // J, by which the energy is below the minimum for this hold
+  double worst_shortfall = 0;  // J, how much the energy is below the minimum for this hold
   double worst_excess = 0;     // N above the bound
   bool all_finite = true;
 };
@@ -165,8 +165,8 @@ class Search {
   Search(Law law, double bound_scale, std::uint64_t seed, bool late = false)
       : law_(law), bound_scale_(bound_scale), late_(late), dice_(seed) {}
 
-  /// Returns the lowest objective relative to the ledger's peak. If it is negative, the ledger was below zero, or below
-  /// the minimum for a late hold.
+  /// Returns the lowest objective relative to the ledger's peak. If the value is negative, the energy was less than
+  /// zero, or less than the minimum for a late hold.
   double worst() {
     double worst = 0;
     for (int start = 0; start < 20; ++start) {

@@ -97,7 +97,7 @@ TEST(Diagnostics, AnObserverSeesWantedForcesTheLoopAndTheNetwork) {
   server.stop();
 }
 
-// tests/server (BadForces, SealedServer) covers each fault of a force in virtual time.
+// The faults of a force are covered in virtual time by tests/server (BadForces, SealedServer).
 TEST(Diagnostics, AnEngineThatSleepsOnThisMachineIsBlamedAndNeverTheNetwork) {
   const ScratchFolder folder;
   Server server(folder.path(), write(folder.path() / "scene.toml", kPressingHand));

@@ -83,7 +83,7 @@ class Report {
   std::ostringstream words_;
 };
 
-/// Moves the hand into the wall, moves it within the wall, and moves it out again.
+/// Moves the hand into the wall, then to another depth, and then out of the wall.
 void use(FalconStage& stage, double duration_s) {
   for (const LocalTime end = clock::now() + from_seconds(duration_s); clock::now() < end;) {
     stage.arm();

@@ -23,8 +23,8 @@ namespace {
 
 constexpr std::uint8_t kOut = 0x02;
 
-/// The scene's watchdogs assume that the machine does not pause, so a claim that failed after a pause is repeated, at
-/// most twice.
+/// The watchdogs of the scene assume that the machine does not pause. If a claim fails after a pause, it is therefore
+/// repeated, but at most twice.
 template <class Claim>
 void on_a_stage(const FalconStage::Config& config, const Claim& claim) {
   for (int left = 2;; --left) {
@@ -125,8 +125,8 @@ TEST(FalconServer, StoppedInMidForceItLetsGoAndPushesAgainOnlyAfterArming) {
       EXPECT_EQ(stage.falcon().seen().pushes_begun, pushes_begun) << "before it was armed\n"
                                                                   << stage.server().process().err();
       stage.arm();
-      // It may be necessary to press more than once, since the ledger assumes that the force was held during the whole
-      // pause.
+      // The button may have to be pressed more than once, because the ledger assumes that the force was held during the
+      // whole pause.
       const auto pushed = [&stage] {
         stage.go_to(-0.015);
         stage.go_to(0.004);

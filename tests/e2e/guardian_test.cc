@@ -181,8 +181,8 @@ TEST(Guardian, OutlivesWhatEndsTheDriversProcessGroup) {
   ended_by(pid);
 }
 
-// A process under load frees its memory for tens of milliseconds before it closes its files. This takes longer here if
-// another process holds the same files.
+// If a process is under load, it can take tens of milliseconds to free its memory before it closes its files. This
+// takes longer here if another process holds the same files.
 TEST(Guardian, WritesZeroWhenItsParentDiesAndAgainWhenTheFilesClose) {
   Heard device;
   std::array<int, 2> lingering{};
@@ -221,7 +221,7 @@ TEST(Guardian, WritesZeroWhenItsParentDiesAndAgainWhenTheFilesClose) {
   for (;;) pause();
 }
 
-/// Returns all packets except forces. Stops when no packet has arrived for `ms` milliseconds.
+/// Returns all packets except for forces. It stops if there is no packet for `ms` milliseconds.
 std::vector<std::string> heard_within(Heard& device, int ms) {
   std::vector<std::string> heard;
   pollfd packet{.fd = device.end_of_the_device(), .events = POLLIN, .revents = 0};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Each part runs in its own process, and one of the processes is killed. Times are not measured, because virtual
+// All parts run in separate processes, and one of these processes is killed. Times are not measured, because virtual
 // machines pause. Instead, the recordings are checked.
 #include <gtest/gtest.h>
 

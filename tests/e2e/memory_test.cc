@@ -85,8 +85,9 @@ TEST(Memory, OfAServerWithADeviceIsSmall) {
 
 TEST(Memory, HasNoLibraryThatTheSceneDoesNotNeed) {
   Fleet one(1);
-  // Every scene needs these libraries for the language runtimes, the scene file, the protocol and its cryptography, and
-  // the log. USB and discovery also load libusb and libsystemd, which have seven dependencies.
+  // These libraries are needed in every scene. They are used for the language runtimes, the scene file, the protocol
+  // and its cryptography, and the log. USB and discovery also load libusb and libsystemd, which have seven
+  // dependencies.
   const std::set<std::string> needed = {"ld-linux-x86-64", "libc",        "libm", "libgcc_s",  "libstdc++",
                                         "libtomlplusplus", "libprotobuf", "libz", "libsodium", "libfmt"};
   for (const std::string& library : libraries(one.pid())) EXPECT_TRUE(needed.contains(library)) << library;

@@ -32,8 +32,8 @@ TEST(Softbody, AHandFeelsASoftBlockAsStiffAsTheSceneMakesIt) {
 
   const Recording recording = read_recording(file);
   expect_passive(recording, scene);
-  // The stiffness is 457.9 N/m at every depth, because the server follows the hand with the local model of each force.
-  // Exceptions are the first forces, which are ramped in, and late forces, which fade.
+  // The stiffness should be 457.9 N/m at every depth, because the server uses the local model of each force to follow
+  // the hand. Exceptions are the first forces, which are ramped in, and late forces, which fade.
   double peak = 0;
   std::size_t deep = 0;
   std::size_t as_stiff = 0;

@@ -60,8 +60,8 @@ TEST(Teleoperation, AHandLeadsTheDeviceOfAnotherServerThroughABadNetwork) {
     return high - low;
   };
   EXPECT_GT(spread(hand), 0.01);
-  // The wall is 8 mm away. In the other direction, the distance depends on where the hand engaged and on how far the
-  // spring was softened by pauses of the machine.
+  // The distance to the wall is 8 mm. The distance in the other direction depends on the position where the hand was
+  // engaged, and on whether pauses of the machine have softened the spring.
   EXPECT_GT(spread(tool), 0.004) << "it follows";
 }
 

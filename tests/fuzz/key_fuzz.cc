@@ -7,8 +7,8 @@
 #include "protocol/secrets/client_key.h"
 #include "tests/fuzz/target.h"
 
-// A file is rejected with a message that does not contain the key, or accepted as a key that only its owner can read,
-// that is not weak, and that survives writing and parsing.
+// A file must either be rejected or accepted. If it is rejected, the message must not contain the key. If it is
+// accepted, only the owner can read the file, the key is not weak, and it is unchanged by writing and parsing.
 
 using namespace tendon;
 

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
 # pack.sh TARGET FOLDER [ARCHIVE]: writes the files of FOLDER as the corpus of TARGET, corpus/TARGET.tar. The same files
-# give the same bytes, whoever packs them and whenever. To add a find:
+# always give the same bytes, for any user and at any time. To add a finding:
 #   mkdir inputs && tar -xf tests/fuzz/corpus/session.tar -C inputs && cp FIND inputs
 #   tests/fuzz/pack.sh session inputs
 set -euo pipefail

@@ -6,9 +6,9 @@
 #include "devices/woodenhaptics/woodenhaptics_device.h"
 #include "tests/fuzz/target.h"
 
-// The input decides what the cable returns and accepts, and when it is disconnected. Current is sent only to a homed
-// device and within the motor limits, the counters are set only after the button was pressed, and the result of `apply`
-// is finite.
+// The input decides which data the cable returns, which data it accepts, and when it is disconnected. Current must only
+// be sent if the device is homed, and must be within the motor limits. The counters must only be set after the button
+// was pressed. The result of `apply` must be finite.
 
 using namespace tendon;
 

@@ -189,8 +189,8 @@ TEST(HardArithmetic, DenormalsAreOffInHapticStepsAndSoftBodyAnswers) {
        .without = "DenormalsOff left out: " + std::to_string(slow_without) + " answers"});
 }
 
-/// Simulates a tool that is pressed into a soft block over a bad network. Two twins with the same seed are bitwise
-/// identical until a datagram is inserted.
+/// Simulates a tool that is pressed into a soft block with a bad network. If there are two simulations with the same
+/// seed, they are bitwise identical until a datagram is inserted into one of them.
 struct Twin {
   explicit Twin(std::uint64_t seed)
       : device(hand()), world(config(seed), device), body(softbody::parse_scene(scene(), "s.toml", ".")) {

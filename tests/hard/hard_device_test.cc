@@ -104,8 +104,8 @@ Observed wind_up(std::uint64_t seed, double prior_variance) {
   return bench.seen();
 }
 
-// Oracle: passive, bounded, quiet, and within 1 N of the force of the wall. A clamped hand is still for 30 s (750
-// answers with 0.05 N of noise, a forgetting half-life of 14 answers) and then moves 10 mm between two answers.
+// Oracle: passive, bounded, quiet, and the force must be within 1 N of that of the wall. The hand is clamped for 30 s
+// (750 answers with 0.05 N of noise, a forgetting half-life of 14 answers) and then moves 10 mm between two answers.
 TEST(HardLoop, AnEstimatorThatHasLongSeenNothingNewDoesNotWindUp) {
   constexpr Duration kWithin = seconds(1);
   const double prior = OutputEstimator::Config{}.prior_variance;
@@ -263,7 +263,7 @@ Observed overestimated(std::uint64_t seed, bool corrected) {
   return seen;
 }
 
-// Oracle: passive with the true friction, also against an adversary, bounded, quiet. The scene claims twice the
+// Oracle: passive with the true friction even if there is an adversary; bounded and quiet. The scene claims twice the
 // friction, and an identification over the workspace reports the true value, which lowers the bounds immediately.
 TEST(HardLoop, FrictionClaimedTwiceTooHighIsCorrectedByTheMapOfTheWorkspace) {
   constexpr Duration kWithin = seconds(1);
@@ -316,7 +316,7 @@ TEST(HardLoop, AClockThatIsSetBackKicksNobody) {
 
 /// Energy (J) that an active burst of 2 s extracts after a calm phase of dissipation.
 double burst_after(Duration calm, bool capped, Observed& seen) {
-  constexpr double kDrag = 2;  // N·s/m, of the environment, which dissipates energy
+  constexpr double kDrag = 2;  // N·s/m, of the environment
   Case set(1);
   set.device.max_substep = milliseconds(2);
   set.device.hand->motion = ScriptedMotion(ScriptedMotion::Sine{.amplitude = 0.02, .frequency = 1.5});

@@ -29,7 +29,7 @@ Observed rate_collapse(std::uint64_t seed, bool limiter) {
   return bench.seen();
 }
 
-// Oracle: passive, bounded, quiet. The forces in those two seconds are 200 to 400 ms old while the hand moves.
+// Oracle: passive, bounded, quiet. During these two seconds, the hand is moving, and the forces are 200 to 400 ms old.
 TEST(HardLoop, AnEngineThatFallsFrom1000To5HzInContactStaysPassive) {
   constexpr Duration kWithin = seconds(1);
   const Observed seen = kept(kWithin, [](std::uint64_t seed) { return rate_collapse(seed, true); });
@@ -63,7 +63,8 @@ Observed bad_network(std::uint64_t seed, bool limiter, bool decay) {
   return bench.seen();
 }
 
-// Oracle: passive, bounded, quiet, and no force from 760 ms after the last arrival until the engine returns.
+// Oracle: passive, bounded, quiet. There must not be any force from 760 ms after the last arrival until the engine is
+// back.
 TEST(HardLoop, FiveHertzOutOfOrderThenSilenceIsPassiveAndFadesToZero) {
   constexpr Duration kWithin = seconds(1);
   const Observed seen = kept(kWithin, [](std::uint64_t seed) { return bad_network(seed, true, true); });

@@ -100,9 +100,9 @@ VectorXd turned_inside_out(const Solid& solid, bool scattered, std::uint64_t see
   return u;
 }
 
-// Oracle: a released body comes to rest in its initial shape, |u| < 1 µm, with det F > 0 in every element. From random
-// positions the corotational law recovers too. The neo-Hookean law has other minima there, in which an edge of the
-// block is wound once around itself, at rest and with det F > 0.
+// Oracle: after a body is released, it must come to rest in its initial shape, with |u| < 1 µm and det F > 0 in every
+// element. From random positions the corotational law recovers too. The neo-Hookean law has other minima there, in
+// which an edge of the block is wound once around itself, at rest and with det F > 0.
 TEST(HardPhysics, ABlockTurnedInsideOutComesBackRightWayRound) {
   double farthest = 0;
   int elsewhere = 0;
@@ -169,9 +169,9 @@ std::string gmsh_of(std::initializer_list<Vec3> nodes, const std::string& elemen
   return out.str();
 }
 
-// Oracle: closed form. A tetrahedron whose fourth node lies on the opposite face has no volume. With the node at height
-// h its volume is h/6 of the unit's. The highest frequency corresponds to h divided by the speed of sound, so the
-// stable step is proportional to h.
+// Oracle: closed form. A tetrahedron whose fourth node lies on the opposite face has no volume. If the node is at the
+// height h, the volume is h/6 of that of the unit. The highest frequency corresponds to h divided by the speed of
+// sound, so the stable step is proportional to h.
 TEST(HardPhysics, AnElementWithoutVolumeIsNamedAndASliverStepRefused) {
   const auto mesh = [](double height) {
     return gmsh_of({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0.25, 0.25, -1}, {0.25, 0.25, height}},
@@ -370,7 +370,8 @@ TEST(HardPhysics, TheRestOfABodyDoesNotDependOnTheStep) {
                      " % deeper with 10 ms than with 1 ms"});
 }
 
-// Oracle: 2/ω, with ω from Lanczos' method. The undamped rule stays bounded at 0.95 of it and diverges at 1.05.
+// Oracle: 2/ω, with ω from Lanczos' method. Without damping, the rule must be bounded at 0.95 of this step and diverge
+// at 1.05.
 TEST(HardPhysics, AnExplicitStepIsStableBelowItsLimitAndRefusedAboveIt) {
   const Solid solid = pressed_block(Element::kTet4, 4, 0.45);
   const double limit = largest_step(solid, 1000);

@@ -98,7 +98,7 @@ struct Observed {
   double most_rate = 0;     ///< N/s
   Duration noisy_for{};     ///< after the end of the disturbance
   bool felt = false;
-  double figure = 0;   ///< the value that was measured in this case, in its own unit
+  double figure = 0;   ///< measured value of the case, in its own unit
   std::string also{};  ///< a violated additional promise of the case
 
   void add(const Observed& other) {
@@ -149,7 +149,7 @@ inline Observed kept(Duration quiet_within, Run run) {
   return worst;
 }
 
-/// Runs a case without its protection. Returns the promise that is violated. It is an error if there is none.
+/// Runs a case without the protection. Returns the promise that is violated. It is an error if there is none.
 template <class Run>
 inline std::string without(const std::string& what, Duration quiet_within, Run run) {
   Observed worst;
@@ -192,7 +192,7 @@ struct Case {
   }
   static simulation::Network::Weather fair() { return weather("delay=uniform(1ms,3ms)", "delay=uniform(1ms,3ms)"); }
 
-  /// The hand moves into the wall, out of it and along it. After this time, it is at rest at a depth of 12 mm.
+  /// The hand is moved in and out of the wall and along it. After this time, it is at rest 12 mm deep in the wall.
   ScriptedMotion restless(Duration time) {
     ScriptedMotion::MinimumJerk reach;
     reach.back_and_forth = false;

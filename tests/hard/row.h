@@ -8,9 +8,9 @@ namespace tendon::hard {
 
 struct Row {
   std::string hard;    ///< the reason why this case is difficult
-  std::string oracle;  ///< the property that the test checks; the same text in every run
+  std::string oracle;  ///< the property that is checked; this must be the same text in every run
   std::string result;
-  std::optional<double> margin = {};  ///< bound / measured, above 1 if the bound holds; none for yes/no properties
+  std::optional<double> margin = {};  ///< bound / measured, above 1 if the bound holds; not used for yes/no
   std::string without;                ///< the result if the protection is disabled
 };
 

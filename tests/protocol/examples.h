@@ -64,8 +64,8 @@ inline ForceCommand force() {
           .valid_for = std::chrono::milliseconds(20)};
 }
 
-/// All fields are set. The tool is 2 mm deep in a surface with the normal −x. The table contains the forces at other
-/// depths.
+/// All fields are set. The tool is 2 mm deep in a surface with the normal −x, and there is a table of the forces at
+/// other depths.
 inline ForceCommand force_with_all() {
   ForceCommand all = force();
   all.sequence = 101;
@@ -244,7 +244,7 @@ inline DeviceState state_with_buttons() {
   return state;
 }
 
-/// All of the parts are set. The handle is rotated by 106° about y and is moving. The fingers are closing on a soft
+/// All parts are set. The handle has been rotated by 106° about y and is moving. The fingers are closing on a soft
 /// object.
 inline DeviceState state_with_handle() {
   DeviceState state = examples::state();
@@ -345,7 +345,7 @@ inline PortFrame port_in_contact() {
   return port;
 }
 
-/// A follower that uses one of the other methods. A floor was found, and waves were sent.
+/// A follower that uses one of the other methods. It has found a floor, and it has sent waves.
 inline PortFrame port_by_model() {
   PortFrame port = port_in_contact();
   port.surface = {.normal = {0, 0.6, 0.8}, .offset = -0.125, .stiffness = 500};
@@ -354,7 +354,7 @@ inline PortFrame port_by_model() {
   return port;
 }
 
-/// The motion of the other end is scaled by 1/2, and it is rotated by 106° about y.
+/// The scale for the motion of the other end is 1/2, and the rotation is 106° about y.
 inline Couple couple() {
   return {.device = 1,
           .channel = 1,
@@ -372,7 +372,8 @@ inline Couple couple() {
           .period = std::chrono::milliseconds(1)};
 }
 
-/// This is sent to an observer. It has the fields of a whole aligned handle, which no single end sends together.
+/// This is sent to an observer. The fields are those of a whole aligned handle. They cannot be sent together by a
+/// single end.
 inline PortFrame port_with_all() {
   PortFrame port = port_by_model();
   port.phase = PortPhase::kAligning;

@@ -71,7 +71,7 @@ inline Bytes raw(std::uint64_t packet_number, const RawProtobuf& body) {
   return bytes;
 }
 
-/// A and Z use the same clock. The datagrams are passed from one to the other by the test.
+/// A and Z use the same clock. The test moves the datagrams from one to the other.
 class TwoEnds : public ::testing::Test {
  protected:
   LocalTime now_ = kOpened;

@@ -261,7 +261,7 @@ TEST(HapticLoop, OfTwoOrdersTheLaterOneCounts) {
   EXPECT_EQ(world.steps(400).applied, Vec3(-2, 0, 0));
 }
 
-/// The engine (number 7) pushes with 2 N and sends its last force and its release in the same period.
+/// The engine (number 7) applies a force of 2 N. It then sends its last force and its release in the same period.
 Vec3 applied_after_release(bool again) {
   Handle handle;
   Pushed pushed(handle);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// This program is used by loop_proof_test.cc. It prints one line for each case. Callgrind counts within `step_in_turn`
+// This program is used by loop_proof_test.cc. A line is printed for each case. Callgrind counts within `step_in_turn`
 // and writes a file each time the function returns.
 #include <iostream>
 #include <memory>

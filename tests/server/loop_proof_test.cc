@@ -28,7 +28,7 @@ TEST_F(LoopProof, APointsStepIsNoSlowerAndAWholeHandleCostsTwoAndAHalf) {
             << " before there were handles), of a "
             << "handle that turns and grips " << handle << ": " << handle / point << " times as many; of a point "
             << "with three joints " << jointed << "\n";
-  EXPECT_LT(point, 0.9 * kBeforeHandles);  // the velocity estimate has become cheaper since then
+  EXPECT_LT(point, 0.9 * kBeforeHandles);  // because the velocity estimate is now cheaper
   EXPECT_GT(point, 0.5 * kBeforeHandles) << "this is no step";
   EXPECT_LT(handle, 2.6 * point);
   EXPECT_GT(handle, 1.5 * point) << "this is no handle";

@@ -27,7 +27,7 @@ struct Clock {
   }
 };
 
-/// One direction of the wire with the datagram in flight. After the handshake, there is never more than one.
+/// One direction of the wire and the datagram that is in flight. There can be only one after the handshake.
 struct Half {
   struct Datagram {
     std::array<std::byte, kMaxDatagram> bytes;
@@ -90,7 +90,7 @@ class Pair {
     state.force_age = std::chrono::milliseconds(7);
     state.mode = Mode::kActive;
     mail_->state.put();
-    // The first poll of each end finds nothing, and the second one finds a datagram.
+    // At each end, there is no datagram in the first poll, but there is one in the second poll.
     LocalTime at_client = clock_.now;
     LocalTime at_server = clock_.now;
     client_busy_.look(at_client);

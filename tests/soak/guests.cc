@@ -32,7 +32,7 @@ ForceClient::Config observer(const std::string& name) {
   return config;
 }
 
-/// Takes one turn, and then waits until the next turn is due or a datagram arrives, at most kLook.
+/// Takes one turn. It then waits until the next turn is due or until a datagram is received, but not longer than kLook.
 template <class Transport>
 void turn(ForceClient& client, Transport& transport) {
   const LocalTime due = client.turn(clock::now());

@@ -38,8 +38,8 @@ class Reconnecting {
   std::vector<std::thread> threads_;
 };
 
-/// A permanent observer that checks each state: all values are finite, the force is within the limiter's bound, and
-/// the energy account is below −1 nJ only after an overrun.
+/// A permanent observer that checks each state. All values must be finite, the force must be within the bound of the
+/// limiter, and the energy account may only be below −1 nJ after an overrun.
 class Watching {
  public:
   explicit Watching(const Address& server);

@@ -132,7 +132,7 @@ struct FakeAvahi::Peer {
 
   int browse(sd_bus_message* call) const {
     constexpr const char* kPath = "/Client0/ServiceBrowser1";
-    // Sends the first signals before the reply that contains the path, as Avahi may do.
+    // The first signals are sent before the reply that contains the path, because Avahi is allowed to do this.
     for (const auto& [name, service] : avahi->services_) {
       for (const int protocol : {0, 1}) {
         emit(bus, kPath, kBrowser, "ItemNew", "iisssu", 2, protocol, name.c_str(), "_tendon._udp", "local", 0U);

@@ -27,7 +27,7 @@ struct Makes {
   void operator()(const auto& config) const { [[maybe_unused]] const T made(config); }
 };
 
-/// One row of a table. `change` makes a valid configuration invalid, and the error message must contain `says`.
+/// One row of a table. A valid configuration is made invalid by `change`, and the error message must contain `says`.
 template <class Config>
 struct Spoiled {
   std::string_view says;

@@ -85,9 +85,9 @@ struct ShardEnd {
 /// Returns nullopt for lines other than {"unit":17,…}.
 std::optional<std::uint64_t> unit_of(std::string_view line);
 
-/// Runs `units` out of the units 0 to `all` − 1. `run` returns a unit's lines, each with '\n', and counts it; the
-/// digest covers these lines. Throws std::invalid_argument if the units do not exist, and std::runtime_error if `out`
-/// fails.
+/// Runs `units` out of the units 0 to `all` − 1. `run` must return the lines of a unit, each with '\n', and count the
+/// unit. The digest is computed from these lines. Throws std::invalid_argument if the units do not exist, and
+/// std::runtime_error if `out` fails.
 void write_shard(const Units& units, std::uint64_t all,
                  const std::function<std::string(std::uint64_t unit, ShardEnd& end)>& run, std::ostream& out);
 

@@ -81,7 +81,7 @@ TEST(View, AHandleInItsMiddleIsNotTurnedWhateverTheFrame) {
   }
 }
 
-/// Formats M·(x, y, z) as the README does: "(−z, −x, y)".
+/// Formats M·(x, y, z) in the same way as the README:
 std::string in_words(const Frame& frame) {
   std::string text = frame.per_metre == 1 ? "(" : std::to_string(std::lround(frame.per_metre)) + " (";
   for (Eigen::Index i = 0; i < 3; ++i) {

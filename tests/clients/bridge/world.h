@@ -18,8 +18,8 @@
 
 namespace tendon::bridge {
 
-/// A server with one of the shipped scenes and its bridges, in virtual time. The haptic loop runs at 1 kHz, and `delay`
-/// is the delay in each direction. Only the simulated device is random.
+/// A server and its bridges in virtual time, with one of the shipped scenes. The haptic loop is run at 1 kHz, and there
+/// is a delay of `delay` in each direction. Only the simulated device is random.
 class World {
  public:
   explicit World(const std::string& scene_file, const std::vector<std::string>& settings = {}, int delay_ms = 0)
@@ -29,7 +29,7 @@ class World {
   World(const World&) = delete;
   World& operator=(const World&) = delete;
 
-  /// Each BridgedDevice has two sessions, so the server sees two clients.
+  /// Each BridgedDevice uses two sessions, which are two clients for the server.
   BridgedDevice& add_bridged(BridgedDevice::Config config = {}) {
     config.new_seed = [this] {
       Seed seed;

@@ -42,7 +42,7 @@ class Network {
 
   void set(Weather weather) { weather_ = weather; }
   void send(LocalTime now, const Address& from, const Address& to, std::span<const std::byte> bytes);
-  /// Receives the next datagram for `to` that is due at `now`. Returns its size, or 0 if there is none.
+  /// Receives the next datagram for `to` that is due at `now`. Returns the size of the datagram, or 0 if there is none.
   std::size_t receive(LocalTime now, const Address& to, Address& from, std::span<std::byte> buffer);
   /// Drops the datagrams that arrived while there was no open socket.
   void drop_arrived(LocalTime now);

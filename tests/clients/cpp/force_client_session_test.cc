@@ -77,7 +77,7 @@ TEST(ForceClient, ConnectsAgainWhenTheServerHasRestarted) {
     world.run(3 * kSecond);
     ASSERT_EQ(world.a->phase(), Phase::kOpen) << "seed " << seed;
     world.restart_server();
-    // This allows for 2 s of silence, 100 ms of back-off, and a handshake.
+    // This includes 2 s of silence, 100 ms of back-off, and a handshake.
     world.run(4 * kSecond);
     EXPECT_EQ(world.a->phase(), Phase::kOpen) << "seed " << seed;
     EXPECT_EQ(world.a->stats().sessions, 2U) << "seed " << seed;

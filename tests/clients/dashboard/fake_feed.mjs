@@ -42,7 +42,7 @@ function stateOf(number, t) {
   return { ...plain, position_m: [0.03 * sway(1.4), 0.03 * sway(2.9), 0.02], applied_n: [0, 0, 0], wanted_n: [0, 0, 0] };
 }
 
-/** Returns the states of a device at ticks [from, to), one in `every`, in the columns of page_json.cc. */
+/** Returns the states of a device at ticks [from, to), but only one in `every`, in the format of page_json.cc. */
 export function statesMessage(number, from, to, every = 1) {
   const ticks = [];
   for (let tick = from; tick < to; tick += every) ticks.push(tick);

@@ -14,7 +14,7 @@
 #include "server/assembly.h"
 #include "tests/support/wire.h"
 
-// The operator, the observer and an engine with the server's loops and its safety layer, on virtual time.
+// The operator, the observer and an engine are used with the loops and the safety layer of the server, in virtual time.
 
 namespace tendon::dash::operator_test {
 namespace {

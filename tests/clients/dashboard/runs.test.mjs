@@ -146,7 +146,8 @@ it("opens a recording at its first instant, and says one number of steps", async
   assert.equal(await tile("state", "note"), `all ${steps} steps are shown`);
   assert.doesNotMatch(await tile("loss", "note"), /\d{3}/, "no third number of steps");
 
-  // At the end the server has stopped the force, and the energy account of the device without a limiter is negative.
+  // At the end, the server has set the force to zero. If there is no limiter, the energy account of the device is
+  // negative.
   const box = await page.locator("[data-chart=force] .u-over").boundingBox();
   await page.mouse.move(box.x + box.width - 2, box.y + 20);
   await until("the tiles tell of the end", async () => Number((await tile("energy", "name")).match(/at ([\d.]+)/)?.[1]) > 2.5);
@@ -183,7 +184,7 @@ it("shows the force by its components when the legend is told to", async (test) 
   await until("they are gone again", async () => (await keys()) === 3);
 });
 
-/** Writes a recording with `count` steps at 1 kHz. The steps of another recording are repeated. */
+/** Writes a recording with `count` steps at 1 kHz. This is done by repeating the steps of another recording. */
 async function lengthen(from, to, count) {
   const reader = new McapStreamReader();
   reader.append(readFileSync(from));

@@ -29,7 +29,7 @@ async function run(test: TestContext, ...options: readonly string[]) {
   const engine = new Program(test, process.execPath, [kBuilt, "--server", listen, "--json"]);
   assert.equal(await server.end(), 0);
   assert.equal(await engine.end("SIGINT"), 0);
-  await network.end("SIGINT"); // the exit code is not checked: on a busy machine the network is worse than requested
+  await network.end("SIGINT"); // it may fail, because the network is worse than requested if the machine is busy
   const { summary } = JSON.parse(engine.lines.find((line) => line.startsWith('{"summary"'))!);
   assert.ok(summary.forces > 100 && summary.forces_unusable === 0, JSON.stringify(summary));
   // torque and stiffness were sent

@@ -76,7 +76,7 @@ it("an arm in MuJoCo follows a far hand, is felt, and waits for the act", async 
     [scene("robot"), "--listen", address, "--record", recording, "--duration-s", "18.5", "--json"]);
 
   await engine.line(isPhase("clutched"));
-  for (let last = ""; last !== "engaged,clutched,engaged";) { // engaged by the button, then clutched and engaged again
+  for (let last = ""; last !== "engaged,clutched,engaged";) { // the button engages, clutches and engages again
     await new Promise((resolve) => setTimeout(resolve, 20));
     last = stretches(parsed(engine)).map(([first]) => first!.phase).slice(-3).join();
     assert.ok(!isPhase("lost")(engine.lines.at(-1)!), "the network was not yet cut");
@@ -106,8 +106,8 @@ it("an arm in MuJoCo follows a far hand, is felt, and waits for the act", async 
     assert.ok(apart(a.tool, b.tool) <= Math.min(allowed, 5e-3), `engaging moved the robot by ${apart(a.tool, b.tool)} m`);
   }
 
-  // The scale is one half. The hand rests for a second, 20 mm below where it engaged (the device's y is the robot's
-  // z).
+  // The scale is one half. The hand is at rest for one second, and is 20 mm below the position where it was engaged.
+  // (The y axis of the device is the z axis of the robot.)
   const start = following![0]!;
   const resting = following!.filter(({ hand, tool }) => Math.abs(hand.y + 0.02) < 0.002 && tool.z > 0.172);
   const settled = resting.slice(Math.floor(resting.length / 4), Math.floor(resting.length / 2)).at(-1)!;

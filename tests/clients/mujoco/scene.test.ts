@@ -20,7 +20,7 @@ const near = (actual: number, expected: number, tolerance: number, what = "") =>
   assert.ok(Math.abs(actual - expected) <= tolerance, `${what} expected ${expected} ± ${tolerance}, got ${actual}`);
 const kRigid = (inside: string, option = "") => `<mujoco><option timestep="0.001" ${option}/><worldbody>${inside}</worldbody></mujoco>`;
 
-/** A tilted plate in the hand. A weight of 0.2 kg rests on it by friction. */
+/** A tilted plate is held by the hand. A weight of 0.2 kg is on the plate, and is held by friction. */
 const kPlate = `<body name="tool" mocap="true" euler="8 10 20"><geom type="box" size="0.1 0.1 0.01" friction="0.7"/></body>
   <body name="weight" pos="0.004 -0.004 0.03" euler="8 10 20"><freejoint/><geom type="box" size="0.02 0.02 0.02" mass="0.2" friction="0.7"/></body>`;
 
@@ -164,14 +164,14 @@ describe("while it runs", () => {
     assert.match(limited.warnings.join(), /the tool lags/);
     near(limited.last, 7.39, 0.05, "at rest");
     assert.ok(limited.most < 2 * limited.last && limited.least >= 0, JSON.stringify(limited));
-    // Without the limit, the tool passes through the surface in one step. The surface then closes over the tool and
-    // pulls it down with 69 N.
+    // If there is no limit, the tool can pass through the surface in one step. The surface then closes over the tool,
+    // which is pulled down with 69 N.
     const free = await dive({ maxToolSpeed: 1e3 });
     assert.ok(free.lagging === 0 && free.least < -30, JSON.stringify(free));
   });
 
   it("a solution that MuJoCo loses gives no force, a warning and a restart", async (test) => {
-    // A spring of 1e9 N/m under an explicit integrator.
+    // A spring of 1e9 N/m, which is unstable with an explicit integrator.
     const { scene, warnings } = await load(test, kRigid(`
       <body name="tool" mocap="true" pos="0 0 0.1"><geom type="sphere" size="0.01"/></body>
       <body name="key"><joint type="slide" axis="0 0 1" stiffness="1e9"/><geom type="sphere" size="0.05" mass="0.1"/></body>`,

@@ -109,7 +109,8 @@ class Server(Process):
         keys: Path | None = None,
         scenes: Mapping[str, str] | None = None,
     ) -> None:
-        """With `keys`, a folder of key files, only their owners can connect. `scenes` maps device names to scenes."""
+        """If `keys` is set, it is a folder of key files, and only clients with one of these keys can connect. `scenes`
+        maps device names to scenes."""
         if scenes is None:
             text = scene("demo")
             if keys is not None:
@@ -132,7 +133,7 @@ def example(folder: Path, name: str, *arguments: str | Path) -> Process:
 
 
 def said_by_example(name: str, *arguments: str) -> tuple[int, str, str]:
-    """Returns exit code, stdout and stderr of an example that ends at once.
+    """Runs an example that ends immediately. Returns the exit code and the contents of stdout and stderr.
 
     It runs in this process, because a new process needs a third of a second to import the package.
     """

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A server for one client that does no I/O. It performs the handshake in either suite and keeps one Session."""
+"""A server for one client that does not do any I/O. It can perform the handshake in either suite, and has a single
+Session."""
 
 from __future__ import annotations
 

@@ -21,8 +21,8 @@ def hand(tick: int, x: float, buttons: int) -> DeviceState:
 
 
 def write(path: Path) -> None:
-    """Writes 3 s at 100 Hz. The robot is engaged from 0.5 s to 1.5 s, clutched until 2 s, and then engaged again. The
-    tool is always at its target.
+    """Writes 3 s at 100 Hz. The phase is engaged from 0.5 s to 1.5 s, clutched until 2 s, and engaged until the end.
+    The tool is always at its target.
     """
     follow = Follower(FollowerConfig(scale=0.5, clutch_button=0, rate_hz=100))
     tool = [0.25, 0.0, 0.125]

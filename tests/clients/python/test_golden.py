@@ -365,7 +365,7 @@ def test_a_datagram_of_1200_bytes_is_read_and_none_of_1201():
 
 
 def out_of_bounds():
-    """Yields frames with one value out of bounds, by the name of the violation."""
+    """Yields frames in which one value is out of bounds. The key is the name of the violation."""
 
     def state(**changes):
         values = {name: getattr(STATE, name) for name in DeviceState.__slots__}

@@ -74,7 +74,8 @@ def test_a_flood_of_reports_does_not_keep_it_from_sending():
 
 
 def test_a_datagram_found_late_in_a_turn_is_not_taken_for_older(monkeypatch):
-    """If the process is preempted within a turn, an old receive time would make the round trip too short."""
+    """If the process is preempted within a turn, the round trip must not be too short because of an old receive
+    time."""
     it = guest(b"one", b"two")
     times = iter([2, 9])
     it.clock = lambda: next(times)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests cipher suites 1 and 2 with both roles in Python. The public vectors are in test_vectors.py."""
+"""Tests cipher suites 1 and 2. Both roles are implemented in Python. The public vectors are in test_vectors.py."""
 
 
 import pytest

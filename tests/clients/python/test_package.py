@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The package as users install it: generated code, types, wheel, examples and README."""
+"""Tests the package as it is installed by users: generated code, types, wheel, examples and README."""
 
 import os
 import re

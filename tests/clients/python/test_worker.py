@@ -53,7 +53,7 @@ def proxy(request, tmp_path, monkeypatch):
 
 
 class Running(threading.Thread):
-    """Runs run() in a thread. `end()` returns the exception that was raised, or None."""
+    """Runs run() in a thread. Use `end()` to get the exception that was raised, or None."""
 
     def __init__(self, answer, comm=None):
         super().__init__(daemon=True)

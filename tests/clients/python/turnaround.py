@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Measures the time from a state to the force that answers it, from socket to socket on loopback. The clients run one
-after another against the same stand-in server, which sends states at 1 kHz. The floor is a program in the same language
-that answers each datagram with a datagram of the same size and does nothing else. `to_floor` is the median of a client
+"""Measures the time from a state to the force that answers it, from socket to socket on loopback. Each of the clients
+is connected to the same stand-in server, which sends states at 1 kHz. The floor is a program in the same language that
+answers each datagram with a datagram of the same size and does nothing else. `to_floor` is the median of a client
 divided by that of its floor. `answered` is the share of states that were answered, and `core_share` is the CPU time of
 the client, including its start, as a share of one core."""
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A client, a server and a bad network in virtual time. The time is always advanced to the next event."""
+"""Simulates a client, a server and a bad network in virtual time. The time is always advanced to the next event."""
 
 from __future__ import annotations
 

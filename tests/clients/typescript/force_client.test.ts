@@ -469,7 +469,7 @@ describe("an impossible configuration", () => {
 
 describe("what need not be sent", () => {
   const stateDeadband = { share: 0.1, floor: 1e-3, maxSilenceUs: 20_000 };
-  /** The hand moves at 0.1 m/s, and one tick in `every` is sent. */
+  /** The speed of the hand is 0.1 m/s, and one tick in `every` is sent to the client. */
   const moving = (every: bigint): Partial<ServerConduct> => ({
     every,
     state: (tick) => ({

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // node turnaround.mjs RECORDING FOXGLOVE_CHECK
 //
-// Prints for each client in a recording of tendond the time from sending a state to the arrival of the force that
-// answers it, on the server's clock. FOXGLOVE_CHECK is build/<preset>/foxglove_check, whose packages read MCAP.
+// Reads a recording of tendond. For each client, it prints the time from sending a state until the force that answers
+// it has arrived, on the clock of the server. FOXGLOVE_CHECK is build/<preset>/foxglove_check, which contains the
+// packages that are used to read MCAP.
 import { readFile } from "node:fs/promises";
 import { createRequire } from "node:module";
 import { resolve } from "node:path";

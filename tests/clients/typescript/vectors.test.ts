@@ -116,7 +116,7 @@ for (const file of ["plain.json", "sealed.json", ...(kHasAes ? ["sealed_aes.json
       });
     }
 
-    /** Returns the seal that closes the vector's datagram and the one that opens it. */
+    /** Returns the seal that is used to close the datagram of the vector, and the one that is used to open it. */
     function seals(vector: DataVector): [Seal, Seal] {
       if (!key) return [new PlainSeal(), new PlainSeal()];
       const first = fromHex(vectors.welcome[`${vector.direction}_key`]);

@@ -78,7 +78,7 @@ TEST(PortableMath, TheExponentialsAreTheirSeriesToTheLastBit) {
     same(x);
     same(-x);
   }
-  for (int k = -1000; k < 1000; ++k) {  // halfway between two powers of two
+  for (int k = -1000; k < 1000; ++k) {  // halfway between two adjacent powers of two
     double x = (k + 0.5) * std::numbers::ln2;
     for (int i = 0; i < 4; ++i) x = std::nextafter(x, -kInfinity);
     for (int i = 0; i < 9; ++i, x = std::nextafter(x, kInfinity)) same(x);

@@ -151,7 +151,7 @@ Outcome run(Dice& dice, const Case<Blocks, Size>& c, int steps) {
     outcome.over_credit = std::max(outcome.over_credit, law.spendable() - energy);
 
     if (c.config.parts.adaptive_friction && dice.chance(0.02)) {
-      for (std::size_t i = 0; i < Blocks; ++i) {  // the true friction varies, and the law gets a lower bound
+      for (std::size_t i = 0; i < Blocks; ++i) {  // the true friction varies, but the law only knows a lower bound
         friction[i] = {c.config.friction[i].coulomb * dice.within(0.2, 1),
                        c.config.friction[i].viscous * dice.within(0.2, 1)};
       }
@@ -279,7 +279,7 @@ TEST(AolPlus, AfterAnIntervalThatIsNoNumberThePlainBoundHolds) {
   EXPECT_EQ(law.limit(push).permitted, plain.limit(push).permitted);
 }
 
-/// Moves the handle in free space for 30 s, at 4 Hz and with an amplitude of 30 mm.
+/// Moves the handle in free space for 30 s. The frequency is 4 Hz, and the amplitude is 30 mm.
 template <class Law>
 void wave(Law& law) {
   double x = 0;

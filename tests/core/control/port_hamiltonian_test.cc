@@ -15,7 +15,8 @@ using std::chrono::milliseconds;
 
 constexpr Friction kFriction{0.05, 0.26};
 
-// Returns the depth (m) of the hand in a wall at 0 while it presses and releases with tremor.
+// Returns the depth (m) of the hand in a wall that is at 0. The hand is pressed into the wall and released again, with
+// tremor.
 double depth(int step) {
   const double t = step * 1e-3;
   return std::abs(8e-3 * std::sin(3 * t) + 2e-3 * std::sin(17 * t) + 1e-4 * std::sin(190 * t));

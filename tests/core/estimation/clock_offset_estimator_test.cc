@@ -37,7 +37,8 @@ struct Hosts {
   }
 };
 
-/// A bad Wi-Fi network: the delay is just above 1 ms, but one in 14 datagrams is in a stall with a long tail.
+/// This is a bad Wi-Fi network. The delay is usually just above 1 ms, but one in 14 datagrams is in a stall with a long
+/// tail.
 Duration wifi(Dice& dice) {
   const double little = -0.15e-3 * std::log(1 - dice.uniform());
   const double stall = dice.chance(0.07) ? 4e-3 / (1 - dice.uniform()) : 0;
@@ -118,7 +119,7 @@ TEST(ClockOffsetEstimator, FollowsADriftThatAMinimumAloneWouldFallBehind) {
   Dice dice(1);
   ClockOffsetEstimator estimator;
   for (int i = 0; i < 600; ++i) estimator.observe(hosts.exchange(kStart + milliseconds(200) * i, dice));
-  const LocalTime later = kStart + std::chrono::seconds(130);  // 10 s after the last exchange: 1 ms of drift
+  const LocalTime later = kStart + std::chrono::seconds(130);  // after 10 s, the drift is 1 ms
   const auto estimate = estimator.estimate(later);
   ASSERT_TRUE(estimate);
   EXPECT_NEAR(estimate->drift, 100e-6, 1e-6);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A longer version of the tests RecursiveLeastSquares.*StaysDefinite*: `nice definiteness_soak 100000000 --json`. The
-// result is in tests/tools/bench/RESULTS.md.
+// This is a longer version of RecursiveLeastSquares.*StaysDefinite*. Use `nice definiteness_soak 100000000 --json` to
+// run it. The result is in tests/tools/bench/RESULTS.md.
 //
 // Feeds nearly collinear regressors (s, s + 1e-4 r, 1), forgetting 0.999, p0 = 1e6, to the UD and the QR form in
 // float32 and float64. After every step every D of P = U D Uᵀ must be positive (1/R² for the QR form), no sample

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// For every motion and every demand, the common account of force and torque and the account of the gripper must not be
-// negative. Both are recomputed from the equations and the true motion.
+// The common account of force and torque and the account of the gripper must not be negative for any motion and any
+// demand. The test computes both of them again from the equations and the true motion.
 #include <gtest/gtest.h>
 #include <rapidcheck.h>
 

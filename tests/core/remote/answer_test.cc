@@ -31,7 +31,7 @@ ForceTable table(double first, double step, std::initializer_list<double> force)
   return made;
 }
 
-/// The table contains the forces for depths from 1 mm above the surface to 7 mm below it, in steps of 1 mm.
+/// The table contains the force for each depth from 1 mm above the surface to 7 mm below the surface, in steps of 1 mm.
 RemoteForce with_table() {
   RemoteForce answer = pressed();
   answer.model->contact = Contact{

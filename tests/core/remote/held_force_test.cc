@@ -119,7 +119,7 @@ TEST(HeldForce, FollowsTheHandWithTheLocalModel) {
   RemoteForce remote = force_at(Duration::zero(), Vec3(-1, 0, 0));
   remote.model = LocalModel{Vec3(0.01, 0, 0), Vec3(100, 0, 0).asDiagonal()};
   held.observe(remote);
-  // The position is 10 mm deeper than in the model. With 100 N/m this adds 1 N along −x.
+  // The position is 10 mm deeper than in the model. If the stiffness is 100 N/m, this is an additional 1 N along −x.
   EXPECT_NEAR((held.wanted(at(milliseconds(1), Vec3(0.02, 0.5, 0))).force - Vec3(-2, 0, 0)).norm(), 0, 1e-12);
 }
 

@@ -32,7 +32,7 @@ RemoteForce answer_to(LocalTime motion, const Vec3& force) {
   return answer;
 }
 
-/// The position of the hand (m): 12 mm at 0.7 Hz plus 3 mm at 2.3 Hz.
+/// Returns the position of the hand (m), which is the sum of 12 mm at 0.7 Hz and 3 mm at 2.3 Hz.
 double hand(int k) {
   const double t = k * 1e-3;
   return 0.012 * std::sin(2 * std::numbers::pi * 0.7 * t) + 0.003 * std::sin(2 * std::numbers::pi * 2.3 * t);
@@ -240,8 +240,8 @@ TEST(OutputEstimator, CooldownEndsConstantResettingWhenTheModelCannotFit) {
 }
 
 TEST(OutputEstimator, AnOutputRecursiveModelRunsAwayOnlyWithAFreePole) {
-  // This is the same least-squares estimator, but with a free pole. It is run at 1 kHz, and the answers arrive at 25
-  // Hz.
+  // This is the same least-squares estimator, but with a free pole. It is used at 1 kHz, although the answers arrive at
+  // 25 Hz.
   UdLeastSquares<2> raw({.forgetting = 0.95, .prior_variance = 1e8});
   std::vector<double> output(kSteps, 0.0);
   double largest_raw = 0;

@@ -188,7 +188,7 @@ TEST(FalconDevice, WhatIsReturnedIsWhatTheMotorsGive) {
     const Vec3 wanted = dice.within(0, 40) * dice.direction();
     bench.run(5ms, wanted);
     ASSERT_TRUE(bench.sample);
-    // The driver knows the position to one count, so the force has an error of a few thousandths.
+    // The position is only known to one count, so the force may be wrong by a few thousandths.
     ASSERT_LT((bench.written - bench.falcon.force()).norm(), 0.01 * bench.written.norm() + 1e-3);
     ASSERT_LE(bench.written.norm(), wanted.norm() + 0.005);  // each torque is rounded separately
     ASSERT_GT(bench.written.normalized().dot(wanted.normalized()), 0.99);

@@ -71,8 +71,8 @@ TEST(FalconKinematics, TheJacobianIsTheDerivativeOfTheAngles) {
   EXPECT_LE(worst, 1e-8);  // rad/m; the values are about 20
 }
 
-// It has sin² θ₂ instead of sin θ₂ sin θ₃: 60 to 94 % of the true value within the ball of 50 mm, so a force along z
-// has a lateral error of one third or more.
+// It uses sin² θ₂ instead of sin θ₂ sin θ₃. This is 60 to 94 % of the true value within the ball of 50 mm, so that a
+// force along z has a lateral error of one third or more.
 TEST(FalconKinematics, TheZColumnOfThePublicDriverIsTooSmallByUpTo40Percent) {
   Dice dice(5);
   double least = 1;

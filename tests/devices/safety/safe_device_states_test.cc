@@ -208,8 +208,8 @@ TEST(SafeDevice, DisarmedInAnyStateItGivesNoForceUntilTheOperatorArms) {
         ASSERT_EQ(rig.step(kPush), Vec3::Zero());
         ASSERT_EQ(rig.puppet.told, Vec3::Zero());
       }
-      // If there is no request, the device must not be armed when it is at rest, when the button is pressed, or when it
-      // is plugged in again.
+      // The device must not be armed without a request, even if it is at rest, if the button is pressed, or if it is
+      // plugged in again.
       for (const Device::State stage : {Device::State::kAbsent, Device::State::kHomed}) {
         rig.puppet.stage = stage;
         rig.steps(200);

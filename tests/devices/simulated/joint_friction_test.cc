@@ -102,8 +102,9 @@ TEST(JointFriction, BrakesAHandleThatTurnsOneJointAsTheClosedFormSays) {
 }
 
 TEST(JointFriction, TurnsRoundWithoutAPauseUnderAForceThatItCannotHold) {
-  // Friction stops the joint, and then the force reverses it. For the rest of the 50 µs substep in which this happens,
-  // friction may have the wrong sign. A pause of that length would cost 2.5 mm/s.
+  // The joint is stopped by friction, and then its motion is reversed by the force. For the rest of the 50 µs substep
+  // in which this happens, friction may have the wrong sign. If the joint stopped for that long, this would cost 2.5
+  // mm/s.
   const Vec3 torques(0.02, 0.02, 0.02);
   for (const Mechanism::Kind& kind : all_kinds()) {
     for (Eigen::Index joint = 0; joint < 3; ++joint) {

@@ -129,7 +129,7 @@ TEST(SimulatedDeviceEnergy, HandAndWallsNeverDoLessWorkThanEquation5Demands) {
 }
 
 TEST(SimulatedDeviceEnergy, NothingIsLostWhereNothingRubs) {
-  // The result is exact without friction, also for a hand with mass and a stiff grip.
+  // If there is no friction, the result is exact, even if the hand has a mass and a stiff grip.
   SimulatedDevice::Config config;
   config.mass = 0.075;
   config.start_velocity = {0.1, -0.2, 0.3};

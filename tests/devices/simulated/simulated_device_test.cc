@@ -178,8 +178,8 @@ TEST(CoulombFriction, HoldsAgainstAForceThatBrakedTheDeviceToAStop) {
 }
 
 TEST(CoulombFriction, TurnsRoundWithoutAPauseUnderAForceThatItCannotHold) {
-  // First, F + f_c stops the handle, and then F − f_c reverses it. For the rest of the 50 µs substep in which this
-  // happens, friction may have the wrong sign. A pause of that length would cost 3 mm/s.
+  // The handle is stopped by F + f_c, and then its motion is reversed by F − f_c. For the rest of the 50 µs substep in
+  // which this happens, friction may have the wrong sign. If the handle stopped for that long, this would cost 3 mm/s.
   const double m = 0.075;
   const double error = 2 * 0.04 / m * seconds(SimulatedDevice::Config{}.max_substep);
   for (const double v0 : {0.1, 0.1003, 0.1011, 0.1017, 0.1026}) {
@@ -329,7 +329,7 @@ TEST(Amplifier, FollowsAStepAsAFirstOrderLag) {
   for (int i = 1; i <= 50; ++i) {
     bench.wait(100us);
     const double t = 1e-4 * i;
-    // The impulse is exact. The force is the average over the last 50 µs.
+    // The impulse is exact. The force is the mean value over the last 50 µs.
     ASSERT_NEAR(bench.truth().velocity.x(), 2 / m * (t - tau * (1 - std::exp(-t / tau))), 1e-13);
     ASSERT_NEAR(bench.truth().device_force.x(), 2 * (1 - std::exp(-(t - 25e-6) / tau)), 2e-3);
   }

@@ -166,8 +166,8 @@ Eigen::MatrixXd exponential(const Eigen::MatrixXd& exponent) {
   return result;
 }
 
-/// Returns the spectral radius of one period. The forces of a spring and a damper are sampled and held for 1 ms. The
-/// states are y, x, ẏ, v and the previous y.
+/// Returns the spectral radius of one period of 1 ms. The force of the spring and the damper is sampled at the start of
+/// the period and does not change. The states are y, x, ẏ, v and the previous y.
 double spectral_radius(const SimulatedDevice::Config& config, double stiffness, double damping) {
   const auto& mode = *config.structural_mode;
   const double b = *config.viscous_friction;

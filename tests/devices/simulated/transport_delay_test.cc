@@ -42,8 +42,8 @@ TEST(TransportDelay, ASampleIsThatOfTheInstantThatItSays) {
 }
 
 TEST(TransportDelay, AForceActsFromItsDelayUntilTheDelayOfTheNext) {
-  // A force of 2 N is applied for 1 ms, which is an impulse of 2 mN·s for every delay. The position shows when it was
-  // applied.
+  // The force is 2 N for 1 ms, so the impulse is 2 mN·s for every delay. The position shows the time at which the force
+  // was applied.
   for (const Duration delay : {Duration(1ns), Duration(999'999ns), Duration(300us), Duration(1ms), Duration(1'700us),
                                Duration(2ms), Duration(12'345'678ns)}) {
     Bench bench(free_mass(std::nullopt, delay));

@@ -12,8 +12,8 @@
 
 namespace tendon {
 
-/// A report waits until it is read and is lost if the cable is unplugged. The descriptors are those of an HID device
-/// with one interrupt endpoint, which is what the driver expects. They were not compared with a real device.
+/// A report waits until it is read, but it is lost if the cable is unplugged. The descriptors are those of an HID
+/// device that has one interrupt endpoint, as the driver expects. They were not compared with a real device.
 class FakeSpaceMouse final : public UsbModel {
  public:
   bool split = false;                  ///< translation and rotation in two reports

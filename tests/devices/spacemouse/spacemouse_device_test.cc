@@ -48,7 +48,7 @@ class MousePipe final : public usb::Pipe {
 struct Bench {
   explicit Bench(const SpaceMouseDevice::Config& config = {}) : device(config, std::make_unique<MousePipe>(mouse)) {}
 
-  /// Holds the cap at `cap` for `time`. There is a report every 16 ms and a read every millisecond.
+  /// Holds the cap at `cap` for `time`. There is a report every 16 ms, and the device is read every millisecond.
   void hold(const Axes& cap, Duration time) {
     for (Duration t{}; t < time; t += 1ms) {
       if (t % 16ms == Duration::zero()) mouse.push(cap);
@@ -94,7 +94,7 @@ TEST(SpaceMouseDevice, RightIsXLiftedIsYTowardsTheUserIsZ) {
 }
 
 TEST(SpaceMouseDevice, ATwistTurnsItAboutTheAxisThatTheOperatorSees) {
-  const Vec3 axes[] = {{1, 0, 0}, {0, 0, 1}, {0, -1, 0}};  // Rx, Ry, Rz: right, towards the user, down
+  const Vec3 axes[] = {{1, 0, 0}, {0, 0, 1}, {0, -1, 0}};  // about the axes right, towards the user, down
   for (const bool split : {false, true}) {
     for (std::size_t i = 0; i < 3; ++i) {
       Bench bench({.dead_band = 0.1, .turn_speed = 0.5});

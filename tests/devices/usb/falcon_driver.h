@@ -60,7 +60,7 @@ struct FalconDriver {
   }
 
   FalconDevice device;
-  Device* turned = &device;  ///< or the wrapper of the device
+  Device* turned = &device;  ///< the device, or a wrapper
   std::optional<PositionSample> sample;
   Vec3 written = Vec3::Zero();
   std::chrono::steady_clock::time_point due = std::chrono::steady_clock::now();

@@ -18,8 +18,8 @@
 
 namespace tendon {
 
-/// A FakeFalcon of this process in real time, which the real libusb of *another* process finds when started with
-/// `environment()`: an unmodified tendond.
+/// A FakeFalcon in this process that can be used by the real libusb of *another* process, for example an unmodified
+/// tendond, if that process is started with `environment()`. It runs in real time.
 ///
 ///     tendond ── libusb ── far_usbfs (preloaded) ══ cable: a socket ══ FarFalcon, a FakeFalcon and the hand on it
 ///        └ guardian ──────── the node: a pty, of which FarFalcon has the master end ─┘

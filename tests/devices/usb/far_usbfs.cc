@@ -44,7 +44,7 @@ int connect_to_falcon() {
   return cable;
 }
 
-/// Receives the node and its descriptors. A negative value means that nothing is plugged in.
+/// Receives the node and its descriptors. If the result is negative, nothing is plugged in.
 int take_node(int cable, std::vector<std::uint8_t>& descriptors) {
   descriptors.resize(1024);
   iovec part{.iov_base = descriptors.data(), .iov_len = descriptors.size()};

@@ -30,7 +30,7 @@ class MockUsb {
   std::unique_ptr<Testbed> testbed_;
 };
 
-/// One port of the machine and its device model, in real time. Thread-safe.
+/// A port of the machine and the model of its device, in real time. Thread-safe.
 class MockPort {
  public:
   /// Creates port `number` of bus 1, which must be from 1 to 9. There is no device in the port. `usb` and `model` must
@@ -42,7 +42,8 @@ class MockPort {
 
   /// Uses a new address each time, like the kernel.
   void plug();
-  /// As with the kernel, the transfers end, the node fails, the device leaves sysfs, and udev sends an event.
+  /// This is the same as with the kernel: the transfers end, the node fails, the device is removed from sysfs, and udev
+  /// sends an event.
   void unplug();
 
   std::string node() const;       ///< of the plugged device: "/dev/bus/usb/001/002"

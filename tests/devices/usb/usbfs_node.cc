@@ -23,8 +23,8 @@ int refuse(int error) {
   return -1;
 }
 
-/// A guardian only has the inherited node. What it writes is sent to the master end, together with the endpoint and the
-/// size.
+/// A guardian can only use the inherited node. The data that is written to it is sent to the master end, together with
+/// the endpoint and the size.
 int bulk_through(int file, const usbdevfs_bulktransfer& transfer) {
   std::array<std::uint8_t, 66> frame{};
   if (transfer.len > frame.size() - 2) return refuse(EINVAL);

@@ -55,7 +55,8 @@ class UsbfsNode {
   /// Called when libusb has called poll, but no transfer has ended.
   virtual void look() {}
 
-  // For the derived class, with mutex_ held. Takes ownership of the slave end and closes the previous one.
+  // Must be called by the derived class while mutex_ is held. It takes ownership of the slave end and closes the
+  // previous one.
   void set_file(int slave);
   int file() const { return file_; }
   void finish(usbdevfs_urb* urb, int status, int size);

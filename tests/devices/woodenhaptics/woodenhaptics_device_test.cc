@@ -41,7 +41,8 @@ TEST(WoodenHapticsDevice, FromThePlugToTheForceItTakesEveryStep) {
     ASSERT_TRUE(bench.sample);
     EXPECT_LT(bench.sample->position.norm(), 2 * bench.device.info().position_resolution);
     EXPECT_TRUE(bench.arm.pushes());
-    // This excludes errors of sign and scale. One count per joint changes the force by a few thousandths.
+    // This excludes errors of sign and scale. If a joint is wrong by one count, the force is wrong by a few
+    // thousandths.
     EXPECT_LT((bench.arm.force() - bench.written).norm(), 0.01 * bench.written.norm());
     EXPECT_GT(bench.written.normalized().dot(kForce.normalized()), 0.999);
   }
@@ -125,7 +126,7 @@ TEST(WoodenHapticsDevice, JointsCarryTheTipAndTurnAsItMoves) {
   }
 }
 
-// The counter has 16 bits per revolution of the body. The arm rotates by two and a half revolutions.
+// The counter has 16 bits per revolution of the body. The arm is rotated by two and a half revolutions.
 TEST(WoodenHapticsDevice, CountersThatWrapAreFollowed) {
   for (const double turns : {2.5, -2.5}) {
     Bench bench;

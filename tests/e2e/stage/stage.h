@@ -18,8 +18,8 @@ std::filesystem::path program(const std::string& name);
 
 std::filesystem::path demo_scene();
 
-/// In this scene, the hand moves into the wall and stays there. The times for which forces are held and faded are
-/// longer than the pauses of a machine, so that every stage of the age policy is used.
+/// In this scene, the hand is moved into the wall and is then held there. The forces are held and faded over a longer
+/// time than the pauses of a machine, so that every stage of the age policy is tested.
 inline constexpr std::string_view kPressingHand = R"([device]
 kind = "simulated"
 profile = "falcon"
@@ -43,13 +43,15 @@ safe_stop_ms = 1000
 /// Returns the path for a command line.
 std::string write(const std::filesystem::path& file, std::string_view text);
 
-/// Returns the number, or the first number of the array, for `key`. Throws std::runtime_error if it does not exist.
+/// Returns the number for `key`. If the value is an array, this is its first number. Throws std::runtime_error if it
+/// does not exist.
 double number_in(std::string_view json, const std::string& key);
 std::uint64_t count_in(std::string_view json, const std::string& key);
 /// The text must not contain escapes.
 std::string text_in(std::string_view json, const std::string& key);
 
-/// A program that prints its address because it uses port 0. It exits after two minutes in case the test is killed.
+/// A program that prints its address because it uses port 0. If the test is killed, the program exits after two
+/// minutes.
 class Service {
  public:
   /// The address is `key` of the JSON event `event`.
@@ -59,7 +61,7 @@ class Service {
   const std::string& address() const noexcept { return address_; }
   Process& process() noexcept { return process_; }
 
-  /// Returns the last line of stdout. Throws std::runtime_error for any other exit code.
+  /// Returns the last line of stdout. Throws std::runtime_error if the exit code is different.
   std::string stop(int signal = SIGTERM, int exit_code = 0);
 
  private:
@@ -96,9 +98,9 @@ struct Recording {
 };
 Recording read_recording(const std::filesystem::path& file);
 
-/// Checks a recording with the limiter on: steps are consecutive, no force exceeds the bound, and the ledger stays
-/// above −1 nJ. After an overrun, it must not decrease until the next one, and forces must not exceed the limiter's
-/// Coulomb friction.
+/// Checks a recording for which the limiter was used: steps must be consecutive, no force may exceed the bound, and the
+/// ledger must be above −1 nJ. After an overrun, it must not decrease until the next one, and forces must not exceed
+/// the limiter's Coulomb friction.
 void expect_passive(const Recording& recording, const Scene& scene);
 
 }  // namespace tendon::e2e

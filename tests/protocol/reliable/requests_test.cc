@@ -11,7 +11,8 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-// After a slow link, the timeout can be many seconds. On a fast link, this would be the wait if the next copy is lost.
+// If the link was slow, the timeout can be many seconds. If the link is fast again and the next copy is lost, this
+// would be the time to wait.
 TEST(OutgoingRequests, AreSentAgainWithinASecondHoweverSlowTheLink) {
   for (const Duration timeout : {Duration(milliseconds(20)), Duration(seconds(1)), Duration(seconds(12))}) {
     OutgoingRequests requests;

@@ -93,7 +93,7 @@ TEST_F(Noise, AnotherKeyOrAnotherPrologueDoesNotOpen) {
 TEST_F(Noise, OneWhoKnowsTheKeyButNotTheEphemeralOnesCannotReadTheAnswer) {
   const auto z = NoiseResponder::read(psk_, prologue_, a_.message());
   const Bytes reply = z->reply(random_.next(), text("welcome"))->message;
-  // The attacker has recorded everything and knows the key, but has a different ephemeral key.
+  // The attacker knows the key and has recorded everything, but its ephemeral key is different.
   const NoiseInitiator thief(psk_, random_.next(), prologue_, text("hello"));
   EXPECT_FALSE(thief.read(reply).has_value());
 }

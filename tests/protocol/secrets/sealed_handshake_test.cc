@@ -240,7 +240,7 @@ TEST_F(SealedHandshake, NoReplyIsEverLongerThanWhatItAnswers) {
   }
 }
 
-const Suites kOld = {Suite::kNoise};  ///< the peer does not support suite 2, or has no hardware support for AES
+const Suites kOld = {Suite::kNoise};  ///< a peer that does not support suite 2, or has no hardware for AES
 const Suites kNew = all_suites();
 const Suites kAesOnly = {Suite::kAesGcm};
 

@@ -295,8 +295,8 @@ class Maker {
     for (const int size : bound.too_few_or_many) resized(size, false);
   }
 
-  /// Adds zeros, letters or copies of the last entry. The devices in claims and grants differ. A new frame is empty,
-  /// like a frame from a newer peer.
+  /// The new entries are zeros, letters or copies of the last entry. The devices in claims and grants must be
+  /// different. A new frame is empty, like a frame from a newer peer.
   static void resize(Message& message, const FieldDescriptor& field, int size) {
     const auto& reflection = *message.GetReflection();
     while (reflection.FieldSize(message, &field) > size) reflection.RemoveLast(&message, &field);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// This program is used by codec_proof_test.cc. It writes and reads a state, a force, and 16 states in columns, with our
-// codec and with libprotobuf, and prints one line for each. Callgrind counts within `in_turn` and writes a file each
-// time the function returns.
+// This program is used by codec_proof_test.cc. A state, a force, and 16 states in columns are written and read with our
+// codec and with libprotobuf. One line is printed for each of them. Callgrind counts within `in_turn` and writes a file
+// each time the function returns.
 #include <array>
 #include <cstdlib>
 #include <iostream>

@@ -19,7 +19,7 @@ namespace {
 
 using examples::data;
 
-/// Expects that `field` makes the request invalid, and that the state after the request is still read.
+/// The request must be invalid because of `field`, and the state after it must still be read.
 void expect_refused(const Request& request, std::string_view field) {
   SCOPED_TRACE(field);
   DataReader reader;

@@ -238,7 +238,7 @@ std::string plain_file() {
          "\n";
 }
 
-/// The server's answer to one Noise message 1, and the keys of `suite` after it.
+/// The answer of the server to a Noise message 1, and the keys of `suite` that can be used after it.
 struct Answered {
   std::string json;
   NoiseSplit split;
@@ -282,7 +282,7 @@ Key renewed(Suite suite, const Key& key) {
   return suite == Suite::kAesGcm ? crypto::AesGcm(key).renewed() : crypto::renewed(key);
 }
 
-/// Returns the example with the token of suite 2. A client adds the token at the end, and a server adds it at the
+/// Returns the example with the token of suite 2. The client adds it at the end, and the server adds it at the
 /// beginning.
 Hello offering(Suite suite) {
   Hello hello = examples::hello();

@@ -98,7 +98,7 @@ def debian_has_the_packages():
 
 @functools.lru_cache(maxsize=None)
 def wrong_python(line, root):
-    """Returns the error in a command that starts a Python program. The result is empty if there is none."""
+    """Returns the error in a command that starts a Python program, or an empty string if there is none."""
     named = [word for word in line if re.match(r"^(clients|tests|deploy)/.*\.py$", word)]
     if not named:
         return WHOSE if len(line) > 1 and line[0] in ("python", "python3", "pip") and "venv" not in line else ""
@@ -134,7 +134,7 @@ def left_out(build):
 
 
 def wrong(command, root, folders):
-    """Returns the error in a command of this project. The result is empty if there is none."""
+    """Returns the error in a command of this project, or an empty string if there is none."""
     found = words(command)
     if not found:
         return ""

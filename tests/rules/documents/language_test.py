@@ -35,7 +35,7 @@ CLEFT = re.compile(
 
 
 def paragraphs(path, text):
-    """Yields (line, text) of each paragraph of a page, or of each comment of a source."""
+    """Yields (line, text) for each paragraph of a page, or for each comment of a source."""
     lines = text.split("\n")
     if path.endswith(".md"):
         at = 1

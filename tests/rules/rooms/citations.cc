@@ -22,7 +22,8 @@ const Names kPagesElsewhere = {"docs/spec.md"};
 
 constexpr std::string_view kProofs = "core/PROOFS.md";
 
-/// Returns the text of a page, or the comments of a source without their marks, at the same lines and columns.
+/// Returns the text of a page, or the comments of a source. The comment marks are removed, but lines and columns do not
+/// change.
 std::string prose_of(const File& file) {
   const std::string_view text = file.text;
   if (file.path.ends_with(".md")) {

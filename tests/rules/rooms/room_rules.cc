@@ -131,7 +131,7 @@ const Names kSharedWithAThread = {"clients/softbody/near/near_model.cc", "client
 const Names kClockReaders = {
     "server/machine/clock.h", "server/machine/clock.cc", "server/machine/log.cc", "server/server.cc",
     "server/machine/udp_link.cc", "clients/cpp/machine.h", "clients/cpp/machine.cc",
-    // runs in the process of another program, whose threads call it
+    // this runs in the process of another program and is called by its threads
     "clients/bridge/chai3d/hd_phantom.cc", "clients/softbody/softbody_main.cc", "tests/clients/softbody/bench.cc",
     "tests/clients/softbody/bullet_block.cc", "tests/tools/bench/", "tests/e2e/", "tests/realtime/", "tests/soak/",
     "tests/devices/usb/", "tests/core/base/time_test.cc", "tests/tools/lab/experiments/meter.cc",

@@ -15,7 +15,8 @@ using Names = std::vector<std::string_view>;
 
 inline const Names kRoomFolders = {"clients", "core", "deploy", "devices", "protocol", "server", "tests"};
 
-/// Returns whether one of `patterns` is the path, a folder of it ("core/"), or its end ("*.h").
+/// Returns true if one of the `patterns` is equal to the path, is a folder that contains it ("core/"), or is its end
+/// ("*.h").
 inline bool one_of(std::string_view path, const Names& patterns) {
   return std::ranges::any_of(patterns, [&](std::string_view pattern) {
     if (pattern.starts_with('*')) {
@@ -49,8 +50,8 @@ inline std::string join(std::initializer_list<std::string_view> parts) {
   return all;
 }
 
-/// Calls `comment` with the range of every comment of a C++ source, and `literal` with the inside of every string and
-/// character literal. The file name of an #include "…" is not a literal.
+/// Calls `comment` with the range of every comment of a C++ source, and `literal` with the range inside every string
+/// and character literal. The file name of an #include "…" is not a literal.
 template <class OnComment, class OnLiteral>
 void for_each_comment_and_literal(std::string_view text, const OnComment& comment, const OnLiteral& literal) {
   const auto end_after = [&](std::string_view mark, std::size_t from) {

@@ -181,7 +181,7 @@ TEST_F(TwoDevices, AnObserverIsToldOfItsDeviceAndOfEachEngineThere) {
   Client left = controller(wall_, "192.0.2.1:4000", {.device = "left", .channel = "main"});
   Client right = controller(other_, "192.0.2.2:4000", {.device = "right", .channel = "tissue", .take_lease = true});
   Client waits = controller(wall_, "192.0.2.5:4000",
-                            {.device = "right", .channel = "tissue"});  // holds no lease, so it is in no report
+                            {.device = "right", .channel = "tissue"});  // has no lease, so it is not in a report
   Client watches_left = observer(screen_, "192.0.2.3:4000", {.device = "left", .diagnostics = true});
   Client watches_right = observer(screen_, "192.0.2.4:4000", {.device = "right", .diagnostics = true});
   measured_ = true;

@@ -13,7 +13,7 @@ namespace {
 
 using std::chrono::milliseconds;
 
-/// A handle with four buttons and axes. The observer receives one of 20 states.
+/// A handle that has four buttons and axes. One in 20 states is sent to the observer.
 class Handle : public SealedServer {
  protected:
   Handle() {

@@ -26,7 +26,7 @@ TEST_F(SealedServer, AFloodOfStrangersIsASampleAndACountAndClientsAreWhole) {
   take_recorded(mail(), client.end->self);
   const Bytes junk(1200, std::byte{0x5a});
   const Bytes hello = wire_.front().bytes;  // without a cookie
-  Bytes forged;                             // a datagram of the session whose end was modified
+  Bytes forged;                             // a datagram of the session, but the end was modified
   const std::size_t before = wire_.size();
   run(milliseconds(100), {&client});
   for (std::size_t i = before; i < wire_.size(); ++i) {

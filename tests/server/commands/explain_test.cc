@@ -19,7 +19,7 @@ using namespace std::chrono_literals;
 
 constexpr int kRounds = 4;
 
-/// Returns a clock that advances by 1 µs at each reading.
+/// Returns a clock that is advanced by 1 µs each time it is read.
 std::function<Duration()> ticking() {
   return [now = Duration{}]() mutable { return now += 1us; };
 }
@@ -104,12 +104,12 @@ TEST(Explain, SaysHowACouplingIsFeltByEachMethod) {
 }
 
 TEST(Explain, ACostIsTheDifferenceToTheSceneWithoutThePart) {
-  // The clock advances by one tick in each round of 200 steps, except in the first trial without a part, which is the
-  // one without viscous friction. So this part seems to cost as much as a whole step.
+  // In each round of 200 steps, the clock is advanced by one tick. The exception is the first trial in which a part is
+  // left out, which is the viscous friction. This part therefore seems to cost as much as a whole step.
   const Scene scene = shipped("demo_parts.toml");
   std::size_t looks = 0;
   const std::size_t trials =
-      3 + 11;  // there are two with the whole scene, one without its device, and 11 without a part
+      3 + 11;  // two for the whole scene, one without its device, and 11 without a part
   Duration now{};
   const auto time = [&] {
     const std::size_t trial = looks++ / 2 % trials;

@@ -21,7 +21,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-/// A test only waits for this long if it fails.
+/// This timeout is only reached if a test fails.
 constexpr Duration kForever = 10s;
 
 constexpr Address kAnyPort4 = {.ip = {0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0xff, 0xff, 127, 0, 0, 1}, .port = 0};
@@ -149,7 +149,7 @@ TEST(UdpLink, OnAllAddressesOfIpv6ItHearsBothFamilies) {
   EXPECT_EQ(to_string(answered_from(four, parse_address("127.0.0.2" + port), link, link)), "127.0.0.2" + port);
 }
 
-// The answer may come from another link than the first one, which receives each Hello.
+// The first link receives each Hello, but the answer may be sent by another one.
 TEST(UdpLink, SeveralOnAllAddressesKnowWhereAPeerHasAskedOneOfThem) {
   for (const char* all : {"0.0.0.0:0", "[::]:0"}) {
     const auto links = UdpLink::several(parse_address(all), Reach::kAnywhere, 2);

@@ -197,7 +197,7 @@ TEST(McapReader, NamesFileBytesAndTimesOfDamage) {
                                    ": the CRC of a chunk does not match; 145 bytes are skipped, after 0.000 s");
 }
 
-// A recorded datagram may itself contain a chunk. It must not be used if the length of the outer chunk is damaged.
+// If a recorded datagram contains a chunk, this chunk must not be used when the length of the outer chunk is damaged.
 TEST(McapReader, ReadsNoChunkWithinAChunkWhoseLengthIsDamaged) {
   const std::string whole = sample_file();
   MemorySink sink;

@@ -40,7 +40,7 @@ Contents read_file(const fs::path& path) {
   return testing::read_all(reader);
 }
 
-/// Records `steps` steps from tick `first` on. The log thread has one tick per step.
+/// Records `steps` steps, starting at tick `first`. There is one tick of the log thread per step.
 void record_run(PartRecorder& recorder, std::uint64_t first, std::uint64_t steps) {
   for (std::uint64_t tick = first; tick < first + steps; ++tick) {
     recorder.record(sample_step(tick));
@@ -354,7 +354,7 @@ TEST_F(PartRecorderTest, HoldsNoMoreMemoryAfterADayThanAfterTwoHours) {
     if (quarter == std::int64_t{8} * 3600 - 10) after_two_hours = held();
   }
   EXPECT_GE(recorder.status().parts, 23U);
-  // This is at the end of an hour. The index of a chunk has about 150 bytes.
+  // This is at the end of an hour. There are about 150 bytes in the index for each chunk.
   EXPECT_NEAR(held(), after_two_hours, 100e3);
 }
 

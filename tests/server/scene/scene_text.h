@@ -15,7 +15,7 @@ namespace tendon {
 extern const std::string_view kMinimal;
 /// This has four lines, so the rest begins at line 5.
 extern const std::string_view kWithoutProfile;
-/// This has nine lines. The table with the motion of the hand begins in the last one.
+/// This has nine lines. The last line is the beginning of the table for the motion of the hand.
 extern const std::string_view kHand;
 
 /// Reads `text` as the file s.toml.

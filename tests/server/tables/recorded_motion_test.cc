@@ -71,7 +71,8 @@ TEST(RecordedMotion, RefusesAScaleThatWouldMakeThePositionVanish) {
 }
 
 TEST(RecordedMotion, AHumanHandOnAFoamDrivesTheDevice) {
-  // The recording cannot be distributed. It contains 4.4 s of an operator at 2 kHz with a lever arm of 0.075 m.
+  // The recording cannot be distributed. It is a recording of an operator that is 4.4 s long and was sampled at 2 kHz,
+  // with a lever arm of 0.075 m.
   const char* data = std::getenv("TENDON_DATA");  // NOLINT(concurrency-mt-unsafe): one thread
   if (data == nullptr) GTEST_SKIP() << "TENDON_DATA is not set: the recorded human motion is not there";
 

@@ -62,7 +62,7 @@ void measure_sessions(Run& run);    ///< sessions.cc
 void measure_512(Run& run);         ///< sessions.cc
 const std::vector<Section>& sections();
 
-/// Call this in a child right after fork(). The kernel then kills the child when its parent dies.
+/// This must be called in a child right after fork(). The child is then killed by the kernel when its parent dies.
 void end_with_parent();
 
 /// Sets the real-time priority of the calling thread and removes its timer slack. If the priority is 0, it does
@@ -79,7 +79,7 @@ class AtPriority {
   bool raised_ = false;
 };
 
-/// `tendon-lab bench`: writes each row with its baseline to `out` as soon as it is measured. Throws
+/// `tendon-lab bench`: writes each row and its baseline to `out` when it has been measured. Throws
 /// std::invalid_argument for an unknown section, std::runtime_error if a measurement or a write fails.
 void bench(const BenchOptions& options, std::ostream& out);
 

@@ -9,16 +9,18 @@
 
 namespace tendon::bench {
 
-/// Measures the real `tendond` with many simulated devices and clients in another process, over UDP on the loopback.
-/// The devices use one substep per step, to keep their cost out of the measurement.
+/// Measures the real `tendond` with many simulated devices. The clients are in another process, and UDP on the loopback
+/// is used. The devices only use one substep per step, so that their cost does not affect the measurement.
 ///
-/// The clients are one thread. They answer states with forces, and load the cores about as much as the server does.
+/// The clients are a single thread. They answer each state with a force. The load on the cores is about the same as
+/// that of the server.
 struct Fleet {
   std::size_t devices = 16;
   std::size_t channels = 1;  ///< per device
   /// If this is true, one session controls all devices of a bank. Otherwise, each channel has its own session.
   bool one_session_for_16 = false;
-  /// 0: one session for each device or channel. Sessions beyond the number of channels observe one device each.
+  /// If this is 0, there is one session for each device or channel. Sessions beyond the number of channels observe one
+  /// device each.
   std::size_t sessions = 0;
   std::uint32_t state_hz = 1000;
   std::uint32_t force_hz = 1000;
@@ -26,7 +28,8 @@ struct Fleet {
   Duration settle = std::chrono::milliseconds(300);  ///< time to wait after the last session has been opened
   Duration length = std::chrono::seconds(2);         ///< measurement; extended until a state arrives
   std::uint64_t seed = 1;
-  /// SCHED_FIFO priority of the clients and of the server's threads except the haptic ones; 0: default scheduling.
+  /// The SCHED_FIFO priority of the clients and of the threads of the server, except for the haptic ones. If this is 0,
+  /// the default scheduling is used.
   int priority = 0;
 };
 

@@ -17,8 +17,9 @@ namespace tendon::bench {
 /// Runs the `tendond` next to this program in a child process, which ends with this object.
 class ServerProcess {
  public:
-  /// Writes the output to files in the folder of the scene. `priority`: SCHED_FIFO priority of all threads except the
-  /// haptic ones; 0: default scheduling. Throws std::runtime_error if the server does not listen within 20 s.
+  /// The output is written to files in the folder of the scene. `priority` is the SCHED_FIFO priority of all threads
+  /// except for the haptic ones; 0: default scheduling. Throws std::runtime_error if the server does not listen within
+  /// 20 s.
   ServerProcess(const std::filesystem::path& scene, int priority);
   ~ServerProcess();
   ServerProcess(const ServerProcess&) = delete;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Calls libhdPhantom.so as CHAI3D does (cPhantomDevice, cHapticDeviceHandler). It loads both libraries by name with
-// RTLD_GLOBAL and looks up 14 symbols. It reads the number of devices. For each device, it reads the number again and
-// the radius and type, and opens the device. It then reads the handle and sets the force in a loop without sleeping,
-// and finally calls Close and StopServo.
+// Calls libhdPhantom.so in the same way as CHAI3D (cPhantomDevice, cHapticDeviceHandler). It loads both libraries by
+// name with RTLD_GLOBAL and looks up 14 symbols. It reads the number of devices. For each device, it reads the number
+// again and the radius and type, and opens the device. It then reads the handle and sets the force in a loop without
+// sleeping, and finally calls Close and StopServo.
 //
 // chai3d_program [--seconds S] [--wall N_PER_M] [--push X Y Z] [--twist X Y Z] [--second-process]
 //

@@ -146,7 +146,7 @@ test("broken frames and half requests end nobody else's connection", async (t) =
   const { bridge } = await startBoth(t);
   const other = await come(t, bridge.url);
   const [host, port] = bridge.address.split(":");
-  let random = 22; // a linear congruential generator, so that each run has the same bytes
+  let random = 22; // a linear congruential generator is used, so that each run has the same bytes
   const byte = () => (random = (random * 1103515245 + 12345) % 2147483648) >> 16 & 255;
   const hello = [
     "GET / HTTP/1.1",

@@ -152,7 +152,8 @@ async def steps_until_nothing(uri: str, act) -> int:
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
 def test_a_program_that_is_killed_or_frozen_with_force_on_is_let_go(tmp_path, number):
-    """The force is valid for 100 ms, and the fade ends 250 ms later. Half a second is allowed for pauses of the machine.
+    """The force is valid for 100 ms, and then fades within 250 ms. The limit of half a second allows for pauses of the
+    machine.
     """
     with Server(tmp_path) as server, Bridge(tmp_path, server.address) as bridge:
         command = ["/usr/bin/python3", HERE / "old_program.py", bridge.uri, "0.5", "500"]

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """old_program.py URI NEWTONS HZ: pushes the hand up with the code of the service's tutorials and their client library.
 
-It sends bytes instead of text, as programs with a fast JSON library do.
+It sends bytes instead of text, because some programs use a fast JSON library that does this.
 """
 
 from __future__ import annotations

@@ -53,7 +53,7 @@ if (process.argv[2] === "echo") {
   run.after(() => child.kill());
   const echo = await open(`ws://127.0.0.1:${await new Promise((resolve) => child.once("message", resolve))}`);
 
-  // The time from a request to the reply. Requests alternate with those to the echo, at 1 kHz.
+  // The time from a request to the reply. There is one request to the bridge and one to the echo per millisecond.
   const ours = [];
   const floor = [];
   const time = async (one, text, into) => {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The DDS side of `tendon-bridge ros2` alone. It publishes known values with time stamps on every topic at 1 kHz, and
-// copies each wrench_command to `wrench`. It is used to test the message types and to measure the latency of DDS.
+// This is only the DDS side of `tendon-bridge ros2`. On every topic, it publishes known values with time stamps at 1
+// kHz. If it receives a wrench_command, it publishes a copy on `wrench`. It is used to test the message types and to
+// measure the latency of DDS.
 #include <poll.h>
 
 #include <array>

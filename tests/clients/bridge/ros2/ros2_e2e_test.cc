@@ -103,8 +103,8 @@ coulomb_friction_n = 0.05
 viscous_friction_n_s_per_m = 0.25
 )";
 
-/// A DDS domain that no other test on this machine uses: reserved by binding a UDP port of the domain that participants
-/// with an index below 100 do not use.
+/// A DDS domain that is not used by any other test on this machine. It is reserved by binding a UDP port of the domain
+/// that participants with an index below 100 do not use.
 class Domain {
  public:
   Domain() {

@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How late tendon-bridge vrpn makes a state and a force, and the floor of the same run: `latency.py [--samples 2000]`.
+"""Measures the latency of tendon-bridge vrpn for states and forces, and the floor: `latency.py [--samples 2000]`.
 
-The script is the network between tendond and tendon-bridge, and the VRPN program. Arrivals are the kernel's stamps, so
-that Python's own wake-ups are left out:
+This script is both the network between tendond and tendon-bridge and the VRPN program. It uses the receive times of the
+kernel, so that the wake-ups of Python are not included:
 
-* state: from a datagram handed to tendon-bridge to the pose at the program
-* force: from a force field handed to tendon-bridge, half a millisecond after a state, to the datagram for tendond
-* floor: from a datagram to its echo, by a process that does nothing else
+* state: the time from sending a datagram to tendon-bridge until the pose arrives at the program
+* force: the time from sending a force field to tendon-bridge, 0.5 ms after a state, until the datagram for tendond
+* floor: the time from sending a datagram until it is sent back by a process that does nothing else
 
-Then the processor time of tendon-bridge with one program at 1 kHz, and the states once more while another program sends
-10 000 fields a second.
+It also measures the processor time of tendon-bridge with one program at 1 kHz, and the latency of states while another
+program sends 10 000 fields per second.
 """
 
 from __future__ import annotations

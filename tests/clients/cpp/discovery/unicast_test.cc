@@ -123,7 +123,7 @@ TEST(UnicastDiscovery, NamesThatPointAtEachOtherLeadNowhere) {
 
 TEST(UnicastDiscovery, AnAnswerThatEndsTooSoonIsRefused) {
   for (const std::uint16_t type : {kSrv, kTxt}) {
-    // keeps the whole question, otherwise the resolver ignores the answer
+    // the whole question must be kept, otherwise the resolver ignores the answer
     for (std::size_t lost = 1; lost < 22; lost += 4) {
       const FakeDns server([&](const Question& question, bool tcp) {
         const std::string whole = sound(question, tcp);

@@ -45,7 +45,7 @@ std::string ended(WorkerProcess& process) {
   return end != nullptr ? end->why : "it has not ended";
 }
 
-/// Counts the processes whose command line contains `text`, without zombies.
+/// Returns the number of processes whose command line contains `text`. Zombies are not included.
 int running(const std::string& text) {
   int count = 0;
   std::error_code ignored;

@@ -3,7 +3,7 @@ import { x25519 } from "@noble/curves/ed25519";
 import { concat } from "../../../../clients/typescript/src/datagram.js";
 import { SymmetricState, type Finished } from "../../../../clients/typescript/src/noise.js";
 
-/** The responder of NNpsk0, which the client does not implement. */
+/** The responder of NNpsk0, which is not implemented in the client. */
 export interface Answered extends Omit<Finished, "payload"> {
   readonly message2: Uint8Array;
 }

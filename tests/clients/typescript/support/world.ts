@@ -62,7 +62,7 @@ export interface ServerConduct {
   key: Uint8Array | undefined;
   /** Use suite 2 if the client offers it. */
   aes: boolean;
-  /** The server renews its key after this number of datagrams or after this time. */
+  /** The number of datagrams and the time after which the server renews its key. */
   renewAfter: { datagrams: bigint; time: Nanoseconds };
   state: (tick: bigint) => DeviceState;
   /** The number of ticks for each state that is sent. */
