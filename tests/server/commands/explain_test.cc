@@ -108,8 +108,7 @@ TEST(Explain, ACostIsTheDifferenceToTheSceneWithoutThePart) {
   // left out, which is the viscous friction. This part therefore seems to cost as much as a whole step.
   const Scene scene = shipped("demo_parts.toml");
   std::size_t looks = 0;
-  const std::size_t trials =
-      3 + 11;  // two for the whole scene, one without its device, and 11 without a part
+  const std::size_t trials = 3 + 11;  // two for the whole scene, one without its device, and 11 without a part
   Duration now{};
   const auto time = [&] {
     const std::size_t trial = looks++ / 2 % trials;
