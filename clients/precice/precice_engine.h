@@ -18,7 +18,7 @@ namespace tendon::precice_worker {
 class PreciceEngine {
  public:
   struct Config {
-    std::string file;  ///< configuration file of preCICE
+    std::string file;  ///< the configuration file of preCICE
     std::string participant = "Hand";
     std::string mesh = "Hand-Mesh";
     std::string displacement = "Displacement";
@@ -33,7 +33,7 @@ class PreciceEngine {
   PreciceEngine(const PreciceEngine&) = delete;
   PreciceEngine& operator=(const PreciceEngine&) = delete;
 
-  /// Throws std::runtime_error at the end of the coupling and for errors of preCICE.
+  /// Throws std::runtime_error if the coupling has ended or if there is an error in preCICE.
   Touch answer(const DeviceState& hand);
 
  private:

@@ -24,24 +24,24 @@ class TouchedPatch {
  public:
   struct Config {
     Vec3 middle = Vec3::Zero();    ///< m, on the undeformed surface, in the frame of the hand
-    Vec3 normal = Vec3(-1, 0, 0);  ///< out of the body; any length > 0
+    Vec3 normal = Vec3(-1, 0, 0);  ///< points out of the body and can have any length > 0
     double radius = 0.01;          ///< m, > 0
-    int rings = 3;                 ///< of nodes around the center, 1 … 50: 1 + 3·rings·(rings + 1) nodes
+    int rings = 3;                 ///< rings of nodes, 1 … 50: 1 + 3·rings·(rings + 1) nodes
   };
   static constexpr double kLeastStep = 1e-5;  ///< m; for smaller steps the secant would be dominated by solver noise
 
   /// Throws std::invalid_argument "FIELD = VALUE: expected …".
   explicit TouchedPatch(const Config& config);
 
-  /// Positions of the undeformed nodes: x, y, z of each, m.
+  /// Returns the positions of the undeformed nodes (m) as x, y and z of each node.
   const std::vector<double>& places() const noexcept { return places_; }
   std::size_t nodes() const noexcept { return places_.size() / 3; }
 
-  /// Returns the displacements for a hand: x, y, z of each node, m.
+  /// Returns the displacements for a position of the hand (m) as x, y and z of each node.
   std::vector<double> displacements(const DeviceState& hand) const;
 
-  /// `held` contains the forces required to hold the nodes at displacements(hand): x, y, z of each, N. Throws
-  /// std::invalid_argument if the size is wrong. A sum that is not finite is returned as the force.
+  /// `held` contains the forces that are required to hold the nodes at displacements(hand), as x, y and z of each node,
+  /// N. Throws std::invalid_argument if the size is wrong. If the sum is not finite, it is returned as the force.
   Touch answer(const DeviceState& hand, std::span<const double> held);
 
  private:

@@ -37,7 +37,7 @@ double worst_per_second(const Vec3& force, const Friction& friction, Law law) {
   return excess * excess / (4 * friction.viscous);
 }
 
-/// Runs 600 steps of a random controller and a random adversary. If `late` is true, one hold in 20 is longer than
+/// Runs 600 steps of a random controller with a random adversary. If `late` is true, one hold in 20 is longer than
 /// configured. It can be up to 32 ms.
 Outcome run(std::uint64_t seed, Law limiter, bool late = false) {
   Dice dice(seed);
@@ -176,7 +176,7 @@ class Search {
       for (int climb = 0; climb < 200; ++climb) {
         std::vector<Gene> next = genes;
         for (int i = 0; i < 3; ++i) next[static_cast<std::size_t>(dice_.within(0, kSteps))] = random_gene();
-        if (dice_.chance(0.3)) {  // repeats a gene in the next step
+        if (dice_.chance(0.3)) {  // the same gene is used in the next step
           const auto from = static_cast<std::size_t>(dice_.within(0, kSteps - 1));
           next[from + 1] = next[from];
         }

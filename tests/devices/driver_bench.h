@@ -51,8 +51,8 @@ struct DriverBench {
   Bench& bench() { return static_cast<Bench&>(*this); }
 };
 
-/// A device with a safety layer must only be driven while it is armed. It must be possible to home and arm it again
-/// after it was unplugged. `home` is called to home the device, and `advance` to step the model to `now`.
+/// A device with a safety layer must only be driven while it is armed. After it was unplugged, it must be possible to
+/// home it and to arm it again. `home` is called to home the device, and `advance` to step the model to `now`.
 template <class Bench, class Model, class Home, class Advance>
 void expect_homing_and_arming_after_a_replug(Bench& bench, Model& model, Home home, Advance advance) {
   using std::chrono::milliseconds;

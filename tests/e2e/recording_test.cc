@@ -40,7 +40,7 @@ std::uint64_t replayed(const std::filesystem::path& file) {
   return count_in(replay.out(), "same");
 }
 
-// This is what happens under the shipped systemd unit: the same scene in the same folder, killed and restarted.
+// This is the same as with the systemd unit: the same scene in the same folder, killed and restarted.
 TEST(Recordings, ACrashedServersRecordingIsLeftAloneByTheNextStart) {
   const ScratchFolder folder;
   const auto first = folder.path() / "demo.mcap";

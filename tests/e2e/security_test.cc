@@ -61,7 +61,7 @@ TEST(Security, AClientWithItsKeyControlsAndAnObserverWatches) {
        {"forged", "old_key", "hellos_plain", "hellos_limited", "hellos_unknown_key", "hellos_forged"}) {
     EXPECT_EQ(count_in(end, cause), 0U) << cause;
   }
-  // Each client sends Bye three times; copies that arrive in a later turn belong to no session.
+  // Each client sends Bye three times. If a copy arrives in a later turn, it does not belong to a session.
   EXPECT_LE(count_in(end, "unknown_connection"), 4U);
 }
 

@@ -18,7 +18,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   LocalTime now{std::chrono::seconds(1000)};
   const ClientKey key{.name = "a", .role = Role::kController, .key = random.next()};
   const Suites all = suites_of_this_machine();
-  // The second server supports only the first suite; both share the cookie secret.
+  // The second server only supports the first suite. Both of them have the same cookie secret.
   ServerHandshake every({.keys = {key}, .suites = all});
   ServerHandshake strict({.keys = {key}, .suites = {all.front()}});
   const auto client_of = [&](const Suites& suites) {

@@ -4,7 +4,7 @@
 #include "tests/fuzz/target.h"
 #include "tests/protocol/wire/told.h"
 
-// The input is sealed with the peer's key and passed to a session. The fast parser and the parser for fields in
+// The input is encrypted with the key of the peer and passed to a session. The fast parser and the parser for fields in
 // arbitrary order must agree.
 
 using namespace tendon;

@@ -156,7 +156,7 @@ TEST(HardArithmetic, DenormalsAreOffInHapticStepsAndSoftBodyAnswers) {
   EXPECT_EQ(device.calls, 200);
   EXPECT_EQ(device.flushed, 200);
 
-  // The block's oscillation decays until the force is smaller than 1e-308.
+  // The oscillation of the block decays until the force is less than 1e-308.
   std::string scene = softbody::testing::with("\"condensed\"", "\"linear\"");
   const auto put = [&](std::string_view old, std::string_view by) { scene.replace(scene.find(old), old.size(), by); };
   put("[\"contact\"]", "[\"contact\", \"inertia\", \"damping\"]\nstep_ms = 2\ndamping_per_s = 60");

@@ -192,8 +192,8 @@ Observed wrap(std::uint64_t seed, bool guarded) {
   return bench.seen();
 }
 
-// Oracle: passive, bounded, quiet, and normal operation after a re-arm. A wrap by 0.2 m in 1 ms corresponds to 32 J of
-// friction and 1.6 J of work.
+// Oracle: passive, bounded, quiet. The device must operate normally after it is armed again. A wrap by 0.2 m in 1 ms
+// corresponds to 32 J of friction and 1.6 J of work.
 TEST(HardLoop, AnEncoderThatWrapsIsAFaultAndNoIncome) {
   constexpr Duration kWithin = seconds(1);
   const Observed seen = kept(kWithin, [](std::uint64_t seed) { return wrap(seed, true); });

@@ -291,8 +291,8 @@ double swung_out(const Solid& solid, double density, double dt, int steps) {
   return u.norm() / start;
 }
 
-// Oracle: the energy of a damped body without external forces decreases in each step (implicit Euler), and the patch
-// follows the tool.
+// Oracle: if there are no external forces, the energy of a damped body must decrease in each step (implicit Euler), and
+// the patch must follow the tool.
 TEST(HardPhysics, MassesAMillionTimesApartStayBoundedAndOnlyLoseEnergy) {
   const double layers[] = {-0.05, 0, 0.0005};
   const double heights[] = {0, 0.05, 0.0505};

@@ -136,7 +136,7 @@ inline double margin_of(const Observed& seen, Duration quiet_within) {
   return std::min(time, kMaxForce / seen.most_force);
 }
 
-/// Runs a case with every seed. All promises must hold, and the hand must feel a force.
+/// Runs a case for every seed. All promises must hold, and the hand must feel a force.
 template <class Run>
 inline Observed kept(Duration quiet_within, Run run) {
   Observed worst;
@@ -237,7 +237,7 @@ class Bench {
 
   void run(Duration duration) { world.run_for(duration); }
   void disturbance_is_over() { over_ = world.now(); }
-  /// Adds a check of every step, which returns the violation or an empty string.
+  /// Adds a check that is called in every step. It returns the violation, or an empty string if there is none.
   void expect_of_steps(std::function<std::string(const StepRecord&)> promise) { promise_ = std::move(promise); }
   const Observed& seen() const { return seen_; }
   void note(double figure) { seen_.figure = std::max(seen_.figure, figure); }

@@ -15,7 +15,7 @@ using std::chrono::microseconds;
 
 const Address kPeer = parse_address("127.0.0.1:5");
 
-/// The size of a datagram is its name. Each query advances the clock slightly.
+/// Datagrams are identified by their size. The clock is advanced slightly by each query.
 class Queue : public Link {
  public:
   void send(const Address& /*to*/, std::span<const std::byte> /*datagram*/) override { ++sent; }

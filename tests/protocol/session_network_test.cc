@@ -19,7 +19,7 @@ Session::Config patient() {
   return config;
 }
 
-/// A requests the rates 1, 2, 3 … as soon as possible. Z answers with the rate as detail.
+/// A requests the rates 1, 2, 3 … as soon as possible. The answer of Z contains the rate as the detail.
 struct Conversation {
   explicit Conversation(World& the_world) : world(the_world) {
     world.on_z = [this](const Session::Event& event) {

@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kSteps = 3000 - 1000;  // the two run lengths of loop-proof
 
-/// The number of instructions for a step of a point at 38d7a6d, before rotation and grip existed.
+/// The number of instructions for the step of a point at 38d7a6d, which did not support rotation and grip.
 constexpr double kBeforeHandles = 2977.5;
 
 using LoopProof = testing::InstructionTest;

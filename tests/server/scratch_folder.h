@@ -9,7 +9,7 @@
 
 namespace tendon::testing {
 
-/// The folder is deleted at the end of the test.
+/// This folder is deleted at the end of the test.
 class ScratchFolder {
  public:
   ScratchFolder() {

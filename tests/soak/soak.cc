@@ -62,7 +62,7 @@ std::vector<std::string> operator+(std::vector<std::string> words, const std::ve
 
 constexpr int kVisitors = 8;
 constexpr VitalSigns kGrowth{.resident = std::size_t{1} << 20};
-/// Each recent engine has a socket and statistics, so their number varies.
+/// Each of the recent engines has a socket and statistics, so that their number varies.
 constexpr VitalSigns kProxyGrowth{.resident = std::size_t{4} << 20, .files = 8};
 /// The index of a recording is held in memory until the end: four chunks per second, about 200 bytes each.
 constexpr std::size_t kIndexBytesPerSecond = 1024;
@@ -202,7 +202,7 @@ class Run {
     const LocalTime start = clock::now();
     const LocalTime end = start + config_.duration;
     const Address server = parse_address(address(*server_));
-    // This is a little early, so that the last sample shows an idle server.
+    // This is done a little early, so that the server is idle in the last sample.
     Reconnecting visitors(server, config_.reconnects, config_.duration * 9 / 10, kVisitors);
     Watching watcher(server);
     LocalTime next_look = start;

@@ -4,13 +4,13 @@ import { createReadStream } from "node:fs";
 import { createInterface } from "node:readline";
 import type { Vec3 } from "./recording.js";
 
-/** The robot at the arrival of a state of the hand. */
+/** The state of the robot when a state of the hand has arrived. */
 export interface Moment {
   /** s, sampling time of the hand in the server's clock. */
   readonly t: number;
   /** "engaged", "clutched" … */
   readonly phase: string;
-  /** m, of the tool in the frame of the robot. */
+  /** The position of the tool in the frame of the robot, m. */
   readonly position: Vec3;
   /** m, of the tool. Undefined if the pose is held. */
   readonly target?: Vec3 | undefined;

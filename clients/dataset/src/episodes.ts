@@ -4,11 +4,11 @@ import type { Moment } from "./demonstration.js";
 import type { Coupling, PoseMap, Port, Step, Vec3 } from "./recording.js";
 
 export interface Frame {
-  /** m, m/s: the tool of the follower, in its base frame. */
+  /** The position and velocity of the follower's tool in its base frame, m and m/s. */
   readonly state: readonly number[];
-  /** N, contact force on the tool; undefined: not measured. */
+  /** The contact force on the tool, N. It is undefined if it was not measured. */
   readonly contact?: Vec3 | undefined;
-  /** m: position requested by the operator, in the base frame of the follower. */
+  /** The position that was requested by the operator, in the base frame of the follower, m. */
   readonly action: Vec3;
 }
 
@@ -24,7 +24,7 @@ function mapped({ scale, rotation }: PoseMap, u: Vec3): Vec3 {
   return [row(rotation[0]), row(rotation[1]), row(rotation[2])];
 }
 
-/** Finds the last of the sorted `rows` that is not later than t. Continues at the previous result. */
+/** Finds the last row in the sorted `rows` that is not later than t. The search starts at the previous result. */
 class Latest<T extends { readonly t: number }> {
   readonly #rows: readonly T[];
   #next = 0;
@@ -78,12 +78,13 @@ export function episodesOf({ leader, follower, map }: Coupling, fps: number): Ep
   return episodes;
 }
 
-/** A robot has lost the hand after this silence in s. */
+/** If there is no state for this time (s), the robot has lost the hand. */
 const kSilence = 0.5;
-/** s: times of ns, as sums of floating-point numbers, are not exact. */
+/** s, because times are in ns and sums of floating-point numbers are not exact. */
 const kRounding = 1e-7;
 
-/** Returns the sequences in which a robot followed, each from engaging on. Clutching does not end a sequence. */
+/** Returns the sequences in which a robot followed the hand. Each of them starts when the robot is engaged. It does not
+ * end if the clutch is held. */
 function followed(moments: readonly Moment[]): Moment[][] {
   const found: Moment[][] = [];
   let open = false;

@@ -11,7 +11,7 @@ import { parquetWriteBuffer } from "hyparquet-writer";
 import type { Episode, Frame } from "./episodes.js";
 
 export interface DatasetConfig {
-  /** An empty or new folder. */
+  /** The folder must be empty, or it must not exist. */
   readonly out: string;
   readonly fps: number;
   /** Description of the task in natural language. */

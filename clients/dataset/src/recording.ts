@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reads the output of `tendon-replay --merge`: both ends of a coupling, in the clock of the leader.
+// Reads the file that is written by `tendon-replay --merge`. It contains both ends of a coupling, with times on the
+// clock of the leader.
 import { createFileRegistry, fromBinary, type DescMessage, type FileRegistry } from "@bufbuild/protobuf";
 import { FileDescriptorSetSchema } from "@bufbuild/protobuf/wkt";
 import { McapStreamReader } from "@mcap/core";
@@ -8,25 +9,25 @@ import { createReadStream } from "node:fs";
 
 export type Vec3 = readonly [number, number, number];
 
-/** A haptic step of one end. */
+/** A haptic step at one end of the coupling. */
 export interface Step {
-  /** s, in the clock of the leader. */
+  /** The time on the clock of the leader, s. */
   readonly t: number;
   readonly tick: bigint;
   readonly position: Vec3;
   readonly velocity: Vec3;
-  /** N, contact force; undefined: not measured. */
+  /** The contact force, N. It is undefined if it was not measured. */
   readonly contact?: Vec3 | undefined;
 }
 
-/** The state that one end sent to the other in a step. */
+/** The state that was sent from one end to the other in a step. */
 export interface Port {
   readonly t: number;
   readonly tick: bigint;
   /** 4: engaged, 5: clutched. */
   readonly phase: number;
   readonly engagement: bigint;
-  /** m, relative to its offset, in its own frame and scale. */
+  /** The position relative to the offset, in its own frame and scale, m. */
   readonly displacement: Vec3;
 }
 

@@ -5,9 +5,9 @@ import { ContactForce, type Triple } from "./contact_force.js";
 import { loadModel } from "./load.js";
 import { inverse, product, rotationOf, rotationVector } from "./rotation.js";
 
-/** λ of the damped least squares, which limits joint speeds near singular configurations. */
+/** λ of the damped least squares. It limits the joint speeds near singular configurations. */
 const kDamping = 0.05;
-/** m and rad, limits of the error that the servos receive. They bound the force of an arm that is blocked. */
+/** The limits of the error that is passed to the servos, m and rad. They limit the force of an arm that is blocked. */
 const kMostWay = 0.05;
 const kMostTurn = 0.3;
 /** The maximum number of steps per call, so that the arm does not jump after a pause of the program. */
@@ -49,7 +49,7 @@ export class Arm {
   readonly #jacobian: readonly [DoubleBuffer, DoubleBuffer];
   #goal: Pose;
   #holds = true;
-  /** s, elapsed time that was not simulated yet. */
+  /** The elapsed time that has not been simulated yet, s. */
   #due = 0;
 
   static async load(mjcf: string, site: string): Promise<Arm> {
@@ -81,7 +81,7 @@ export class Arm {
 
   /** Pose of the tool in the frame of the scene. */
   pose(): Pose {
-    const [at, turned] = [this.#data.site_xpos, this.#data.site_xmat]; // views; invalid after the heap grows
+    const [at, turned] = [this.#data.site_xpos, this.#data.site_xmat]; // these views are invalid if the heap has grown
     const matrix = Array.from({ length: 9 }, (_, i) => turned[9 * this.#site + i] as number);
     const [w, x, y, z] = rotationOf(matrix);
     return { position: { x: at[3 * this.#site], y: at[3 * this.#site + 1], z: at[3 * this.#site + 2] }, orientation: { w, x, y, z } };
@@ -91,12 +91,12 @@ export class Arm {
     [this.#goal, this.#holds] = [goal, false];
   }
 
-  /** Holds the pose at the first call. */
+  /** Holds the pose that the arm has at the first call. */
   hold(): void {
     if (!this.#holds) [this.#goal, this.#holds] = [this.pose(), true];
   }
 
-  /** N, force on the tool in the frame of the scene, from the newest step. */
+  /** Returns the force on the tool (N) in the newest step, in the frame of the scene. */
   contact(): ToolContact {
     const [x, y, z] = this.#contacts.on(this.#data);
     return { force: { x, y, z } };
@@ -124,7 +124,7 @@ export class Arm {
     const way: Triple = [to.x - p.x, to.y - p.y, to.z - p.z];
     const back = inverse([q!.w, q!.x, q!.y, q!.z]);
     const turn = rotationVector(product([turned!.w, turned!.x, turned!.y, turned!.z], back));
-    const part = Math.min(1, kMostWay / Math.hypot(...way)); // 1 if there is no error: most / 0
+    const part = Math.min(1, kMostWay / Math.hypot(...way)); // without an error, most / 0 is infinite and this is 1
     const share = Math.min(1, kMostTurn / Math.hypot(...turn));
     return Float64Array.from([...way.map((c) => part * c), ...turn.map((c) => share * c)]);
   }

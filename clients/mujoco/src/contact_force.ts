@@ -8,7 +8,7 @@ export class ContactForce {
   readonly #mj: MainModule;
   readonly #model: MjModel;
   readonly #geoms: ReadonlySet<number>;
-  /** Force and torque of one contact in its own frame, normal first. */
+  /** The force and the torque of one contact in its own frame. The first component is along the normal. */
   readonly #wrench: DoubleBuffer;
 
   constructor(mj: MainModule, model: MjModel, geoms: Iterable<number>) {
@@ -16,10 +16,10 @@ export class ContactForce {
     this.#wrench = new mj.DoubleBuffer(6);
   }
 
-  /** N, in the frame of the scene, from the newest step. */
+  /** Returns the force (N) in the newest step, in the frame of the scene. */
   on(data: MjData): Triple {
     const force: [number, number, number] = [0, 0, 0];
-    const contacts = data.contact; // copies; each one that is not deleted leaks 1 kB
+    const contacts = data.contact; // these are copies, and each copy that is not deleted leaks 1 kB
     for (let i = 0; i < contacts.size(); ++i) {
       const contact = contacts.get(i)!;
       const [first, second] = contact.geom;

@@ -9,7 +9,7 @@ export type Matrix = readonly number[];
 
 export const kNoTurn: Rotation = [1, 0, 0, 0];
 
-/** Returns a b: first b, then a. */
+/** Returns a b, which is the rotation b followed by a. */
 export const product = ([a, b, c, d]: Rotation, [w, x, y, z]: Rotation): Rotation => [
   a * w - b * x - c * y - d * z, a * x + b * w + c * z - d * y, a * y - b * z + c * w + d * x, a * z + b * y - c * x + d * w,
 ];
@@ -27,7 +27,7 @@ export function rotationBy(vector: Triple): Rotation {
   return [Math.cos(angle / 2), share * vector[0], share * vector[1], share * vector[2]];
 }
 
-/** Returns the rotation vector with norm ≤ π. Equal for q and −q. */
+/** Returns the rotation vector, whose norm is at most π. The result is the same for q and −q. */
 export function rotationVector([w, x, y, z]: Rotation): Triple {
   const length = Math.hypot(x, y, z);
   if (length === 0) return [0, 0, 0];
@@ -87,8 +87,9 @@ export function spring(m: Matrix, most: number): Matrix | undefined {
 }
 
 /**
- * Rotation from the device frame to a scene with z up, x to the right of the operator, and y away from the operator.
- * `operatorFromDevice` is that of the HandleDescription (x right, y up, z to the operator); default: identity.
+ * Returns the rotation from the device frame to a scene in which z points up, x to the right of the operator, and y
+ * away from the operator. `operatorFromDevice` is part of the HandleDescription (x right, y up, z to the operator). By
+ * default, it is the identity.
  */
 export function zUp(operatorFromDevice: Quat = { w: 1, x: 0, y: 0, z: 0 }): Matrix {
   const { w, x, y, z } = operatorFromDevice;

@@ -9,32 +9,33 @@ import {
 export interface Pose {
   /** m */
   readonly at: Triple;
-  /** Rotates the frame of the tool to that of the scene. */
+  /** The rotation from the frame of the tool to that of the scene. */
   readonly turn: Rotation;
 }
 
-/** Force on the hand, about the point that it holds. */
+/** The force on the hand, and the torque about the point that is held by the hand. */
 export interface Felt {
   /** N */
   readonly force: Triple;
   /** N·m */
   readonly torque?: Triple;
-  /** N/m and N·m/rad, resistance of the scene to a displacement and a rotation of the hand. */
+  /** How much the scene resists a displacement and a rotation of the hand, N/m and N·m/rad. */
   readonly stiffness?: Matrix | undefined;
   readonly angularStiffness?: Matrix | undefined;
-  /** m, range of the stiffness. */
+  /** The range in which the stiffness is valid, m. */
   readonly validRadius?: number;
 }
 
 export interface Tool {
-  /** Initial pose in the scene file, which corresponds to the origin of the device. */
+  /** The initial pose in the scene file. It corresponds to the origin of the device. */
   readonly home: Pose;
-  /** Must be called before a step of `seconds`. `pose` is the pose of the hand at its end, reached at constant speed.
+  /** Must be called before a step of `seconds`. `pose` is the pose of the hand at the end of the step. The hand moves
+   * there at constant speed.
    */
   lead(pose: Pose, seconds: number): void;
-  /** Force of the newest step. Does not change the scene. */
+  /** Returns the force of the newest step. The scene is not changed. */
   felt(): Felt;
-  /** Called when the scene is reset. */
+  /** This is called when the scene is reset. */
   restart(): void;
   delete(): void;
 }
@@ -45,13 +46,14 @@ const rotate = (q: Rotation, v: Triple): Triple => times(matrixOf(q), v);
 const toolError = (name: string, what: string): Error => new Error(`MuJoCo scene: the tool, body "${name}", ${what}`);
 
 export interface Coupling {
-  /** N/m, between the hand and the tool. */
+  /** Stiffness of the coupling between the hand and the tool, N/m. */
   readonly stiffness: number;
   /** N·m/rad */
   readonly angularStiffness: number;
 }
 
-/** A mocap body at the position of the hand, without rotation. The hand feels the contact forces on it. */
+/** A mocap body that is at the position of the hand and does not rotate. The hand feels the contact forces on this
+ * body. */
 class LedTool implements Tool {
   readonly home: Pose;
   readonly #data: MjData;
@@ -66,7 +68,7 @@ class LedTool implements Tool {
   }
 
   lead({ at }: Pose): void {
-    this.#data.mocap_pos.set(at, 3 * this.#mocap); // views become invalid when the heap grows
+    this.#data.mocap_pos.set(at, 3 * this.#mocap); // these views are invalid if the heap has grown
   }
   felt(): Felt {
     return { force: this.#contacts.on(this.#data) };
@@ -77,7 +79,7 @@ class LedTool implements Tool {
   }
 }
 
-/** Step of the finite differences: m and rad. */
+/** The step that is used in finite differences, m and rad. */
 const kProbe = 1e-4;
 const kProbeTurn = 2e-3;
 
@@ -110,10 +112,11 @@ class HeldTool implements Tool {
   readonly #derives: boolean;
   readonly #qpos: number;
   readonly #dof: number;
-  /** N·s/m and N·m·s/rad, of the six degrees of freedom; rotations are about the axes of the tool. */
+  /** The damping of the six degrees of freedom, N·s/m and N·m·s/rad. Rotations are about the axes of the tool. */
   readonly #damping: readonly number[];
   #hand: Pose;
-  /** N and N·m, damper forces due to the motion of the hand. MuJoCo adds those due to the motion of the tool. */
+  /** The damper forces that are caused by the motion of the hand, N and N·m. MuJoCo adds those that are caused by the
+   * motion of the tool. */
   #dragged: readonly number[] = [0, 0, 0, 0, 0, 0];
 
   constructor(mj: MainModule, model: MjModel, data: MjData, body: number, name: string, coupling: Coupling, derives: boolean) {
@@ -141,7 +144,7 @@ class HeldTool implements Tool {
     const turned = rotationVector(product(hand.turn, inverse(this.#hand.turn)));
     const spin = this.#toTool(turned.map((angle) => angle / seconds) as never);
     this.#dragged = [...speed, ...spin].map((rate, i) => this.#damping[i]! * rate);
-    this.#pull(this.#hand); // from the current poses, so that a tool moving with the hand exerts no force
+    this.#pull(this.#hand); // starts at the current poses, so that there is no force if the tool moves with the hand
     this.#hand = hand;
   }
 
@@ -149,7 +152,7 @@ class HeldTool implements Tool {
     const { force, torque } = this.#springs(this.#hand);
     const felt = { force: negative(force), torque: negative(torque) };
     if (!this.#derives) return felt;
-    // After this distance the spring has no force; beyond it, the model would pull.
+    // At this distance, the force of the spring is zero. Beyond it, the model would pull.
     return { ...felt, ...this.#derivatives(), validRadius: Math.hypot(...force) / this.#coupling.stiffness };
   }
 
@@ -167,7 +170,7 @@ class HeldTool implements Tool {
     return rotate(inverse(this.#pose(this.#data.qpos).turn), v);
   }
 
-  /** On the tool, at the origin of its frame. */
+  /** The force on the tool, at the origin of its frame. */
   #springs(hand: Pose): { readonly force: Triple; readonly torque: Triple } {
     const { stiffness: k, angularStiffness: kappa } = this.#coupling;
     const { at, turn } = this.#pose(this.#data.qpos);

@@ -16,7 +16,7 @@ export interface SceneConfig {
    * stiffness are sent as well (see tool.ts).
    */
   readonly tool: string;
-  /** For a held tool. Default: 1000 N/m and 2 N·m/rad. */
+  /** The stiffness of the coupling if the tool is held. Default: 1000 N/m and 2 N·m/rad. */
   readonly coupling?: Partial<Coupling>;
   /** For a held tool. Requires 14 evaluations of the scene for each answer, without collision detection. Default:
    * true. */
@@ -28,33 +28,34 @@ export interface SceneConfig {
    * into a body within one step. Default: 1, which is faster than a hand in contact.
    */
   readonly maxToolSpeed?: number;
-  /** rad/s, likewise. Default: 20. */
+  /** The maximum angular speed of the tool, rad/s. Default: 20. */
   readonly maxToolSpin?: number;
   /** The maximum number of steps per answer. If more are due, simulated time falls behind. Default: 20. */
   readonly maxSteps?: number;
-  /** Files referenced by the scene. */
+  /** The files that are used in the scene. */
   readonly assets?: Assets;
-  /** Called with warnings about the scene and the simulation. Default: console.warn. */
+  /** This is called with warnings about the scene and the simulation. Default: console.warn. */
   readonly onWarning?: (text: string) => void;
 }
 
 export interface SceneStats {
   readonly answers: number;
   readonly steps: number;
-  /** Positions that were not finite and invalid orientations; not simulated. */
+  /** The number of positions that were not finite or whose orientation was invalid. They were not simulated. */
   readonly badPositions: number;
-  /** Answers in which the hand was faster than maxToolSpeed or maxToolSpin, so that the tool lagged. */
+  /** The number of answers in which the hand was faster than maxToolSpeed or maxToolSpin, so that the tool did not
+   * reach it. */
   readonly lagging: number;
-  /** Resets of the scene because MuJoCo lost the solution. */
+  /** The number of times that the scene was reset because MuJoCo had lost the solution. */
   readonly restarts: number;
-  /** Answers without some contacts because MuJoCo ran out of memory. */
+  /** The number of answers in which some contacts are missing, because MuJoCo did not have enough memory. */
   readonly incomplete: number;
-  /** s of the hand's time that were not simulated because of maxSteps. */
+  /** The time of the hand that was not simulated because of maxSteps, s. */
   readonly behind: number;
 }
 
 const kIdentity = [1, 0, 0, 0, 1, 0, 0, 0, 1];
-/** ForceClient does not send this force. No force is better than a wrong one. */
+/** This force is not sent by ForceClient, because it is better to send no force than a wrong one. */
 const kNoTouch: Touch = { force: { x: NaN, y: NaN, z: NaN } };
 
 function checkRotation(r: readonly number[]): readonly number[] {
@@ -82,7 +83,7 @@ function positive(name: string, value: number): number {
  * (README.md). The memory belongs to WebAssembly; free it with delete().
  */
 export class TouchableScene {
-  /** MuJoCo and the scene, for additional uses: actuators, more bodies, rendering. */
+  /** Provides access to MuJoCo and the scene for other uses, such as actuators, additional bodies or rendering. */
   readonly mujoco: MainModule;
   readonly model: MjModel;
   readonly data: MjData;
@@ -91,14 +92,14 @@ export class TouchableScene {
   readonly #frame: Matrix;
   readonly #turned: Rotation;
   readonly #tool: Tool;
-  /** Last pose of the tool. */
+  /** Returns the last pose of the tool. */
   #led: Pose;
   readonly #stats = { answers: 0, steps: 0, badPositions: 0, lagging: 0, restarts: 0, incomplete: 0, behind: 0 };
   #sampledNs: bigint | undefined;
-  /** s, elapsed time that was not simulated yet. */
+  /** The elapsed time that has not been simulated yet, s. */
   #due = 0;
   #touch: Touch | undefined;
-  /** Number of warnings of MuJoCo, by mjtWarning. */
+  /** Returns how many warnings were issued by MuJoCo for each mjtWarning. */
   #warned: readonly number[];
 
   /** Throws an Error if the scene is invalid, a RangeError if `config` is invalid. */
@@ -182,7 +183,7 @@ export class TouchableScene {
     return (this.#touch = touch);
   }
 
-  /** N, sum of all contact forces on a body in the frame of the scene, from the newest step. */
+  /** Returns the sum of all contact forces on a body (N) in the newest step, in the frame of the scene. */
   contactForce(body: string): Vec3 {
     const reader = new ContactForce(this.mujoco, this.model, this.#geomsOf(this.#body(body)));
     const [x, y, z] = reader.on(this.data);
@@ -237,7 +238,7 @@ export class TouchableScene {
     const way = from.at.map((at, i) => hand.at[i]! - at) as never as Triple;
     const spin = rotationVector(product(hand.turn, inverse(from.turn)));
     const time = steps * this.#timestep;
-    // 1 if there is no displacement: reach / 0
+    // If there is no displacement, reach / 0 is infinite and this is 1.
     const share = Math.min(1, (maxToolSpeed * time) / Math.hypot(...way), (maxToolSpin * time) / Math.hypot(...spin));
     if (share < 1)
       this.#tell(++this.#stats.lagging, `the hand is faster than ${maxToolSpeed} m/s or ${maxToolSpin} rad/s: the tool lags behind the hand`);
@@ -260,8 +261,8 @@ export class TouchableScene {
     });
   }
 
-  /** Returns why the state is invalid, or an empty string. MuJoCo then restarts at time 0 and only increments a
-   * counter. */
+  /** Returns an error message if the state is invalid, or an empty string. In this case, MuJoCo has only incremented a
+   * counter and has restarted at time 0. */
   #lost(): string {
     const now = this.#warnings();
     const kinds = this.mujoco.mjtWarning;
@@ -287,7 +288,7 @@ export class TouchableScene {
     this.#warned = this.#warnings();
   }
 
-  /** The torque is omitted for a hand without an orientation. */
+  /** If the hand does not have an orientation, there is no torque. */
   #felt(turns: boolean): Touch {
     const { force, torque, stiffness, angularStiffness, validRadius } = this.#tool.felt();
     return {

@@ -16,7 +16,7 @@ TAG_SIZE = 16
 
 
 class AesGcm:
-    """A key with its precomputed key schedule."""
+    """A key for which the key schedule has been computed."""
 
     def __init__(self, key: bytes) -> None:
         self._aes = AESGCM(key)
@@ -34,7 +34,7 @@ class AesGcm:
             return None
 
     def renewed(self) -> AesGcm:
-        """REKEY(key) of Noise: the next key, from which this one cannot be derived."""
+        """REKEY(key) of Noise. Returns the next key. It is not possible to derive this key from the next one."""
         return AesGcm(self.seal(2**64 - 1, b"", bytes(32))[:32])
 
 

@@ -38,8 +38,8 @@ class Client(AnyClient):
         self._wake_at: Instant = NEVER
 
     async def states(self, duration_s: float | None = None) -> AsyncIterator[DeviceState]:
-        """Yields the newest state, at Config.rate_hz or as soon as a new one is available; older states are skipped.
-        Ends after `duration_s` if it is not None. Raises RefusedForGood."""
+        """Yields the newest state, at Config.rate_hz or when a new one is available. Older states are skipped. If
+        `duration_s` is not None, it ends after this time. Raises RefusedForGood."""
         guest, core = self._guest, self._guest.core
         now = time.monotonic_ns()
         end = NEVER if duration_s is None else now + duration_s * 1e9
@@ -89,7 +89,7 @@ class Client(AnyClient):
         self._set_timer()
 
     async def _wait_until(self, instant: Instant) -> None:
-        """Waits until `instant` or an event."""
+        """Waits until `instant` or until there is an event."""
         self._wake_at = instant
         self._waiter = asyncio.get_running_loop().create_future()
         self._set_timer()
@@ -102,7 +102,8 @@ class Client(AnyClient):
                 self._set_timer()
 
     def _set_timer(self) -> None:
-        """Sets the timer for the next turn. A timer that expires earlier is kept, because it sets the next one."""
+        """Sets the timer for the next turn. If there is a timer that expires earlier, it is not changed, because it
+        will set the next one."""
         due = min(self._guest.core.next_turn(), self._wake_at)
         if self._timer is not None:
             if self._timer_due <= due:

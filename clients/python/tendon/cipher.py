@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Protection of a session's datagrams: none (suite 0), or authenticated encryption with key renewal, by
-ChaCha20-Poly1305 (suite 1) or AES-256-GCM (suite 2)."""
+"""Protects the datagrams of a session. Suite 0 has no protection. Suite 1 (ChaCha20-Poly1305) and suite 2 (AES-256-GCM)
+use authenticated encryption with key renewal."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def names_of(suites: Iterable[Suite]) -> str:
 RENEW_AFTER_DATAGRAMS = 1 << 20
 RENEW_AFTER_NS = 600_000_000_000
 OVERLAP_NS = 2_000_000_000
-"""How long datagrams with the previous key are accepted after the peer has renewed its key."""
+"""After the peer has renewed its key, datagrams with the previous key are accepted for this time."""
 
 
 class Forged(Exception):
@@ -35,7 +35,7 @@ class Forged(Exception):
 
 
 class OldKey(Exception):
-    """The key of the datagram's epoch has expired or is more than one epoch ahead."""
+    """The key of this epoch has expired, or the epoch is too far ahead."""
 
 
 class Cipher(Protocol):
@@ -68,7 +68,7 @@ class Plain:
 
 
 class _ChaCha:
-    """A key of suite 1 with the interface of AesGcm."""
+    """A key of suite 1 that has the same interface as AesGcm."""
 
     def __init__(self, key: bytes) -> None:
         self._key = key

@@ -70,7 +70,7 @@ def _key(program: str, text: str) -> bytes:
     try:
         return read_key(text)
     except (OSError, ValueError) as error:
-        # argparse would exit with status 2, which means wrong usage.
+        # argparse would use the exit status 2, which is for wrong usage
         raise SystemExit(f"{program}: {error}") from None
 
 
@@ -198,7 +198,7 @@ def _run_several(options: argparse.Namespace, physics: Mapping[str, Physics]) ->
 
 
 async def _touch_several(options: argparse.Namespace, physics: Mapping[str, Physics]) -> dict[str, Stats]:
-    """Runs until --duration-s, SIGINT or SIGTERM, or an exception of a callback."""
+    """Runs until --duration-s, SIGINT or SIGTERM, or until a callback raises an exception."""
 
     async def touch(device: str, client: aio.Client) -> None:
         reported: LinkReport | None = None

@@ -14,7 +14,8 @@ from .guest import AnyClient
 from .messages import NEVER, DeviceState, Touch
 
 Physics = Callable[[DeviceState], Union[Touch, Sequence[float], None]]
-"""The physics engine as a function from device state to force (and stiffness). If it returns None, nothing is sent."""
+"""The physics engine is a function from the device state to a force (and a stiffness). If it returns None, no force is
+sent."""
 
 
 class Client(AnyClient):
@@ -39,10 +40,10 @@ class Client(AnyClient):
         on_silence: Callable[[int], object] | None = None,
         silence_s: float = 0.01,
     ) -> Iterator[DeviceState]:
-        """Yields the newest state, at Config.rate_hz or as soon as a new one is available; older states are skipped.
-        Ends after `duration_s` if it is not None. Calls `on_silence` with time.monotonic_ns() when no state has
-        arrived for `silence_s`, also before the first state. Stop anything there that must not continue without an
-        operator. Raises RefusedForGood, and exceptions of `on_silence`."""
+        """Yields the newest state, at Config.rate_hz or when a new one is available. Older states are skipped. If
+        `duration_s` is not None, it ends after this time. If no state has arrived for `silence_s`, it calls
+        `on_silence` with time.monotonic_ns(). This is also done before the first state. Use it to stop everything that
+        must not continue without an operator. Raises RefusedForGood, and exceptions of `on_silence`."""
         expect(0.001 <= silence_s <= 10, "silence_s", silence_s, "0.001 to 10")
         guest, core = self._guest, self._guest.core
         silence_ns = NEVER if on_silence is None else silence_s * 1e9
@@ -74,7 +75,7 @@ class Client(AnyClient):
         on_silence: Callable[[int], object] | None = None,
         silence_s: float = 0.01,
     ) -> None:
-        """Answers each state with the result of `physics`. The other arguments are those of states(). Raises
+        """Answers each state with the result of `physics`. For the other arguments, see states(). Raises
         RefusedForGood, and exceptions of `physics`."""
         for hand in self.states(duration_s, on_silence, silence_s):
             self.answer(hand, physics(hand))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Configuration and statistics of a client."""
+"""The configuration and the statistics of a client."""
 
 from __future__ import annotations
 
@@ -23,26 +23,28 @@ class Config:
     """Configuration of a client. Raises ValueError "FIELD = VALUE: expected …" if a value is invalid."""
 
     name: str = "guest"
-    """For the log of the server; at most 64 bytes."""
+    """This name is used in the log of the server. It has at most 64 bytes."""
     role: Role = Role.CONTROLLER
     """A controller receives states and sends forces, one per channel. An observer only receives."""
     device: str = ""
-    """Name of the device. Empty: the first one of the server. At most 24 bytes."""
+    """The name of the device, which has at most 24 bytes. If it is empty, this is the first one of the server."""
     channel: str = ""
-    """Name of the channel of the device. Empty: the first one. At most 24 bytes."""
+    """The name of the channel of the device, which has at most 24 bytes. If it is empty, this is the first one."""
     take_lease: bool = False
-    """If another controller holds the lease of the channel, keep asking for it. The request is repeated when the
-    server reports that the lease may have ended."""
+    """If another controller has the lease of the channel, this client keeps asking for it. It sends the request again
+    when the server reports that the lease may have ended."""
     key: bytes | None = field(default=None, repr=False)
     """32 bytes shared with the server (`read_key`). If there is a key, all traffic is encrypted. Without a key,
     servers accept only local clients."""
     suites: tuple[Suite, ...] = usable_suites()
     """Cipher suites offered for an encrypted session. The server selects one."""
     rate_hz: float = 0
-    """States returned per second, at multiples of 1/rate_hz or as soon as a new one is available after that. After a
-    delay of a full period, the schedule restarts; missed calls are not made up. 0: every new state."""
+    """The number of states that are returned per second. A state is returned at each multiple of 1/rate_hz, or when a
+    new one is available after that. If this is delayed by a full period, the schedule is restarted, and the missed
+    states are not returned later. If it is 0, every new state is returned."""
     state_hz: int = 0
-    """States per second to request from the server; 0: the default of the server."""
+    """The number of states per second that is requested from the server. If it is 0, this is the default of the
+    server."""
     valid_for_s: float = 0
     """How long after its arrival the server may use a force; at most 10 s. 0: derived from the period T between
     forces, which is the requested period or, if the engine is slower, the time between the states that the last
@@ -54,9 +56,10 @@ class Config:
     deadband: ForceDeadband | None = None
     """Omit forces that a human cannot distinguish from the last one sent. None: every force is sent."""
     state_deadband: SetStateDeadband | None = None
-    """The server omits states that the client can predict. If rate_hz = r > 0, states are returned at multiples of
-    1/r as predicted for that time, including tick and sampling time. Ticks always increase. States are predicted
-    for at most max_silence_us. If rate_hz = 0, only received states are returned. None: all states are requested."""
+    """The server omits states that can be predicted by the client. If rate_hz = r > 0, states are returned at multiples
+    of 1/r as predicted for that time, including tick and sampling time. Ticks always increase. A state is not predicted
+    for longer than max_silence_us. If rate_hz = 0, only received states are returned. None: all states are
+    requested."""
     diagnostics: bool = False
     """For observers: requests the forces of the engines before limiting (`DeviceState.force_wanted`), and reports on
     the loop of the device and its engines once per second. Servers that do not support this feature omit them."""
@@ -67,14 +70,15 @@ class Config:
     """Requests access to the outputs of the device (`HandleDescription.outputs`: lamps, vibration). Required for
     `set_output`."""
     ways: tuple[str, ...] = ()
-    """Names of the methods with which this engine computes forces. `Touch.way` is an index into this list, starting
-    at 1. Observers and recordings receive the names. At most 8 unique names, each of 1 to 24 bytes."""
+    """The names of the methods that are used by this engine to compute forces. `Touch.way` is an index into this list,
+    starting at 1. Observers and recordings receive the names. There can be at most 8 different names, and each of them
+    has 1 to 24 bytes."""
     patience_s: float = 2.0
-    """The time for which an attempt waits for an answer."""
+    """The time to wait for an answer in an attempt."""
     retry_min_s: float = 0.1
-    """Wait before the first retry. It doubles with each attempt."""
+    """The time to wait before the first retry. It is doubled after each attempt."""
     retry_max_s: float = 2.0
-    """Upper limit of the wait. The first state of a session resets it."""
+    """The upper limit of this time. When a session receives its first state, the time is reset."""
 
     def __post_init__(self) -> None:
         def expect_at_most(most: int, text: str, field: str) -> None:
@@ -120,7 +124,7 @@ class Stats:
     phase: Phase = Phase.GREETING
     code: Code = Code.OK  # why the last attempt or session ended, with the message of the server
     reason: str = ""
-    link: LinkStats = field(default_factory=LinkStats)  # of the current or the last session
+    link: LinkStats = field(default_factory=LinkStats)  # for the current session or the last one
     attempts: int = 0
     sessions: int = 0  # attempts that the server accepted
     states: int = 0  # received states

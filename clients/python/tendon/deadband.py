@@ -22,7 +22,7 @@ class ForceDeadband:
     floor: float = 0.05
     """N. Smaller changes are omitted until the longest silence."""
     longest_silence_s: float = 0.02
-    """Limits the time for which the device renders an old force after a packet loss."""
+    """This limits how long an old force is rendered by the device after a packet loss."""
 
     def __post_init__(self) -> None:
         expect(0 <= self.share <= 1, "deadband.share", self.share, "0 to 1")
@@ -31,7 +31,8 @@ class ForceDeadband:
 
 
 HANDLE_LEVER = 0.05
-"""m, from the center to the end of a handle. Converts the floor of a force (N) to that of a torque (N·m)."""
+"""The distance from the center to the end of a handle, m. It is used to convert the floor of a force (N) to that of a
+torque (N·m)."""
 
 
 class Deadband:
@@ -43,8 +44,8 @@ class Deadband:
         self._sent: tuple[int, Vec3, Vec3 | None, float | None] | None = None
 
     def passes(self, now: int, force: Vec3, torque: Vec3 | None = None, grip_force: float | None = None) -> bool:
-        """Returns whether one of the three values must be sent, or has appeared or disappeared. If so, all are
-        recorded as sent."""
+        """Returns True if one of the three values must be sent, or if it has appeared or disappeared. In this case, all
+        of them are recorded as sent."""
         if self._sent is not None and now - self._sent[0] < self._silence_ns:
             _, force_before, torque_before, grip_before = self._sent
             same_parts = (torque is None, grip_force is None) == (torque_before is None, grip_before is None)

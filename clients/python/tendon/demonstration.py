@@ -39,7 +39,7 @@ class Demonstration:
         target_m      of the tool; null: the robot holds its pose
         contact_n     force on the tool; absent: not measured
 
-    States with a pose, target or contact that is not finite are omitted. Existing files are not overwritten
+    A state is omitted if its pose, target or contact is not finite. Existing files are not overwritten
     (FileExistsError). Lines are buffered, so that `add` rarely waits for the disk.
     """
 

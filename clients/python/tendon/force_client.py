@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A client of a Tendon server, sans I/O: it opens a session and keeps it alive, returns the newest device state,
+"""A client of a Tendon server that does no I/O. It opens a session and keeps it alive, returns the newest device state,
 sends the force that answers it, and reconnects after the session ends.
 """
 
@@ -67,7 +67,8 @@ _MIN_VALID_FOR_NS = 20_000_000
 _MAX_OBSERVED_PERIOD_NS = 100_000_000
 
 _ASK_LEASE_AGAIN_NS = 50_000_000
-"""The minimum time between two requests for a lease. The current holder renews its lease continuously."""
+"""There must be at least this time between two requests for a lease, because the current holder renews its lease
+continuously."""
 
 
 _WAITING = (Phase.UNANSWERED, Phase.REFUSED, Phase.LOST)
@@ -96,7 +97,7 @@ class ForceClient:
         self.device_report: DeviceReport | None = None
         """Newest report on the loop of the device in this session. Requires Config.diagnostics."""
         self.peer_reports: dict[int, PeerReport] = {}
-        """The newest report on the engine of each channel. It is kept when the engine leaves. Requires
+        """The newest report on the engine of each channel. If the engine leaves, the report is not removed. Requires
         Config.diagnostics."""
         self.config = config
         self._random = random
@@ -110,7 +111,7 @@ class ForceClient:
         self._ask_lease: Instant = NEVER  # time of the next lease request
         self._give_up = now  # timeout of the current attempt
         self._retry = now  # start of the next attempt
-        self._back_off = _ns(config.retry_min_s)  # wait before the attempt after that
+        self._back_off = _ns(config.retry_min_s)  # the time to wait before the next attempt
         self._unseen: DeviceState | None = None  # newest state that was not returned
         self._pressed = 0  # buttons pressed in any state since the last returned one
         self._newest: DeviceState | None = None  # newest state, returned or not
@@ -136,7 +137,7 @@ class ForceClient:
             self._take_events(now)
 
     def tick(self, now: int) -> None:
-        """Performs all work due at `now`."""
+        """Does all the work that is due at `now`."""
         if self._session is not None:
             self._session.tick(now)
             self._take_events(now)
@@ -302,7 +303,7 @@ class ForceClient:
     # ---- Out ----
 
     def next_datagram(self, now: int) -> bytes | None:
-        """Returns the next datagram to send, or None if there is none."""
+        """Returns the next datagram that should be sent, or None if there is none."""
         if self._ended is not None:
             bye = self._ended.next_datagram(now)
             if bye is not None:
@@ -341,7 +342,7 @@ class ForceClient:
         return self._retry if self.phase in _WAITING else NEVER
 
     def next_state_due(self) -> Instant:
-        """Returns when `next_state` will return a state, or NEVER while no new state is available or the channel is
+        """Returns when `next_state` will return a state. This is NEVER if there is no new state, or if the channel is
         not held."""
         if self._waits_for_lease():
             return NEVER
@@ -349,7 +350,7 @@ class ForceClient:
             return NEVER if self._unseen is None else self._next_call
         if self._newest is None:
             return NEVER
-        ahead = max(self._seen_tick + 1 - self._newest.tick, 0)  # the first tick that was not returned
+        ahead = max(self._seen_tick + 1 - self._newest.tick, 0)  # the first tick that has not been returned
         due = max(self._next_call, self._newest_arrived + ahead * self._haptic_period())
         return due if due - self._newest_arrived <= self._silence_ns() else NEVER
 
@@ -365,7 +366,7 @@ class ForceClient:
 
     @property
     def live_stats(self) -> Stats:
-        """Returns the statistics without a copy. Do not keep or modify them. `link` is not up to date."""
+        """Returns the statistics without a copy. They must not be modified or kept. `link` is not updated."""
         return self._stats
 
     # ---- Inside ----
@@ -460,7 +461,7 @@ class ForceClient:
                 self._stats.states += 1
                 self._stats.states_skipped += self._unseen is not None
                 self._unseen = self._newest = event
-                # Another engine held the channel when the button was pressed.
+                # When the button was pressed, another engine had the channel.
                 self._pressed = event.buttons | (0 if self._waits_for_lease() else self._pressed)
                 self._newest_arrived = now
                 self._back_off = _ns(self.config.retry_min_s)
@@ -519,7 +520,8 @@ class ForceClient:
         return 1000 * self.config.state_deadband.max_silence_us if self.config.state_deadband else 0
 
     def _predicted(self, now: int) -> DeviceState | None:
-        """Returns the state predicted for `now`, or None if there is nothing new or the last state is too old."""
+        """Returns the state that is predicted for `now`. Returns None if there is nothing new, or if the last state is
+        too old."""
         newest, age = self._newest, now - self._newest_arrived
         if newest is None or age > self._silence_ns():
             return None

@@ -120,8 +120,8 @@ class Guest:
         self.tend(self.take(now))
 
     def take(self, now: int) -> int:
-        """First half of a turn: receives, and returns the time. The newest state should be answered before the other
-        half."""
+        """The first half of a turn: receives datagrams and returns the time. The newest state should be answered before
+        the other half."""
         for _ in range(MAX_DATAGRAMS):
             datagram = self._receive()
             if datagram is None:
@@ -132,7 +132,7 @@ class Guest:
         return now
 
     def tend(self, now: int) -> None:
-        """Second half of a turn."""
+        """The second half of a turn."""
         self.core.tick(now)
         self.flush(now)
         self._follow_the_name()
@@ -165,8 +165,8 @@ class Guest:
             raise RefusedForGood(f"{self.server} has ended the session: {stats.reason}", stats.code)
 
     def _follow_the_name(self) -> None:
-        """Resolves the name again between two attempts, because the address of the server may have changed. If the
-        current address did not answer, the next one is tried."""
+        """Resolves the name again between two attempts, because the server may have a new address. If the current
+        address did not answer, the next one is tried."""
         phase = self.core.phase
         waits = phase in (Phase.UNANSWERED, Phase.REFUSED, Phase.LOST)
         if waits and not self._waited and not _is_numeric(self.server):
@@ -203,7 +203,7 @@ class Guest:
     def _receive(self) -> bytes | None:
         for _ in range(_MAX_ERRORS):
             try:
-                # One more byte than the limit, so that a datagram that is too large can be detected.
+                # This is one more byte than the limit, so that it is possible to detect a datagram that is too large.
                 return self.socket.recv(limits.MAX_DATAGRAM + 1)
             except BlockingIOError:
                 return None
@@ -261,8 +261,8 @@ class AnyClient:
         self._guest.flush(time.monotonic_ns())
 
     def answer(self, hand: DeviceState, touch: Touch | Sequence[float] | None) -> None:
-        """Sends the result of an engine for this state, unless it is None. If the engine returns only None for one
-        second, a warning is logged once, because its `return` statement may be missing."""
+        """Sends the result of an engine for this state. If it is None, no force is sent. If the engine returns only
+        None for one second, a warning is logged once, because its `return` statement may be missing."""
         if touch is not None:
             self._may_lack_return = False
             self.send(hand, touch)
@@ -340,7 +340,8 @@ class AnyClient:
 
     @property
     def report(self) -> LinkReport | None:
-        """Newest report on the received forces, once per second while they arrive. None before the first."""
+        """The newest report on the received forces. It is sent once per second if there are any. None before the
+        first."""
         return self._guest.core.report
 
     @property
@@ -351,7 +352,7 @@ class AnyClient:
 
     @property
     def peer_reports(self) -> dict[int, PeerReport]:
-        """The newest report on the engine of each channel. It is kept when the engine leaves. Requires
+        """The newest report on the engine of each channel. If the engine leaves, the report is not removed. Requires
         Config.diagnostics."""
         return self._guest.core.peer_reports
 

@@ -39,7 +39,7 @@ def prologue(header: bytes, identity: bytes, random: bytes) -> bytes:
 class ClientHandshake:
     """Sends Hellos until a Retry with a cookie arrives, then Hellos with the cookie until the answer arrives.
 
-    It has no timeout. Datagrams that are malformed, not authentic, or of another attempt are ignored.
+    There is no timeout. A datagram is ignored if it is malformed, not authentic, or if it belongs to another attempt.
     """
 
     def __init__(
@@ -72,7 +72,7 @@ class ClientHandshake:
         self._cookie: bytes | None = None
         self._next_hello: Instant = now
         self.outcome: Outcome | None = None
-        """Set when the server has answered, which ends the handshake."""
+        """This is set when the server has answered. The handshake is then complete."""
 
     def receive(self, now: int, datagram: bytes) -> None:
         if self.outcome is not None:

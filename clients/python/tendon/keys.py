@@ -13,8 +13,8 @@ _FEWEST_DIFFERENT = 18
 
 
 def read_key(file: Path | str) -> bytes:
-    """Returns the 32 bytes in a key file. It contains one line, `controller` or `observer` and 64 hexadecimal digits.
-    Empty lines and lines that begin with # are ignored.
+    """Returns the 32 bytes in a key file. The file contains one line with `controller` or `observer` and 64 hexadecimal
+    digits. A line is ignored if it is empty or if it begins with #.
 
     Raises ValueError, with a message that does not contain the key, if the file is not a key file or the key is
     weak; OSError if it is unreadable or not a regular file; PermissionError if other users may read it.
@@ -39,6 +39,7 @@ def read_key(file: Path | str) -> bytes:
 
 
 def _weak(key: bytes) -> bool:
-    """Whether a key repeats a few bytes, counts up, or is typed text. Rejects fewer than one in 10⁹ random keys."""
+    """Returns True if a key repeats a few bytes, counts up, or is typed text. The probability that a random key is
+    rejected is less than one in 10⁹."""
     steps = {(after - before) % 256 for before, after in zip(key, key[1:])}
     return min(len(set(key)), len(steps)) < _FEWEST_DIFFERENT or all(0x20 <= byte < 0x7F for byte in key)

@@ -37,4 +37,5 @@ PACKET_NUMBERS = 1 << 60
 LIFE_NS = 24 * 3600 * 1_000_000_000
 """Maximum age of an encrypted session."""
 MAX_FORGED = 1 << 36
-"""A session also ends after this number of forged datagrams, which bounds guessing of authentication tags."""
+"""A session also ends after this number of forged datagrams, which limits how often an authentication tag can be
+guessed."""

@@ -34,7 +34,7 @@ FEATURE_OUTPUTS = "outputs"
 """The client receives the outputs of the device (lamps, vibration) and may set them."""
 
 FEATURE_TELEOPERATION = "teleoperation"
-"""The client can be the other end of a coupling. It sends a Couple request, and both ends send PortStates."""
+"""The client can be one of the ends of a coupling. It sends a Couple request, and both ends send PortStates."""
 
 FEATURE_WAYS = "ways"
 """An engine names its methods, and each force contains the method that computed it."""
@@ -45,7 +45,7 @@ PeerReport)."""
 
 
 class Reason(IntFlag):
-    """Why the force of the device differs from the requested one. Unknown bits are kept."""
+    """The reasons why the force of the device is not the requested one. Unknown bits are kept."""
 
     ENERGY = 1
     MAX_FORCE = 2
@@ -131,6 +131,6 @@ class LinkStats:
 
 
 NEVER = inf
-"""A time that is never reached. Other times are integer nanoseconds of a monotonic clock."""
+"""A time that is never reached. All other times are integers, in nanoseconds of a monotonic clock."""
 
 Instant = Union[int, float]

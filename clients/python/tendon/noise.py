@@ -4,8 +4,8 @@
     -> psk, e
     <- e, ee
 
-and its primitives. The only module that uses libsodium (PyNaCl). It generates no random numbers: ephemeral keys
-are arguments, each for one handshake.
+and its primitives. This is the only module that uses libsodium (PyNaCl). It does not generate random numbers: ephemeral
+keys are passed as arguments, and each of them can be used for only one handshake.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def unseal(key: bytes, number: int, associated: bytes, sealed: bytes) -> bytes |
 
 
 def renewed(key: bytes) -> bytes:
-    """REKEY(key) of Noise: the next key, from which this one cannot be derived."""
+    """REKEY(key) of Noise. Returns the next key. It is not possible to derive this key from the next one."""
     return seal(key, 2**64 - 1, b"", bytes(KEY_SIZE))[:KEY_SIZE]
 
 
@@ -83,7 +83,7 @@ class SymmetricState:
     """
 
     def __init__(self, prologue: bytes) -> None:
-        self.hash = sha256(_PROTOCOL).digest()  # the name is longer than a hash
+        self.hash = sha256(_PROTOCOL).digest()  # because the name is longer than a hash
         self._chaining_key = self.hash
         self._key = b""
         self.mix_hash(prologue)
@@ -127,7 +127,8 @@ class SymmetricState:
 
 
 class Initiator:
-    """The client side. Each object must encrypt only one message 1, because another payload would reuse the nonce."""
+    """The client side. Each object must only be used to encrypt one message 1, because the nonce would be used again
+    for another payload."""
 
     def __init__(self, key: bytes, ephemeral: bytes, prologue: bytes, payload: bytes) -> None:
         self._ephemeral = ephemeral

@@ -32,7 +32,7 @@ class OutgoingRequests:
         self._next = 1
 
     def add(self, request: Request) -> int | None:
-        """Queues a request. Returns its id, or None if the window is full."""
+        """Queues a request. Returns the id of the request, or None if the window is full."""
         if len(self._open) == REQUEST_WINDOW:
             return None
         number = self._next

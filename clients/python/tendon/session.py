@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One session, usable by client and server (SESSION.md), as a state machine: bytes and times in, bytes and events
-out."""
+"""A session that can be used by clients and servers (SESSION.md). This is a state machine, whose inputs are bytes and
+times, and whose outputs are bytes and events."""
 
 from __future__ import annotations
 
@@ -64,13 +64,13 @@ def _end(port: PortState) -> tuple[int, int, bool]:
 
 
 class Session:
-    """Sans I/O: no socket, clock, thread or random numbers.
+    """It does no I/O and does not use a clock, threads or random numbers.
 
     Call `receive` for each datagram and `tick` when `next_turn()` is due, then call `next_event` and
     `next_datagram` until they are empty. `now` must not decrease.
 
-    All queues are bounded: one state, one force, one report and one port state (for each device, channel and end),
-    and limits.REQUEST_WINDOW requests in each direction. A value that was not taken is replaced by a newer one.
+    All queues are bounded: one state, one force, one report and one port state (for each device, channel and end), and
+    limits.REQUEST_WINDOW requests in each direction. If a newer value arrives before a value is taken, it replaces it.
     """
 
     def __init__(self, connection_id: int, opened: int, cipher: Cipher | None = None) -> None:
@@ -210,7 +210,7 @@ class Session:
     # ---- Out ----
 
     def next_datagram(self, now: int) -> bytes | None:
-        """Returns the next datagram to send, or None if there is none."""
+        """Returns the next datagram that should be sent, or None if there is none."""
         self.latest = now
         if self._byes_left > 0 and self._bye is not None:
             self._byes_left -= 1
@@ -360,7 +360,8 @@ class Session:
         return codec.write_data_head(now, echo)
 
     def _fill(self, now: int) -> bytes:
-        """Writes as many frames as fit, most time-critical first. The others are sent in the next datagram."""
+        """Writes as many frames as possible, the most time-critical ones first. The next datagram contains the
+        others."""
         body = bytearray(self._head(now))
 
         def add(frame: Frame) -> bool:

@@ -203,7 +203,8 @@ class Follower:
         return self._target
 
     def silence(self, now_ns: int) -> Pose | None:
-        """Must be called every few milliseconds while no state arrives. Returns the last target at first, then None."""
+        """This must be called every few milliseconds if no state arrives. At first, it returns the last target. Later,
+        it returns None."""
         self._advance(now_ns)
         if self._phase is not Following.ENGAGED or self._age() > self._late_ns + 20_000_000:
             self._waits = True

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A worker: a program that computes forces for a proxy, and that may be slow, stop or crash.
+"""A worker is a program that computes forces for a proxy. It may be slow, stop or crash.
 
     import tendon
 
@@ -31,7 +31,7 @@ from .messages import DeviceState, ForceCommand, Touch
 
 ADDRESS_VARIABLE = "TENDON_WORKER_ADDRESS"
 SECRET_VARIABLE = "TENDON_WORKER_SECRET"
-"""Environment variables of a worker: the address, unix:PATH or tcp:HOST:PORT, and the secret."""
+"""The environment variables of a worker. They contain the address, unix:PATH or tcp:HOST:PORT, and the secret."""
 
 OPENING_MAGIC = b"tendon worker 1\n"
 
@@ -50,14 +50,14 @@ class Communicator(Protocol):
 
 
 def run(answer: Physics, comm: Communicator | None = None) -> None:
-    """Answers each state with the result of `answer` until the proxy closes the stream. If it is None, no force is
-    known.
+    """Answers each state with the result of `answer` until the proxy closes the stream. If the result is None, the
+    force is not known.
 
     With `comm`, all ranks must call this function. `answer` is called with the same state on each rank, and the
     result of rank 0 is sent. Exceptions of `answer` propagate. With `comm`, they are printed and terminate all
     ranks, because the others could wait forever. The proxy then starts a new worker.
 
-    Forces that are not finite or out of bounds are sent unchanged; the proxy refuses, counts and reports them.
+    If a force is not finite or out of bounds, it is sent unchanged. The proxy refuses, counts and reports it.
 
     Raises RuntimeError if the address or secret is missing in the environment ("TENDON_WORKER_ADDRESS: …") or
     malformed, or if a record is not a state; ConnectionError if no proxy listens there; ValueError if an answer
@@ -85,8 +85,8 @@ class Stream:
         self._bytes = bytearray()
 
     def next_state(self) -> tuple[int, DeviceState] | None:
-        """Blocks until the next state and returns its sequence and the state. Returns None if the proxy has closed
-        the stream. Raises RuntimeError if the record is not a state."""
+        """Blocks until there is a state, and returns its sequence number and the state. Returns None if the proxy has
+        closed the stream. Raises RuntimeError if the record is not a state."""
         if (head := self._take(_LENGTH_BYTES)) is None:
             return None
         length = int.from_bytes(head, "little")
@@ -102,8 +102,8 @@ class Stream:
         raise RuntimeError("expected a state from the proxy, received something else")
 
     def send(self, sequence: int, hand: DeviceState, touch: Touch | Sequence[float] | None) -> bool:
-        """Answers the state `hand` with that `sequence`. If it is None, no force is known. Returns False if the
-        stream is closed. Raises ValueError if `touch` has a wrong shape."""
+        """Answers the state `hand` with that `sequence`. If `touch` is None, the force is not known. Returns False if
+        the stream is closed. Raises ValueError if `touch` has a wrong shape."""
         body = b"" if touch is None else codec.write_frame(_command(sequence, hand, touch))
         if len(body) > limits.MAX_DATAGRAM:
             raise ValueError(f"the answer has {len(body)} bytes: expected at most {limits.MAX_DATAGRAM}")
@@ -123,7 +123,7 @@ class Stream:
         self.close()
 
     def _take(self, size: int) -> bytes | None:
-        """Returns the next `size` bytes of the stream, or None at its end."""
+        """Returns the next `size` bytes of the stream, or None if the stream has ended."""
         while len(self._bytes) < size:
             try:
                 piece = self._socket.recv(4096)

@@ -8,20 +8,20 @@ import {
 
 /** The answer of a physics engine to one device state. */
 export interface Touch {
-  /** N, acting on the hand: a wall that resists motion along +x pushes along −x. */
+  /** The force on the hand, N. If a wall resists motion along +x, its force is along −x. */
   readonly force: Vec3;
   /**
    * N/m, −∂force/∂position at the state's position; a wall with normal n: k·n·nᵀ. The device loop uses it to
    * extrapolate the force until the next answer, if the server supports it.
    */
   readonly stiffness?: Stiffness | undefined;
-  /** m, distance from the state's position within which the stiffness is valid. */
+  /** The stiffness is valid within this distance from the position of the state, m. */
   readonly validRadius?: number | undefined;
   /** The contact surface, optionally with a table of force over depth. */
   readonly contact?: Contact | undefined;
-  /** The body was cut or torn since the previous answer. The server discards both local models. */
+  /** The body has been cut or torn since the previous answer. The server then discards both local models. */
   readonly topologyChanged?: boolean | undefined;
-  /** N, the engine's estimate of the error of the force. */
+  /** The error of the force as estimated by the engine, N. */
   readonly error?: number | undefined;
   /**
    * N·m, acting on the hand, axes of the base frame, about the handle's position. For handles with additional
@@ -33,7 +33,7 @@ export interface Touch {
    * the torque. Only valid if the state has an orientation.
    */
   readonly angularStiffness?: Stiffness | undefined;
-  /** N, on the fingers in the gripper; > 0 opens them. */
+  /** The force on the fingers in the gripper, N. If it is positive, it opens them. */
   readonly gripForce?: number | undefined;
   /**
    * Index into `ways` of the config of the method that computed this answer, starting at 1; absent: unspecified. It
@@ -63,7 +63,8 @@ export function objection(touch: Touch): string {
   return good ? "" : "its stiffness, radius, contact or error is not finite, or out of the bounds in WIRE.md";
 }
 
-/** Returns the part of an answer that a server with these features supports, and a description of the rest. */
+/** Returns the part of an answer that is supported by a server with these features, and a description of the omitted
+ * part. */
 export function usable(
   touch: Touch, hand: DeviceState, features: readonly string[],
 ): { readonly answer: Pick<ForceCommand, "force" | "model" | "torque" | "gripForce">; readonly leftOut: string } {

@@ -15,7 +15,7 @@ export const isRotation = ({ w, x, y, z }: Quat): boolean => isUnit(Math.hypot(w
 export const isNormal = (v: Vec3 | undefined): boolean =>
   v !== undefined && isVec3(v) && isUnit(Math.hypot(v.x, v.y, v.z));
 
-/** Returns whether both corners are present and min ≤ max, or neither is present. */
+/** Returns true if both corners are present and min ≤ max, or if neither is present. */
 export const isBox = (min: Vec3 | undefined, max: Vec3 | undefined): boolean =>
   min && max ? min.x <= max.x && min.y <= max.y && min.z <= max.z : !min && !max;
 
@@ -29,7 +29,7 @@ export const areCounts = (values: readonly bigint[], fewest: number, most: numbe
   isWithin(values.length, fewest, most);
 export const sum = (values: readonly bigint[]): bigint => values.reduce((total, value) => total + value, 0n);
 
-/** `refused` returns the name of the first field of a message that is out of bounds. */
+/** If a message is out of bounds, `refused` returns the name of the first wrong field. */
 export const areMessages = <Message>(
   messages: readonly Message[], fewest: number, most: number, refused: (message: Message) => string | undefined,
 ): boolean => isWithin(messages.length, fewest, most) && messages.every((message) => refused(message) === undefined);
@@ -43,7 +43,7 @@ export const isText = (text: string, bytes: number): boolean => kEncoder.encode(
 export const areTexts = (texts: readonly string[], fewest: number, most: number, bytes: number): boolean =>
   isWithin(texts.length, fewest, most) && texts.every((text) => isText(text, bytes));
 
-// The next two check the answer of an engine. An infinite radius is equivalent to an absent one.
+// The next two functions check the answer of an engine. An infinite radius is the same as an absent one.
 export const isRadius = (metres: number | undefined): boolean =>
   metres === undefined || metres === Infinity || isWithin(metres, 0, kMaxValue);
 export const isError = (newtons: number | undefined): boolean =>

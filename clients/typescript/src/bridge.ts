@@ -8,14 +8,14 @@ import { kMaxDatagram } from "./limits.js";
 import { addressText, isLoopback, lookUp, parseAddress, parseServer, udp } from "./udp.js";
 
 export interface BridgeConfig {
-  /** HOST:PORT for WebSockets; port 0: chosen by the system. */
+  /** The address for WebSockets, HOST:PORT. If the port is 0, it is chosen by the system. */
   readonly listen: string;
-  /** HOST:PORT of tendond; HOST is a name or an address. */
+  /** The address of tendond, HOST:PORT. HOST can be a name or an address. */
   readonly to: string;
-  /** Additional origins of pages that may connect: "https://lab.example". */
+  /** Other origins of pages that may connect, for example "https://lab.example". */
   readonly origins: readonly string[];
   readonly maxPeers: number;
-  /** The maximum number of datagrams per second from a page. Other datagrams are dropped. */
+  /** The maximum number of datagrams per second that are accepted from a page. Other datagrams are dropped. */
   readonly maxRateHz: number;
 }
 
@@ -26,24 +26,24 @@ export const kBridgeDefaults: BridgeConfig = {
 export interface BridgeCounts {
   peers: number;
   opened: number;
-  /** Refused: wrong origin, or too many WebSockets. */
+  /** The number of WebSockets that were refused because of a wrong origin, or because there were too many. */
   refusedOrigin: number;
   refusedFull: number;
   toServer: number;
   toPage: number;
-  /** Dropped: not a Tendon datagram. */
+  /** The number of messages that were dropped because they are not datagrams of Tendon. */
   malformed: number;
-  /** Dropped: unencrypted and from another machine. */
+  /** The number of messages that were dropped because they are unencrypted and from another machine. */
   plain: number;
   /** Dropped: above maxRateHz. */
   tooFast: number;
-  /** Dropped: replaced by a newer one because the page is too slow. */
+  /** The number of datagrams that were dropped for newer ones because the page is too slow. */
   tooSlow: number;
 }
 
-/** Bytes waiting in a WebSocket: about 60 ms of states at 1 kHz. */
+/** The maximum number of bytes that wait in a WebSocket, which is about 60 ms of states at 1 kHz. */
 const kMaxWaitingBytes = 16 * 1024;
-/** A page that is silent for this time is disconnected. A session sends every 50 ms. */
+/** If a page is silent for this time, it is disconnected. A session sends every 50 ms. */
 const kIdleMs = 30_000;
 
 /**
@@ -87,7 +87,7 @@ export class Bridge {
     return bridge;
   }
 
-  /** Address at which it listens, HOST:PORT. */
+  /** The address at which the bridge listens, HOST:PORT. */
   get address(): string {
     const { address, port } = this.#http.address() as AddressInfo;
     return addressText({ host: address, port });

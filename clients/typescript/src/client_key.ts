@@ -10,7 +10,7 @@ export function readClientKey(file: string): ClientKey {
   try {
     const status = statSync(file);
     if (!status.isFile()) throw new RangeError("it is not a regular file"); // opening a pipe would block
-    // Windows has no permission bits; all are set there.
+    // There are no permission bits in Windows, so all of them are set.
     if (process.platform !== "win32" && (status.mode & 0o077) !== 0) {
       throw new RangeError(
         "other users can read or write this key; run `chmod 600` on it, and create a new key if others may have read it",

@@ -46,7 +46,8 @@ export function encodeFrame(frame: Frame): Uint8Array {
   return toBinary(pb.DatagramSchema, create(pb.DatagramSchema, { frames: [{ body }] }));
 }
 
-/** Returns undefined if the body is malformed: not protobuf, too many frames, or without a valid time. */
+/** Returns undefined if the body is malformed, which means that it is not protobuf, has too many frames, or does not
+ * have a valid time. */
 export function decodeData(body: Uint8Array): DataContent | undefined {
   const datagram = parse(pb.DatagramSchema, body);
   if (!datagram || datagram.frames.length > limits.kMaxFrames) return undefined;
@@ -55,7 +56,7 @@ export function decodeData(body: Uint8Array): DataContent | undefined {
   const frames: Frame[] = [];
   let invalid = 0;
   for (const { body } of datagram.frames) {
-    if (body.case === undefined || body.case === "states") continue; // from a newer peer, or not requested
+    if (body.case === undefined || body.case === "states") continue; // sent by a newer peer, or not requested
     const frame = body.case === "control" ? readControl(body.value) : gen.readFrame(body);
     if (!frame || (frame.kind === "control" && frame.value.invalid !== undefined)) ++invalid;
     const told = frame ?? refusedAck(body);

@@ -11,23 +11,25 @@ import type { LinkStats } from "./session.js";
 import { kUsableSuites, namesOf } from "./suites.js";
 
 export interface ClientConfig {
-  /** For the log of the server; at most 64 bytes. */
+  /** This name is used in the log of the server. It has at most 64 bytes. */
   readonly name?: string;
-  /** Names of the device and its channel, at most 24 bytes each. Empty: the first one of the server. */
+  /** The names of the device and its channel, which have at most 24 bytes each. If a name is empty, this is the first
+   * one of the server. */
   readonly device?: string;
   readonly channel?: string;
   /**
-   * If another controller holds the lease of the channel, keep asking for it. The request is repeated when the server
-   * reports that the lease may have ended.
+   * If another controller has the lease of the channel, this client keeps asking for it. It sends the request again
+   * when the server reports that the lease may have ended.
    */
   readonly takeLease?: boolean;
   /** 32 bytes shared with the server for encryption. Without a key, only loopback is accepted. */
   readonly key?: Uint8Array | undefined;
   /** Cipher suites offered for an encrypted session. The server selects one. Default: all suites of this runtime. */
   readonly suites?: readonly CipherSuite[];
-  /** Calls of the callback per second, 0.001 … 100 000; 0: one for each new state. */
+  /** How often the callback is called per second, 0.001 … 100 000. If it is 0, it is called for each new state. */
   readonly rateHz?: number;
-  /** States per second to request from the server; 0: the default of the server. */
+  /** The number of states per second that is requested from the server. If it is 0, this is the default of the server.
+   * */
   readonly stateHz?: number;
   /**
    * How long after its arrival the server may use a force; at most 10 s. 0: max(3 T, 20 ms) with the period T between
@@ -38,10 +40,10 @@ export interface ClientConfig {
   /** Omit forces that a human cannot distinguish from the last one sent. Absent: every force is sent. */
   readonly deadband?: ForceDeadband | undefined;
   /**
-   * The server omits states that the client can predict. If rateHz = r > 0, the callback runs at multiples of 1/r
-   * with the state predicted for that time, including tick and sampling time. Ticks always increase. States are
-   * predicted for at most maxSilenceUs. If rateHz = 0, the callback receives only received states. Absent: all states
-   * are requested.
+   * The server omits states that can be predicted by the client. If rateHz = r > 0, the callback runs at multiples of
+   * 1/r with the state predicted for that time, including tick and sampling time. Ticks always increase. A state is not
+   * predicted for longer than maxSilenceUs. If rateHz = 0, the callback receives only received states. Absent: all
+   * states are requested.
    */
   readonly stateDeadband?: StateDeadband | undefined;
   /**
@@ -54,13 +56,14 @@ export interface ClientConfig {
   /** Requests access to the outputs of the device (HandleDescription.outputs: lamps, vibration), for setOutput(). */
   readonly outputs?: boolean;
   /**
-   * Names of the methods with which this engine computes forces. Touch.way is an index into this list, starting at 1.
-   * Observers and recordings receive the names. At most 8 unique names, each of 1 to 24 bytes.
+   * The names of the methods that are used by this engine to compute forces. Touch.way is an index into this list,
+   * starting at 1. Observers and recordings receive the names. There can be at most 8 different names, and each of them
+   * has 1 to 24 bytes.
    */
   readonly ways?: readonly string[];
-  /** The time for which an attempt waits for an answer. */
+  /** The time to wait for an answer in an attempt. */
   readonly patienceMs?: number;
-  /** Wait before the first retry. It doubles with each attempt. */
+  /** The time to wait before the first retry. It is doubled after each attempt. */
   readonly retryMinMs?: number;
   readonly retryMaxMs?: number;
   /** Returns random bytes for the handshakes. Default: those of the system. */
@@ -76,29 +79,29 @@ export type Phase = "greeting" | "open" | "unanswered" | "refused" | "lost" | "s
 
 export interface ClientStats {
   phase: Phase;
-  /** Why the last attempt or session ended, with the message of the server if there is one. */
+  /** The reason for the end of the last attempt or session, and the message of the server if there is one. */
   code: Code;
   reason: string;
-  /** Of the current or the last session. */
+  /** The statistics of the current session or the last one. */
   link: LinkStats | undefined;
   attempts: number;
-  /** Attempts that the server accepted. */
+  /** The number of attempts that were accepted by the server. */
   sessions: number;
   states: number;
-  /** Predicted states that the callback received. */
+  /** The number of predicted states that were passed to the callback. */
   statesPredicted: number;
-  /** Received states that a newer one replaced before the callback ran. */
+  /** The number of received states that were replaced by a newer one before the callback was called. */
   statesSkipped: number;
   forces: number;
-  /** Forces not sent because they are not finite or out of bounds. */
+  /** The number of forces that were not sent because they are not finite or out of bounds. */
   forcesUnusable: number;
-  /** Reason for the newest unusable force. Empty if there is none. */
+  /** The reason for the newest force that was unusable. Empty if there is none. */
   unusable: string;
-  /** The omitted part of the forces, and the reason. Empty if there is none. */
+  /** The part of the forces that was omitted, and the reason. Empty if there is none. */
   leftOut: string;
-  /** Forces not sent because they are within the deadband. */
+  /** The number of forces that were not sent because they are within the deadband. */
   forcesAlike: number;
-  /** The client that has taken over the channel. Empty if there is none. */
+  /** The client that has taken over this channel. Empty if there is none. */
   leaseLostTo: string;
 }
 

@@ -6,24 +6,24 @@ import type {
 } from "./messages.js";
 import { fromMilliseconds, kNever, toMilliseconds, type Nanoseconds } from "./time.js";
 
-/** Sends and receives datagrams of one server. */
+/** Sends datagrams to a server and receives its datagrams. */
 export interface Transport {
-  /** Sends a datagram, or drops it. */
+  /** Sends a datagram. If this is not possible, the datagram is dropped. */
   send(datagram: Uint8Array): void;
   /** Called after an attempt or a session, when the server's address may have changed. `another`: it did not answer. */
   again?(another: boolean): void;
   close(): void;
 }
 /**
- * Opens a transport to one server: udp() of "tendon-client/node", webSocket(), or your own. Must not call back
- * synchronously. `fail` reports a permanent error and ends the client.
+ * Opens a transport to one server: udp() of "tendon-client/node", webSocket(), or your own. It must not call back
+ * synchronously. Use `fail` to report a permanent error, which ends the client.
  */
 export type OpenTransport = (receive: (datagram: Uint8Array) => void, fail: (error: Error) => void) => Transport;
 
 export interface ConnectConfig extends ClientConfig {
   readonly onPhase?: (guest: Guest) => void;
   readonly onReport?: (report: LinkReport) => void;
-  /** Called for each new reason why a force, or a part of it (`leftOut`), was not sent. */
+  /** This is called when there is a new reason for not sending a force, or a part of it (`leftOut`). */
   readonly onUnusable?: (why: string) => void;
 }
 
@@ -38,11 +38,12 @@ export interface Guest {
   readonly handle: HandleDescription | undefined;
   /** Whether this client holds the channel. Otherwise the physics callback is not called. */
   readonly holds: boolean;
-  /** Newest report on the received forces, once per second while they arrive. */
+  /** The newest report on the received forces. It is sent once per second if there are any. */
   readonly report: LinkReport | undefined;
-  /** Newest report on the loop of the device, once per second. Requires `diagnostics`. */
+  /** The newest report on the loop of the device, which is sent once per second. Requires `diagnostics`. */
   readonly deviceReport: DeviceReport | undefined;
-  /** The newest report on the engine of each channel, kept when the engine leaves. Requires `diagnostics`. */
+  /** The newest report on the engine of each channel. If the engine leaves, the report is not removed. Requires
+   * `diagnostics`. */
   readonly peerReports: ReadonlyMap<number, PeerReport>;
   stats(): ClientStats;
   rearm(): boolean;
@@ -104,7 +105,8 @@ class RealTimeGuest implements Guest {
   #timerDue: Nanoseconds = kNever;
   #deferred = false;
   #ended = false;
-  /** Datagrams since the last round of the event loop, and the number of rounds by which they delayed the turn. */
+  /** The number of datagrams since the last round of the event loop, and the number of rounds for which they have
+   * delayed the turn. */
   #arrived = 0;
   #rounds = 0;
 

@@ -27,7 +27,7 @@ export interface Header {
   readonly type: DatagramType;
   readonly epoch: number;
   readonly suite: CipherSuite;
-  /** Assigned by the server; 0 before that. */
+  /** This is assigned by the server. It is 0 before that. */
   readonly connectionId: number;
   /** 0, 1, 2 … for each direction in Data, otherwise 0. */
   readonly packetNumber: bigint;
@@ -69,7 +69,7 @@ export interface HelloDatagram {
   readonly suite: CipherSuite;
   /** 16 bytes chosen by the client, which identify the attempt in Retry and Answer. */
   readonly random: Uint8Array;
-  /** 16 bytes chosen by the server; zeros in the first Hello. */
+  /** 16 bytes that are chosen by the server. They are zero in the first Hello. */
   readonly cookie: Uint8Array;
   /** Suite 0: message Hello. Suite 1: key id, then Noise message 1. */
   readonly content: Uint8Array;

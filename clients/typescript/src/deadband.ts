@@ -13,7 +13,7 @@ export interface ForceDeadband {
   readonly share: number;
   /** N, typically 0.05. Smaller changes are omitted until the longest silence. */
   readonly floor: number;
-  /** Typically 20. Limits the time for which the device renders an old force after a packet loss. */
+  /** Typically 20. This limits how long an old force is rendered by the device after a packet loss. */
   readonly longestSilenceMs: number;
 }
 
@@ -32,7 +32,8 @@ export function checkStateDeadband({ share, floor, maxSilenceUs }: StateDeadband
   expect(possible, "stateDeadband.maxSilenceUs", maxSilenceUs, "0, or a whole number from 1000 to 20000");
 }
 
-/** m, from the center to the end of a handle. Converts the floor of a force (N) to that of a torque (N·m). */
+/** The distance from the center to the end of a handle, m. It is used to convert the floor of a force (N) to that of a
+ * torque (N·m). */
 const kHandleLever = 0.05;
 const kZero: Vec3 = { x: 0, y: 0, z: 0 };
 
@@ -45,8 +46,8 @@ export class Deadband {
     this.#config = config;
   }
 
-  /** Returns whether one of the three values must be sent, or has appeared or disappeared. If so, all are recorded as
-   * sent. */
+  /** Returns true if one of the three values must be sent, or if it has appeared or disappeared. In this case, all of
+   * them are recorded as sent. */
   passes(now: Nanoseconds, value: Pick<ForceCommand, "force" | "torque" | "gripForce">): boolean {
     const { floor, longestSilenceMs } = this.#config;
     const { x, y, z } = value.force;

@@ -10,7 +10,7 @@ export function clip(text: string, limit: number): string {
   const { read } = kEncoder.encodeInto(text, new Uint8Array(limit));
   return text.slice(0, read);
 }
-/** Truncates the first `most` texts, and drops the rest. */
+/** Returns only the first `most` texts, and truncates them. */
 export const clipAll = (texts: readonly string[], most: number, limit: number): string[] =>
   texts.slice(0, most).map((text) => clip(text, limit));
 

@@ -8,9 +8,9 @@ import { Mode, type Contact, type DeviceState, type Quat, type Vec3 } from "./me
 export interface Pose {
   /** m */
   readonly position: Vec3;
-  /** Unit quaternion. Absent: only the position is controlled. */
+  /** A unit quaternion. If it is absent, only the position is controlled. */
   readonly orientation?: Quat | undefined;
-  /** Opening of the gripper, m or rad. Absent: no gripper. */
+  /** The opening of the gripper, m or rad. It is absent if there is no gripper. */
   readonly grip?: number | undefined;
 }
 
@@ -18,13 +18,13 @@ export interface Pose {
 export interface ToolContact {
   /** N */
   readonly force: Vec3;
-  /** N·m, about the position of the tool. */
+  /** The torque about the position of the tool, N·m. */
   readonly torque?: Vec3 | undefined;
-  /** N/m, > 0, of the surface along its normal, if known. */
+  /** The stiffness of the surface along its normal, N/m. It must be positive, and is absent if it is not known. */
   readonly stiffness?: number | undefined;
-  /** Points from the surface to the tool. Absent: along the force. */
+  /** This points from the surface to the tool. If it is absent, it is the direction of the force. */
   readonly normal?: Vec3 | undefined;
-  /** N, on the fingers; > 0 opens them. */
+  /** The force on the fingers, N. If it is positive, it opens them. */
   readonly gripForce?: number | undefined;
 }
 
@@ -105,8 +105,8 @@ function complete(given: FollowerConfig): Complete {
 }
 
 /**
- * Position mapping, clutch and reaction to loss of connection. It has no clock and no timer: `nowMs` is the arrival
- * time of a state, from any monotonic clock (performance.now()).
+ * Position mapping, clutch and reaction to loss of connection. It does not use a clock or a timer: `nowMs` is the
+ * arrival time of a state, from any monotonic clock (performance.now()).
  *
  *     const follow = new Follower({ scale: 0.5, clutchButton: 1 });
  *     const physics = (hand: DeviceState) => {

@@ -15,8 +15,8 @@ import {
 import { Session, type LinkStats } from "./session.js";
 import { earliest, fromMilliseconds, kNever, latest, type Nanoseconds } from "./time.js";
 
-/** The physics engine as a callback. While it computes, newer states replace older ones. If it returns null, nothing
- * is sent. */
+/** The physics engine as a callback. If a newer state arrives during the computation, it replaces the older one. If the
+ * callback returns null, no force is sent. */
 export type Physics = (hand: DeviceState) => Vec3 | Touch | null;
 
 /** Callback of an observer. */
@@ -24,17 +24,18 @@ export type Watch = (hand: DeviceState, link: Readonly<LinkStats>) => void;
 
 const kValidPeriods = 3;
 const kMinValidForMs = 20;
-/** If the gap is longer, it is not used as a period. An engine below 10 Hz must set rateHz. */
+/** If the gap is longer, it is not used as a period. If an engine is slower than 10 Hz, it must set rateHz. */
 const kMaxObservedPeriodMs = 100;
-/** The minimum time between two requests for a lease. The current holder renews its lease continuously. */
+/** There must be at least this time between two requests for a lease, because the current holder renews its lease
+ * continuously. */
 const kAskLeaseAgain = fromMilliseconds(50);
 
 /** Indices used if neither device nor channel is named. */
 const kFirstPlace: Omit<Grant, "role"> = { device: 0, channel: 0 };
 
 /**
- * A client of a Tendon server, without socket, clock or timer. It opens a session and keeps it alive, passes the
- * newest device state to one callback, sends the returned force, and reconnects after the session ends.
+ * A client of a Tendon server that does not use a socket, a clock or a timer. It opens a session and keeps it alive,
+ * passes the newest device state to one callback, sends the returned force, and reconnects after the session ends.
  *
  *     client.receive(now, datagram) for each received datagram; then client.turn(now), again at the returned time.
  *
@@ -52,7 +53,7 @@ export class ForceClient {
   readonly #physics: Physics | undefined;
   readonly #watch: Watch | undefined;
   readonly #send: (datagram: Uint8Array) => void;
-  /** Period of the callback; 0: none. */
+  /** The period of the callback. If it is 0, there is none. */
   readonly #period: Nanoseconds;
 
   #handshake: ClientHandshake | undefined;
@@ -71,16 +72,16 @@ export class ForceClient {
   #giveUp = 0n;
   /** Start of the next attempt. */
   #retry = 0n;
-  /** Wait before the attempt after that. */
+  /** The time to wait before the next attempt. */
   #backOff: Nanoseconds;
 
-  /** Newest state that the callback has not received. */
+  /** The newest state that has not been passed to the callback. */
   #unseen: DeviceState | undefined;
-  /** Buttons pressed in any state since the last callback. */
+  /** The buttons that were pressed in any state since the last callback. */
   #pressed = 0;
   #newest: DeviceState | undefined;
   #newestArrived: Nanoseconds;
-  /** Newest tick passed to the callback. */
+  /** The newest tick that was passed to the callback. */
   #seenTick = 0n;
   /** Id of the pending request for the state deadband. */
   #deadbandRequest: number | undefined;
@@ -92,7 +93,7 @@ export class ForceClient {
   #peerReports: ReadonlyMap<number, PeerReport> = new Map();
   #nextCall: Nanoseconds;
   #sequence = 0n;
-  /** State tick that the newest force answers. */
+  /** The tick of the state that is answered by the newest force. */
   #answeredTick = 0n;
   readonly #stats: ClientStats = {
     phase: "greeting", code: Code.OK, reason: "", link: undefined, attempts: 0, sessions: 0, states: 0, statesPredicted: 0,
@@ -188,8 +189,8 @@ export class ForceClient {
 
   /**
    * Sets an indicator lamp or starts a vibration pulse (HandleDescription.outputs). Requires the channel (`holds`).
-   * Returns false as rearm() does, and without `outputs` in the config. Throws a RangeError if `setting` is out of
-   * bounds.
+   * Returns false in the same cases as rearm(), and if `outputs` is not set in the config. Throws a RangeError if
+   * `setting` is out of bounds.
    */
   setOutput(output: number, setting: LampColour | Vibration): boolean {
     const wanted: Request = { kind: "setOutput", device: this.#place.device, output, setting };
@@ -204,7 +205,8 @@ export class ForceClient {
   get holds(): boolean {
     return this.#holds;
   }
-  /** Requests the lease of the channel, again if it is lost before the answer. Returns false as rearm() does. */
+  /** Requests the lease of the channel. If it is lost before the answer, the request is sent again. Returns false as
+   * rearm() does. */
   takeLease(): boolean {
     const { device, channel } = this.#place;
     const asked = this.#session?.request({ kind: "takeLease", device, channel });
@@ -251,7 +253,7 @@ export class ForceClient {
     return this.#handle;
   }
 
-  /** Newest report on the received forces in this session. Sent once per second while forces arrive. */
+  /** The newest report on the received forces in this session. It is sent once per second if there are any. */
   get report(): LinkReport | undefined {
     return this.#report;
   }
@@ -260,7 +262,8 @@ export class ForceClient {
   get deviceReport(): DeviceReport | undefined {
     return this.#deviceReport;
   }
-  /** The newest report on the engine of each channel, kept when the engine leaves. Requires `diagnostics`. */
+  /** The newest report on the engine of each channel. If the engine leaves, the report is not removed. Requires
+   * `diagnostics`. */
   get peerReports(): ReadonlyMap<number, PeerReport> {
     return this.#peerReports;
   }
@@ -380,8 +383,8 @@ export class ForceClient {
       } else if (event.kind === "request") {
         this.#takeRequest(now, event.id, event.request);
       } else if (event.kind === "closed") {
-        this.#flush(now); // sends the Bye of a session that reached its maximum age
-        // Reconnecting would start a cycle of replacements.
+        this.#flush(now); // sends the Bye if a session has reached its maximum age
+        // Reconnecting would start a cycle in which both programs replace each other.
         this.#end(now, event.code === Code.REPLACED ? "stopped" : "lost", event.code, event.reason);
       }
     }
@@ -446,12 +449,13 @@ export class ForceClient {
     }
   }
 
-  /** Returns the state predicted for `now`, or undefined if there is nothing new or the last state is too old. */
+  /** Returns the state that is predicted for `now`. Returns undefined if there is nothing new, or if the last state is
+   * too old. */
   #predicted(now: Nanoseconds): DeviceState | undefined {
     const age = now - this.#newestArrived;
     if (!this.#newest || age > this.#silence()) return undefined;
     const state = predict(this.#newest, age, this.#hapticPeriod());
-    if (state.tick <= this.#seenTick) return undefined; // the previous state had a shorter network delay
+    if (state.tick <= this.#seenTick) return undefined; // the network delay of the previous state was shorter
     if (state.tick > this.#newest.tick) ++this.#stats.statesPredicted;
     return state;
   }
@@ -510,7 +514,7 @@ export class ForceClient {
     return Math.min(Math.max(kValidPeriods * period, kMinValidForMs), kMaxValidForMs);
   }
 
-  /** Returns the time of the next callback, or kNever if no unseen state is available. */
+  /** the first tick that was not passed on */
   #nextDue(): Nanoseconds {
     if (!this.#predicts) return this.#unseen ? this.#nextCall : kNever;
     if (!this.#newest) return kNever;

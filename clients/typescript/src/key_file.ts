@@ -3,19 +3,20 @@ import { Role } from "./messages.js";
 import { kKeySize } from "./noise.js";
 
 export interface ClientKey {
-  /** The maximum role; a controller may also observe. */
+  /** The maximum role of a client with this key. A controller may also be an observer. */
   readonly role: Role;
   readonly key: Uint8Array;
 }
 
-/** 32 random bytes have about 30 distinct values. Fewer than 18 occur once in 10¹¹ keys. */
+/** In 32 random bytes, there are about 30 different values. The probability that there are fewer than 18 is one in
+ * 10¹¹. */
 const kFewestDifferent = 18;
 const kExpected = "expected one line, `controller` or `observer` and 64 hexadecimal digits";
 
 /**
- * Parses a key file, which `tendond keygen` writes: empty lines and lines that begin with # are ignored, and one line
- * contains `controller` or `observer` and 64 hexadecimal digits. Throws a RangeError with a message that does not
- * contain the key if the text is malformed or the key is weak.
+ * Parses a key file, which is written by `tendond keygen`. The file contains one line with `controller` or `observer`
+ * and 64 hexadecimal digits. A line is ignored if it is empty or if it begins with #. Throws a RangeError with a
+ * message that does not contain the key if the text is malformed or the key is weak.
  */
 export function parseKeyFile(text: string): ClientKey {
   const lines = text.split("\n").map((line) => line.trim()).filter((line) => line !== "" && !line.startsWith("#"));
@@ -34,7 +35,7 @@ export function parseKeyFile(text: string): ClientKey {
   return { role, key };
 }
 
-/** Returns why the key is weak, or undefined. */
+/** Returns the reason if the key is weak, or undefined. */
 function weakness(key: Uint8Array): string | undefined {
   if (new Set(key).size < kFewestDifferent) return "it repeats the same few bytes";
   const steps = new Set(Array.from(key.subarray(1), (byte, i) => (byte - key[i]!) & 0xff));

@@ -18,10 +18,11 @@ export const kFeatureHandle = "handle";
 
 /** Feature: the client receives the joints of the device (`joints` in the config). */
 export const kFeatureJoints = "joints";
-/** Feature: the client receives the outputs of the device and may set them (`outputs` in the config). */
+/** Feature: the client receives the outputs of the device and can set them (`outputs` in the config). */
 export const kFeatureOutputs = "outputs";
 
-/** Feature: the client may be the other end of a coupling: it sends Couple, and PortStates are sent both ways. */
+/** Feature: the client can be one of the ends of a coupling. It sends Couple, and PortStates are sent in both
+ * directions. */
 export const kFeatureTeleoperation = "teleoperation";
 
 /** Feature: an engine names its methods, and each force contains the method that computed it. */

@@ -10,7 +10,7 @@ export const kKeySize = 32;
 const kTagSize = 16;
 /** Nonce of REKEY. */
 const kMaxNonce = 0xffff_ffff_ffff_ffffn;
-const kName = "Noise_NNpsk0_25519_ChaChaPoly_SHA256"; // longer than a hash, so it is hashed
+const kName = "Noise_NNpsk0_25519_ChaChaPoly_SHA256"; // this is longer than a hash, so the hash is used
 const kNothing = new Uint8Array(0);
 
 const ascii = (text: string): Uint8Array => new TextEncoder().encode(text);
@@ -36,19 +36,20 @@ export function decrypt(key: Uint8Array, number: bigint, header: Uint8Array, sea
   }
 }
 
-/** Returns the next key, from which `key` cannot be derived. */
+/** Returns the next key. It is not possible to derive `key` from it. */
 export const rekey = (key: Uint8Array): Uint8Array =>
   encrypt(key, kMaxNonce, kNothing, new Uint8Array(kKeySize)).slice(0, kKeySize);
 
 /** Identifies the key to the server without revealing it: 8 bytes. */
 export const keyId = (key: Uint8Array): Uint8Array => sha256(concat(ascii("tendon-key-id"), key)).slice(0, 8);
 
-/** The hash and key that both sides have mixed so far. Immutable, so that an invalid message changes nothing. */
+/** The hash and key that both sides have mixed so far. This is immutable, so that it is not changed by an invalid
+ * message. */
 export class SymmetricState {
   private constructor(
     readonly hash: Uint8Array,
     readonly chainingKey: Uint8Array,
-    /** Empty before the first is mixed in. */
+    /** This is empty before the first key is mixed in. */
     readonly key: Uint8Array = kNothing,
     readonly number: bigint = 0n,
   ) {}
@@ -110,7 +111,7 @@ export interface Finished {
   readonly sendKey: Uint8Array;
   /** Decrypts responder → initiator. */
   readonly receiveKey: Uint8Array;
-  /** Handshake hash, equal on both sides. */
+  /** The hash of the handshake, which is equal on both sides. */
   readonly hash: Uint8Array;
 }
 
@@ -135,7 +136,7 @@ export class Initiator {
     this.#state = state;
   }
 
-  /** Returns undefined and changes nothing if the sender does not know the key. */
+  /** Returns undefined if the sender does not know the key. In this case, nothing is changed. */
   readMessage2(message: Uint8Array): Finished | undefined {
     if (message.length < kKeySize + kTagSize) return undefined;
     const theirs = message.slice(0, kKeySize);

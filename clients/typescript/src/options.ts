@@ -9,13 +9,13 @@ import { parseServer } from "./udp.js";
 export interface Options extends ClientConfig {
   /** Address of tendond. */
   readonly server: string;
-  /** 0: run until SIGINT or SIGTERM. */
+  /** The duration of the run. If it is 0, it is run until SIGINT or SIGTERM. */
   readonly durationS: number;
   /** Print the final summary to stdout as one JSON object instead of to stderr as text. */
   readonly json: boolean;
 }
 
-/** Default and description of a number ≥ 0 or a flag. */
+/** The default and the description of an option, which is a number ≥ 0 or a flag. */
 type Extra = readonly [number, string] | readonly [false, string];
 type ValueOf<E extends Extra> = E extends readonly [number, string] ? number : boolean;
 

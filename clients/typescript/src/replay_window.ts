@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-/** 2048 bits, of which 64 are being filled, so that at least 1984 numbers are remembered. */
+/** There are 2048 bits. Since 64 of them are being filled, at least 1984 numbers are remembered. */
 const kWords = 32n;
 const kRemembered = (kWords - 1n) * 64n;
 

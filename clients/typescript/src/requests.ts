@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reliable requests of a session: they arrive exactly once and in order, and each is answered. The requester repeats
-// each until it is answered; the receiver stores its last 16 answers and repeats an answer if the request is
+// Reliable requests of a session. They arrive exactly once and in order, and each of them is answered. A request is
+// repeated until it is answered. The receiver stores its last 16 answers and repeats an answer if the request is
 // repeated. This is sufficient because at most 16 requests are pending: when n + 16 arrives, the answer to n has been
 // received.
 import type { Control, ControlAck } from "./codec.js";
@@ -12,7 +12,7 @@ const kMaxId = 0xffffffff;
 
 interface Asked {
   readonly control: Control;
-  /** Undefined before the first transmission. */
+  /** This is undefined before the first transmission. */
   due: Nanoseconds | undefined;
   timesSent: number;
   answer: ControlAck | undefined;
@@ -20,10 +20,11 @@ interface Asked {
 
 /** The requesting side. */
 export class OutgoingRequests {
-  /** Upper limit of the exponential back-off, unless the round trip is longer. */
+  /** The upper limit of the exponential back-off, unless the round trip is longer. */
   static readonly kMaxWait = kSecond;
 
-  /** In order of the ids. The first one is the oldest without a taken answer. */
+  /** The requests are in the order of their ids. The first one is the oldest request whose answer has not been taken.
+   * */
   readonly #asked: Asked[] = [];
   #next = 1;
 

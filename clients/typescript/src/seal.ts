@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Protection of the body of a Data datagram: none, or authenticated encryption with key renewal.
+// Protects the body of a Data datagram. There is no protection, or authenticated encryption with key renewal.
 import { AesKey } from "./aes.js";
 import { CipherSuite, concat, DatagramType, encodeHeader, kHeaderSize, type Header } from "./datagram.js";
 import { decrypt, encrypt, rekey } from "./noise.js";
@@ -11,7 +11,8 @@ export interface Seal {
   readonly overhead: number;
   /** Returns the datagram. */
   close(now: Nanoseconds, connectionId: number, packetNumber: bigint, body: Uint8Array): Uint8Array;
-  /** Returns the body. "forged": authentication failed. "oldKey": the key has expired or is far ahead. */
+  /** Returns the body. The result is "forged" if the authentication failed, and "oldKey" if the key has expired or is
+   * too far ahead. */
   open(now: Nanoseconds, header: Header, datagram: Uint8Array): Uint8Array | "forged" | "oldKey";
 }
 
@@ -28,7 +29,7 @@ export class PlainSeal implements Seal {
   }
 }
 
-/** A key of suite 1 with the interface of AesKey. */
+/** A key of suite 1 that has the same interface as AesKey. */
 class ChaChaKey {
   constructor(private readonly key: Uint8Array) {}
 
@@ -49,9 +50,9 @@ type SealingKey = ChaChaKey | AesKey;
  * Suites 1 and 2: ChaCha20-Poly1305 or AES-256-GCM with the packet number as nonce and the header as associated data.
  */
 export class NoiseSeal implements Seal {
-  /** The key of the sender is renewed after this number of datagrams or after this time. */
+  /** The sender renews its key after this number of datagrams, or after this time. */
   static readonly kRenewAfter = { datagrams: 1n << 20n, time: 600n * kSecond };
-  /** How long the previous key stays valid after a renewal. */
+  /** After a renewal, the previous key can be used for this time. */
   static readonly kOverlap = 2n * kSecond;
 
   readonly overhead = 16;

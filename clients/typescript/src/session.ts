@@ -21,25 +21,26 @@ export interface LinkStats {
   sent: number;
   /** Accepted. */
   received: number;
-  /** Packet numbers of the peer that were never received (so far). */
+  /** The number of packets of the peer that have never been received (so far). */
   lost: number;
-  /** Packets that the peer had not received according to its ack vectors. */
+  /** The number of packets that were not received by the peer according to its ack vectors. */
   lostOutgoing: number;
-  /** Accepted, but older than a previous one. */
+  /** The number of datagrams that were accepted but are older than a previous one. */
   reordered: number;
-  /** Dropped: received before, older than the window, or of the handshake. */
+  /** The number of datagrams that were dropped because they were received before, are older than the window, or belong
+   * to the handshake. */
   duplicated: number;
-  /** Dropped: not a datagram of this session. */
+  /** The number of datagrams that were dropped because they do not belong to this session. */
   malformed: number;
-  /** Dropped: authentication failed (suites 1 and 2). */
+  /** The number of datagrams that were dropped because the authentication failed (suites 1 and 2). */
   forged: number;
-  /** Dropped: its key has expired or is far ahead (suites 1 and 2). */
+  /** The number of datagrams that were dropped because their key has expired or is too far ahead (suites 1 and 2). */
   oldKey: number;
-  /** Frame dropped: a value is out of bounds (NaN, Infinity …). */
+  /** The number of frames that were dropped because a value is out of bounds (NaN, Infinity …). */
   invalid: number;
-  /** Frame dropped: not newer than the newest state, force or report. */
+  /** The number of frames that were dropped because they are not newer than the newest state, force or report. */
   stale: number;
-  /** ms, newest sample; undefined before the first. */
+  /** The newest sample of the round trip, ms. It is undefined before the first one. */
   roundTripMs: number | undefined;
   /** ms, SRTT of RFC 6298. */
   smoothedRoundTripMs: number;
@@ -47,12 +48,12 @@ export interface LinkStats {
   roundTripVariationMs: number;
 }
 
-/** Sent to observers that request diagnostics. */
+/** These are sent to observers that request diagnostics. */
 export type Diagnosis =
   | { readonly kind: "deviceReport"; readonly value: DeviceReport }
   | { readonly kind: "peerReport"; readonly value: PeerReport };
 
-/** Key of the streams in which the newest report replaces older ones. */
+/** The key of the streams in which only the newest report is kept. */
 function streamOf({ kind, value }: Diagnosis): string {
   return kind === "deviceReport" ? `${value.device}` : `${value.device}/${value.channel}`;
 }
@@ -77,14 +78,15 @@ export type SessionEvent =
   | { readonly kind: "port"; readonly port: PortState }
   | { readonly kind: "request"; readonly id: number; readonly request: Request }
   | ({ readonly kind: "answered" } & ControlAck)
-  /** The last event, after a Bye of the peer. Code.TIMED_OUT: the peer was silent; Code.EXPIRED: maximum age reached.
+  /** This is the last event if the peer has sent a Bye. Code.TIMED_OUT: the peer was silent. Code.EXPIRED: the maximum
+   * age was reached.
    */
   | { readonly kind: "closed"; readonly code: Code; readonly reason: string };
 
 export interface SessionConfig {
   readonly connectionId: number;
   readonly seal?: Seal;
-  /** The maximum time between two datagrams. */
+  /** There must not be a longer time between two datagrams. */
   readonly keepAlive?: Nanoseconds;
   /** The session is closed if the peer is silent for this time. */
   readonly timeout?: Nanoseconds;
@@ -95,11 +97,11 @@ export interface SessionConfig {
 }
 
 /**
- * One session, usable by client and server, sans I/O: bytes and times in, bytes and events out. The protocol is
- * described in protocol/SESSION.md.
+ * A session that can be used by clients and servers, without I/O. Its inputs are bytes and times, and its outputs are
+ * bytes and events. The protocol is described in protocol/SESSION.md.
  *
- * States, forces and reports: the newest value replaces older ones. Requests are reliable and ordered. Each datagram
- * contains an echo, which yields a round trip and an ack vector. All queues are bounded.
+ * In states, forces and reports, an older value is replaced by the newest one. Requests are reliable and ordered. Each
+ * datagram contains an echo, which yields a round trip and an ack vector. All queues are bounded.
  *
  * Call `receive` for each datagram and `tick` when `nextTick()` is due, then call `nextEvent` and `nextDatagram`
  * until they are empty.
@@ -137,7 +139,7 @@ export class Session {
   #newestReport = 0n;
   readonly #newestDiagnosis = new Map<string, bigint>();
   readonly #newestPort = new Map<string, PortState>();
-  /** Newest sent packet that the peer has echoed. */
+  /** The newest packet that was sent and has been echoed by the peer. */
   #newestEchoed = -1n;
   readonly #answering = new IncomingRequests();
   readonly #roundTrip = new RoundTrip();
@@ -407,8 +409,8 @@ export class Session {
   }
 
   /**
-   * Writes as many frames as fit, most time-critical first. The others are sent in the next datagram. State and force
-   * always fit together.
+   * Writes as many frames as possible, the most time-critical ones first. The next datagram contains the others. There
+   * is always enough space for a state and a force.
    */
   #write(now: Nanoseconds): Uint8Array {
     const { connectionId, seal, minResend } = this.#config;

@@ -25,7 +25,7 @@ export function parseAddress(text: string): Address {
 
 export const addressText = ({ host, port }: Address): string => `${isIPv6(host) ? `[${host}]` : host}:${port}`;
 
-/** Whether the address is in 127.0.0.0/8 or ::1. False for names. */
+/** Returns true if the address is in 127.0.0.0/8 or ::1. Returns false for names. */
 export function isLoopback(host: string): boolean {
   const ip = host.replace(/^::ffff:/i, "");
   return isIPv4(ip) ? ip.startsWith("127.") : ip === "::1";
@@ -52,7 +52,7 @@ export async function lookUp(host: string): Promise<readonly string[]> {
   }
 }
 
-/** The maximum number of datagrams waiting for the socket; older ones are dropped. */
+/** The maximum number of datagrams that wait for the socket. If there are more, the oldest ones are dropped. */
 const kMostWaiting = 16;
 
 /**
@@ -66,13 +66,13 @@ export function udp(server: string): OpenTransport {
     let socket: Socket | undefined;
     let present = "";
     let closed = false;
-    /** Used until a socket is connected, which takes some rounds of the event loop. */
+    /** This is used until a socket is connected, which takes some rounds of the event loop. */
     const waiting: Uint8Array[] = [];
     const send = (datagram: Uint8Array): void => {
       if (socket) socket.send(datagram, () => {});
       else if (waiting.push(datagram) > kMostWaiting) waiting.shift();
     };
-    /** Resolves to whether the address is reachable. */
+    /** The result is true if the address is reachable. */
     const moveTo = (ip: string): Promise<boolean> =>
       new Promise((resolve) => {
         const next = createSocket(isIPv6(ip) ? "udp6" : "udp4");

@@ -5,16 +5,16 @@ import type { OpenTransport } from "./connect.js";
 const kMaxWaitingBytes = 16 * 1024;
 
 /**
- * Transport for browsers, which have no UDP: each binary message contains one datagram, which tendon-bridge forwards
- * unchanged. With a key, the bridge sees only encrypted datagrams. After the WebSocket is closed, the next datagram
- * opens a new one; a session of suite 1 continues over it.
+ * A transport for browsers, which cannot use UDP. Each binary message contains one datagram, and the WebSocket bridge
+ * forwards it unchanged. If there is a key, the bridge only sees encrypted datagrams. After the WebSocket is closed,
+ * the next datagram opens a new one, and a session of suite 1 is continued.
  *
  *     webSocket("ws://127.0.0.1:47180")
  */
 export function webSocket(url: string | URL, WebSocketClass: typeof WebSocket = WebSocket): OpenTransport {
   return (receive) => {
     let socket: WebSocket | undefined;
-    /** The newest datagram sent while the socket was opening. */
+    /** The newest datagram that was sent before the socket was open. */
     let waiting: Uint8Array | undefined;
     let closed = false;
 

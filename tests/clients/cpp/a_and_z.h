@@ -44,7 +44,7 @@ class Network {
   void send(LocalTime now, const Address& from, const Address& to, std::span<const std::byte> bytes);
   /// Receives the next datagram for `to` that is due at `now`. Returns the size of the datagram, or 0 if there is none.
   std::size_t receive(LocalTime now, const Address& to, Address& from, std::span<std::byte> buffer);
-  /// Drops the datagrams that arrived while there was no open socket.
+  /// Drops the datagrams that have arrived while there was no open socket.
   void drop_arrived(LocalTime now);
   LocalTime next_arrival() const { return flying_.empty() ? LocalTime::max() : flying_.begin()->first; }
 
@@ -80,7 +80,7 @@ class Port : public Link {
   Address self_;
 };
 
-/// Serves one client at a time, the newest. The simulated hand moves along a known path.
+/// Serves a single client, which is the newest one. The simulated hand moves along a known path.
 class Server {
  public:
   Server(Link& link, std::uint8_t secret) : link_(link), handshake_(handshake_config(secret)) {}
@@ -95,7 +95,7 @@ class Server {
   static constexpr int kLoopHz = 1000;
   int state_hz = kLoopHz;
   std::optional<Turning> turning;
-  std::uint64_t press_every = 0;  ///< button 1 is pressed in one of this many states; 0: never
+  std::uint64_t press_every = 0;  ///< button 1 is pressed in one of this many states, or never if this is 0
 
   std::vector<Code> lease_answers;  ///< the answers to take_lease, followed by kOk
   int snatches = 0;                 ///< leases that are taken by another client immediately

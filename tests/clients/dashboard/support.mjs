@@ -21,7 +21,7 @@ export function scratch(test) {
   return folder;
 }
 
-/** A running program and the lines of its stdout and stderr. It is killed at the end of the test. */
+/** A running program and the lines that it has written to stdout and stderr. It is killed when the test has ended. */
 export class Program {
   lines = [];
   constructor(test, name, args, folder) {

@@ -252,7 +252,7 @@ describe("a scene whose z points up", () => {
   });
 });
 
-/** The scene of the example. The tool is moved along the axes of the scene. */
+/** The scene is that of the example. The tool is moved in the directions of the axes of the scene. */
 const kExample = readFileSync(join(kRoot, "clients/mujoco/examples/peg_in_hole.ts"), "utf8");
 const kPeg = /`([\s\S]*)`/.exec(kExample)![1]!.replace('name="peg"', 'name="tool"');
 const kProbes = [[1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 0], [1, -1, 0], [1, 0, 1], [1, 0, -1], [0, 1, 1], [0, 1, -1], [1, 1, 1]];

@@ -66,7 +66,7 @@ class Direction:
 
 
 class World:
-    """A is the client and Z the server, whose clock has an offset. The same seed reproduces the same run."""
+    """A is the client, and Z is the server, whose clock has an offset. If the seed is the same, the run is the same."""
 
     OFFSET = 1234 * 3600 * SECOND + 56789
     START = 100 * SECOND

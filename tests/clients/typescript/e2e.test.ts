@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// This test runs tendond, the compiled examples, and the bridge. TENDON_PROGRAMS is the folder of tendond.
+// This test runs tendond, the compiled examples, and the bridge. TENDON_PROGRAMS is the folder that contains tendond.
 import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
 import { createSocket } from "node:dgram";

@@ -22,7 +22,7 @@ class Rotations : public ::testing::Test {
  protected:
   Vec3 vector(double longest) { return dice_.direction() * dice_.within(0, longest); }
   Quat rotation() { return rotation_by(vector(std::numbers::pi)); }
-  /// Returns a random symmetric stiffness with eigenvalues between 0 and 2 N·m/rad.
+  /// Returns a random symmetric stiffness. The eigenvalues are between 0 and 2 N·m/rad.
   Mat3 stiffness() {
     const Mat3 turn = matrix_of(rotation());
     const Vec3 values(dice_.within(0, 2), dice_.within(0, 2), dice_.within(0, 2));
@@ -120,7 +120,7 @@ TEST_F(Rotations, ASpringIsStiffnessTimesAngleForSmallTurns) {
   }
 }
 
-/// Returns the work of the hand along a closed path, J. If it is negative, the spring generated energy.
+/// Returns the work of the hand (J) along a closed path. If it is negative, the spring generated energy.
 double work_round(const Mat3& k, const Quat& rest, const std::vector<Quat>& way) {
   constexpr int kParts = 40;  // per leg; three Gauss points in each part leave an error of about 1e-12 J
   constexpr std::array<std::pair<double, double>, 3> kGauss{

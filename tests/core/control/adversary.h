@@ -192,8 +192,8 @@ inline Friction random_friction(Dice& dice) {
   return {dice.chance(0.3) ? 0.0 : dice.decades(-3, -0.3), dice.decades(-2, 0.3)};
 }
 
-/// Counts the seeds for which the port generated energy. `make(claimed friction, longest hold)` returns the law. The
-/// law assumes a viscous friction that is too large by the factor `overclaim`.
+/// Counts the seeds for which the port generated energy. `make(claimed friction, longest hold)` must return the law.
+/// The law uses a viscous friction that is too large by the factor `overclaim`.
 template <int N, class Make>
 int broken_by_hostile_worlds(Make make, int seeds, double overclaim = 1) {
   int broken = 0;
@@ -212,8 +212,8 @@ int broken_by_hostile_worlds(Make make, int seeds, double overclaim = 1) {
   return broken;
 }
 
-/// This test is for laws that are only passive in static, convex worlds. `make` also gets the world's largest slope
-/// `stiffest`, N/m.
+/// This test is for laws that are only passive in static, convex worlds. `make` is also called with the largest slope
+/// of the world, `stiffest` (N/m).
 template <int N, class Make>
 int broken_by_static_worlds(Make make, int seeds, const Walls& walls = {}, int periods_late = 0) {
   int broken = 0;

@@ -176,8 +176,8 @@ Outcome run(Dice& dice, const Case<Blocks, Size>& c, int steps) {
   return outcome;
 }
 
-/// Adaptive friction (`f`) must be tested alone, because the interval in which the friction decreases is booked with
-/// the previous bound.
+/// Adaptive friction (`f`) must not be combined with other parts, because the interval in which the friction decreases
+/// is booked with the previous bound.
 template <int Blocks, int Size>
 void expect_passive(const std::string& listed, int seeds = 150) {
   SCOPED_TRACE(std::to_string(Blocks) + " blocks of " + std::to_string(Size));
@@ -302,7 +302,7 @@ TEST(AolPlus, WavingInFreeSpaceSwitchesThePlainLimiterOffButNotTheCappedOne) {
   EXPECT_NEAR(capped.limit({.force = Vec<1>(1e3)}).permitted, 0.02 + 2 * std::sqrt(0.26 * 0.005 / 1e-3), 1e-9);
 }
 
-/// Moves slowly to `depth` and back. Returns the share of the steps in which the force was limited.
+/// Moves slowly to `depth` and back. Returns the share of steps for which the force was limited.
 template <class Law>
 double limited_share(Law& law, double stiffness, double depth) {
   double applied = 0;

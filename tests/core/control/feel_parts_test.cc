@@ -19,7 +19,7 @@ AolPlus<1>::Config device(Duration period, double viscous = 0.005, double coulom
   return {.friction = {Friction{coulomb, viscous}}, .longest_hold = period};
 }
 
-/// Returns the displayed stiffness when the hand moves 10 mm into a spring of `stiffness` at 20 mm/s.
+/// Returns the stiffness that is displayed when the hand moves 10 mm into a spring of `stiffness` at 20 mm/s.
 double displayed(const AolPlus<1>::Config& config, double stiffness) {
   AolPlus<1> law(config);
   const double step = 0.02 * seconds(config.longest_hold);

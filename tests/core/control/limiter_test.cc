@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Passivity is tested by core_passivity_test.
+// core_passivity_test tests whether the limiter is passive.
 #include "core/control/limiter.h"
 
 #include <gtest/gtest.h>

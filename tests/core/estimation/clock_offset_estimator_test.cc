@@ -99,7 +99,7 @@ TEST(ClockOffsetEstimator, ItsBoundHoldsForEveryPromisedDriftAndAsymmetry) {
   }
 }
 
-// The peer receives nothing new, so it echoes our last datagram with an increasing delay.
+// The peer does not receive anything new, so it echoes our last datagram with an increasing delay.
 TEST(ClockOffsetEstimator, ItsBoundHoldsForAPeerThatDelaysAndDrifts) {
   for (std::uint64_t seed = 1; seed <= 60; ++seed) {
     Dice dice(seed);

@@ -166,7 +166,7 @@ class HandlePair {
     return out;
   }
 
-  /// This is a single rotation about one axis. The limiter uses the difference between two samples.
+  /// This is a single rotation about one axis. The limiter uses the difference of two samples.
   void move(End& end, const Vec<kSize>& way, Duration held) {
     Vec<kSize> seen = way;
     if constexpr (kSize == 6) {

@@ -12,8 +12,8 @@
 #include "devices/usb/pipe.h"
 #include "tests/devices/falcon/fake_falcon.h"
 
-/// A pair of SOCK_SEQPACKET sockets between two processes. The driver sends the endpoint number and the data of an OUT
-/// transfer, or 0 and a vendor request. The Falcon sends the data of an IN transfer.
+/// A pair of SOCK_SEQPACKET sockets that connects two processes. The driver sends the endpoint number and the data of
+/// an OUT transfer, or 0 and a vendor request. The Falcon sends the data of an IN transfer.
 namespace tendon::socket_cable {
 
 inline constexpr std::uint8_t kRequest = 0;

@@ -89,7 +89,7 @@ TEST(ReplayDevice, AFasterLoopGetsEverySampleOnceAndNothingMadeUpBetween) {
   EXPECT_EQ(out.without, 791 - 99);
 }
 
-// The ledger integrates over the intervals between samples.
+// The ledger is integrated over the intervals between the samples.
 TEST(ReplayDevice, TimesIncreaseWhateverTheLoopDoes) {
   Dice dice(4);
   for (const AtEnd at_end : {AtEnd::kHold, AtEnd::kRepeat}) {

@@ -165,7 +165,7 @@ TEST(SafeDevice, EveryFaultInEveryStateEndsInZeroForce) {
       trouble.cause(rig);
       rig.steps(static_cast<int>(kRamp / 1ms), kPush);
       const SafeDevice::Status after = rig.safe.status();
-      for (int i = 0; i < 1200; ++i) {  // requests to arm expire before this time
+      for (int i = 0; i < 1200; ++i) {  // a request to arm must have expired by this time
         ASSERT_EQ(rig.step(kPush), Vec3::Zero());
         ASSERT_EQ(rig.puppet.told, Vec3::Zero());
       }

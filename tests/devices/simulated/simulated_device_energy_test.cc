@@ -12,7 +12,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-/// Position of the encoder and the motors.
+/// The position of the encoder and of the motors.
 Vec3 motor_side(const SimulatedDevice::Truth& truth) { return truth.position + truth.deflection; }
 
 double stored(const SimulatedDevice::Truth& truth) { return truth.kinetic_energy + truth.spring_energy; }
@@ -96,7 +96,7 @@ struct World {
 };
 
 TEST(SimulatedDeviceEnergy, HandAndWallsNeverDoLessWorkThanEquation5Demands) {
-  // 2000 random devices, hands, forces and intervals are tested with exact position sensing.
+  // Tests 2000 random devices, hands, forces and intervals with exact position sensing.
   double least = 1e300;
   for (std::uint64_t seed = 0; seed < 2000; ++seed) {
     Dice dice(seed);

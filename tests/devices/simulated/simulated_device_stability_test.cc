@@ -64,8 +64,8 @@ TEST(SampledSpring, LosesStabilityAtTheStiffnessOfTheClosedForm) {
   }
 }
 
-/// The motion in the last half second of 3 s. The rest position of the spring is on the edge between two counts, which
-/// is the worst case. With f_c = 0.05 N and a count of 0.2 mm, 2 f_c/Δ = 500 N/m.
+/// The motion in the last half second of 3 s. The worst case is a rest position of the spring on the edge between two
+/// counts. With f_c = 0.05 N and a count of 0.2 mm, 2 f_c/Δ = 500 N/m.
 double late_speed_on_a_count_edge(double stiffness) {
   const double step = 2e-4;
   auto config = device(0.075, 2);

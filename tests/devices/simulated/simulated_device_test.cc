@@ -195,8 +195,8 @@ TEST(CoulombFriction, TurnsRoundWithoutAPauseUnderAForceThatItCannotHold) {
 }
 
 TEST(CoulombFriction, OpposesTheVelocityAlongACurvedPath) {
-  // A lateral force acts while the handle slides. The result is compared to Runge-Kutta for m dv/dt = F − f_c v/|v| in
-  // steps of 1 µs.
+  // The handle is sliding while there is a lateral force. The result is compared to Runge-Kutta for m dv/dt = F − f_c
+  // v/|v| in steps of 1 µs.
   const double m = 0.075;
   const double f_c = 0.04;
   const Vec3 force(0, 0.1, 0.05);

@@ -25,7 +25,7 @@ SimulatedDevice::Config free_mass(std::optional<Duration> sample, std::optional<
 }
 
 TEST(TransportDelay, ASampleIsThatOfTheInstantThatItSays) {
-  // The position shows when the sample was taken. The intervals are not multiples of the delay.
+  // The position shows when the sample was taken. The intervals must not be multiples of the delay.
   for (const Duration delay : {Duration(1ms), Duration(1'700us), Duration(333'333ns), Duration(100ms)}) {
     auto config = free_mass(delay, std::nullopt);
     config.start_velocity = {1, 0, 0};

@@ -301,7 +301,7 @@ class Driven {
   pid_t pid_ = -1;
 };
 
-// In half of the runs, this must take at most 20 ms, or four bare round trips if that is longer.
+// This must take at most 20 ms in half of the runs. If four bare round trips are longer, they are the limit.
 TEST(UsbKernel, AGuardedFalconHasNoForce20MillisecondsAfterItsDriversSigkill) {
   std::vector<double> took_ms;
   std::vector<double> trips_ms;
@@ -370,7 +370,7 @@ TEST(UsbKernel, ASpaceMouseIsTakenFromUsbhidAndGivenBack) {
   EXPECT_TRUE(comes_true([&] { return find(kId) && kernel_driver(find(kId)->port) == "usbhid"; }));
 }
 
-/// Writes one JSON object per test and line. Names and values need no escapes.
+/// Writes one JSON object per test and line. There is no need to escape names and values.
 class Lines final : public testing::EmptyTestEventListener {
  public:
   explicit Lines(const std::string& path) : out_(path) {}

@@ -224,7 +224,7 @@ TEST(LibusbPipe, RequestsAndDataReachTheDeviceInOrder) {
   UsbfsShim shim({.has_firmware = false, .firmware_bytes = 4096});
   const auto pipe = pipe_to(shim);
   ASSERT_TRUE(comes_true([&] { return pipe->connection() != 0; }));
-  // The greeting is only valid at 9600 baud, so its order relative to the requests matters.
+  // The order of the greeting and the requests is important, because the greeting is only valid at 9600 baud.
   const std::vector<std::uint8_t> greeting = {0x0A, 0x43, 0x0D};
   EXPECT_TRUE(pipe->request(usb::ftdi::divisor(2)));
   EXPECT_TRUE(pipe->request(usb::ftdi::divisor(0x4138)));

@@ -169,7 +169,7 @@ struct MockPort::Inside {
     while (!stop) {
       const LocalTime at = real_now();
       while (plugged && !waiting.empty() && model.next_in() <= at) let_in(at);
-      // The model may be changed without a notification.
+      // The model can be changed without a notification.
       changed.wait_for(lock, std::clamp<Duration>(plugged && !waiting.empty() ? model.next_in() - at : Duration::max(),
                                                   std::chrono::microseconds(10), std::chrono::milliseconds(5)));
     }

@@ -42,7 +42,7 @@ class MockPort {
 
   /// Uses a new address each time, like the kernel.
   void plug();
-  /// This is the same as with the kernel: the transfers end, the node fails, the device is removed from sysfs, and udev
+  /// This does the same as the kernel: the transfers end, the node fails, the device is removed from sysfs, and udev
   /// sends an event.
   void unplug();
 

@@ -71,7 +71,7 @@ TEST_F(MockUsbTest, DevicesAreListedWhereTheyArePluggedInAndNotWhenTheyAreOut) {
   EXPECT_EQ(report(), "");
 }
 
-// The default user of a container is root and may open every node, so this test runs without privileges.
+// This test is run without privileges, because the default user of a container is root and may open every node.
 TEST_F(MockUsbTest, AForbiddenAnUnpluggedAndAMissingNodeAreToldApart) {
   const auto look = [] {
     const auto lacks = [] {

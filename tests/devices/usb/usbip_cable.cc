@@ -119,7 +119,7 @@ void UsbIpCable::unplug() {
 
 void UsbIpCable::run() {
   while (!stop_) {
-    Duration most = 5ms;  // the model may have been changed
+    Duration most = 5ms;  // the model may have changed
     {
       const std::lock_guard lock(mutex_);
       let_in(real_now());

@@ -56,7 +56,7 @@ class FakeWoodenHaptics {
 
   bool plugged() const { return plugged_; }
   int times_plugged() const { return times_plugged_; }
-  /// The board is not a serial chip, so it has no vendor requests.
+  /// The board is not a serial chip, so it does not have any vendor requests.
   bool request(LocalTime, std::uint8_t, std::uint16_t) { return false; }
   bool write(LocalTime now, std::span<const std::uint8_t> bytes);
   LocalTime next_in() const;

@@ -181,7 +181,7 @@ TEST(WoodenHapticsKinematics, CurrentsDoTheWorkOfTheForce) {
   }
 }
 
-// The torque constant, the capstan and the lengths are published. The arithmetic was done by hand.
+// The torque constant, the capstan and the lengths were published. The arithmetic was done by hand.
 TEST(WoodenHapticsKinematics, ANewtonUpwardsTakesTheCurrentsOfTheDrawings) {
   const Model& model = *find_model("woodenhaptics_v2019");
   const auto pose = pose_at(model, Vec3::Zero());

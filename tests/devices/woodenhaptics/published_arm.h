@@ -67,7 +67,7 @@ struct Arm {
     return Vec3(0, 0, length()[0]) + about(angles[0], Vec3::UnitZ()) * Vec3(up + down) - origin();
   }
 
-  /// Returns the upper intersection of the circles around the shoulder and the tip.
+  /// Returns the upper one of the intersections of the circles around the shoulder and the tip.
   Vec3 angles_at(const Vec3& position) const {
     const Vec3 at = position + origin();
     const Eigen::Vector2d tip(std::hypot(at.x(), at.y()), at.z() - length()[0]);

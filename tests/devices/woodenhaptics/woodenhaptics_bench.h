@@ -62,7 +62,7 @@ struct WoodenHapticsBench : DriverBench<WoodenHapticsBench> {
     }
   }
 
-  /// Moves to the calibration pose, presses the button and returns to the center, like the operator.
+  /// Moves to the calibration pose, presses the button and then returns to the center, as the operator would do.
   void home(const Vec3& force = Vec3::Zero()) {
     const Vec3 counts = arm.arm().calibration();
     arm.turn_to(counts.cwiseProduct(arm.arm().per_count()));

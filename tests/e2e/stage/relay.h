@@ -31,7 +31,7 @@ class Relay {
   std::vector<Datagram> said() const;
 
   void forge(std::span<const std::byte> datagram);
-  /// Removes the last byte from the next `count` datagrams that are sent by the client.
+  /// Removes the last byte of the next `count` datagrams that the client sends.
   void cut_next(int count);
 
  private:

@@ -47,7 +47,7 @@ std::string write(const std::filesystem::path& file, std::string_view text);
 /// does not exist.
 double number_in(std::string_view json, const std::string& key);
 std::uint64_t count_in(std::string_view json, const std::string& key);
-/// The text must not contain escapes.
+/// The text must not contain any escapes.
 std::string text_in(std::string_view json, const std::string& key);
 
 /// A program that prints its address because it uses port 0. If the test is killed, the program exits after two

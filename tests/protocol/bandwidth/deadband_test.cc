@@ -20,7 +20,7 @@ TEST(Deadband, PassesWhatDiffersByMoreThanATenthAndHoldsBackTheRest) {
   EXPECT_FALSE(deadband.passes(kStart + milliseconds(1), {2.19, 0, 0}));
   EXPECT_FALSE(deadband.passes(kStart + milliseconds(2), {2, 0.19, 0}));
   EXPECT_TRUE(deadband.passes(kStart + milliseconds(3), {2.21, 0, 0}));
-  // The reference is the last value that was sent, so slow changes accumulate.
+  // The reference is the last value that has been sent, so that slow changes accumulate.
   EXPECT_FALSE(deadband.passes(kStart + milliseconds(4), {2.42, 0, 0}));
   EXPECT_TRUE(deadband.passes(kStart + milliseconds(5), {2.44, 0, 0}));
 }

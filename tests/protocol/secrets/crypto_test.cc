@@ -5,7 +5,7 @@
 
 #include <set>
 
-// The known answers are in vectors_test.cc.
+// vectors_test.cc contains the known answers.
 
 namespace tendon::crypto_test {
 namespace {

@@ -7,7 +7,7 @@
 
 #include "tests/protocol/examples.h"
 
-// The known answer of cacophony is in vectors_test.cc.
+// vectors_test.cc contains the known answer of cacophony.
 
 namespace tendon::noise_test {
 namespace {

@@ -18,7 +18,7 @@ namespace {
 
 using examples::Bytes;
 
-/// Parses the hex digits before the semicolon. "00 x1117" repeats a byte.
+/// Parses the hexadecimal digits in front of the semicolon. "00 x1117" repeats a byte.
 Bytes bytes_of(const std::string& line) {
   Bytes out;
   std::istringstream words(line.substr(0, line.find(';')));

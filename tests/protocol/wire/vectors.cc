@@ -379,8 +379,8 @@ std::string sealed_file(Suite suite) {
     const Key& split = welcome.split.responder_to_initiator;
     drop("in suite 1, with the key that Split() gave", "malformed", sealed(Suite::kNoise, split, good, state));
     drop("the key that Split() gave", "forged", sealed(suite, split, good, state));
-    // The bytes of the number in the nonce are reversed, as in a little-endian implementation, but the header has the
-    // correct number.
+    // As in a little-endian implementation, the bytes of the number in the nonce are reversed. The number in the header
+    // is correct.
     const auto clear = encode_header({.suite = suite, .connection_id = examples::kConnection, .packet_number = 1});
     Bytes turned(clear.begin(), clear.end());
     turned.resize(kHeaderSize + state.size() + crypto::kTagSize);

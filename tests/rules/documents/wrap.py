@@ -20,7 +20,7 @@ _QUOTE = re.compile(r"(\s*>\s?)(.*)", re.S)
 _VERBATIM = re.compile(r"\s*(\||#|<|\[[^\]]+\]:\s|(?:[-*_]\s*){3,}$|=+$)")
 # An unbreakable piece: a code span, a link or image with its address, or text without blanks.
 _PIECE = re.compile(r"(?:``[^`]*(?:`[^`]+)*``|`[^`]*`|!?\[[^\]\[]*\]\([^)]*\)|[^\s`\[]|[`\[])+")
-# At the beginning of a line, these would begin an item, a heading, a quote, a table or a rule.
+# If these are at the beginning of a line, they would start an item, a heading, a quote, a table or a rule.
 _MARK = re.compile(r"[-*+]$|#+$|=+$|-+$|\d+[.)]$|[>|]")
 
 

@@ -14,7 +14,7 @@
 namespace tendon::rooms {
 namespace {
 
-/// This is a citation if the first folder is a room. A page (.md) is always a citation.
+/// This is a citation if the first folder is a room. If it is a page (.md), it is always a citation.
 const Names kCitedSources = {"*.h",  "*.cc",   "*.py",  "*.ts",    "*.mjs",  "*.proto",
                              "*.sh", "*.toml", "*.csv", "*.cmake", "*.html", "*.css"};
 
@@ -97,7 +97,7 @@ void check_cited_files(const File& file, std::string_view prose, const Citable& 
       while (name.ends_with('.')) {  // the end of a sentence
         name.remove_suffix(1);
       }
-      // It is part of a URL, a variable or a pattern.
+      // This is part of a URL, a variable or a pattern.
       const bool part = (from > 0 && contains(":~@$<>{}*\\", line.substr(from - 1, 1))) ||
                         (to < line.size() && contains("<>{}*$", line.substr(to, 1)));
       from = to;

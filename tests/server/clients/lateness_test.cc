@@ -100,7 +100,7 @@ TEST(Lateness, OnlyTheSilenceOfALocalEngineIsItsFault) {
   }
 }
 
-/// There is a gap of `apart` between two time stamps, and then a force with a long round trip.
+/// There is a gap of `apart` between two time stamps, which is followed by a force with a long round trip.
 Lateness::Report after_silence(Duration apart, std::uint64_t lost) {
   Engine engine;
   engine.answer_times(200);

@@ -145,7 +145,7 @@ class SealedServer : public Servers {
       });
     }
   }
-  /// Answers each state with a valid force that is changed by `spoil`. Returns the newest report on it.
+  /// Answers each state with a valid force that is changed by `spoil`. Returns the newest report about it.
   template <class Spoil>
   std::optional<LinkReport> run_foreign(Duration length, const Spoil& spoil) {
     Foreign client(wire_, "127.0.0.1:4000", server_, foreign_, now_);

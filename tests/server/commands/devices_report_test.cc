@@ -99,7 +99,7 @@ std::string hex4(std::uint16_t number) {
   return text.str();
 }
 
-// The udev rule named by `tendond devices` must exist and cover every device that has a driver.
+// `tendond devices` prints the name of a udev rule, which must exist and must contain every device that has a driver.
 TEST(DevicesReport, TheUdevRulesNameEveryIdOfEveryDriver) {
   std::size_t ids = 0;
   for (const Driver* driver : drivers()) {

@@ -108,7 +108,7 @@ TEST(Doctor, OfWhatTheKernelDoesNotSayItClaimsNothing) {
 }
 
 TEST(Doctor, MeasuresLatenessAgainstTheScheduleNotTheLastWakeUp) {
-  // Wake-up n is n µs late, from 0 to 99. The last one also includes a pause.
+  // The lateness of wake-up n is n µs, from 0 to 99. There is also a pause in the last one.
   LocalTime now{5s};
   int sleeps = 0;
   LocalTime first_due{};

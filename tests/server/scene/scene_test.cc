@@ -316,7 +316,7 @@ TEST(Scene, AProfilesJointFrictionIsNoLessThanTheLimitersBound) {
   EXPECT_NEAR(least_friction(scene.simulated()).coulomb, falcon.coulomb_friction.value, 1e-12);
   EXPECT_EQ(least_friction(scene.simulated()).viscous, falcon.viscous_friction.value);
   EXPECT_EQ(scene.loop.control.limiter.friction.coulomb, falcon.coulomb_bound.value);
-  // The identified friction may be equal to the friction of the device, but it must not exceed it.
+  // The identified friction can be equal to the friction of the device, but it must not be larger.
   const std::string joints = "[device.effects.joint_friction]\nkind = \"falcon\"\n";
   EXPECT_EQ(minimal_and(joints + "[limiter]\ncoulomb_friction_n = 0.4\n").loop.control.limiter.friction.coulomb, 0.4);
   EXPECT_NE(error_of_minimal_and(joints + "[limiter]\ncoulomb_friction_n = 0.41\n")

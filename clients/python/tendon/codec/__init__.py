@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Encoding and decoding of messages. Only these modules depend on the header layout and on protobuf (WIRE.md).
+"""Encoding and decoding of messages. The header layout and protobuf are only used in these modules (WIRE.md).
 
-Encoding trusts its input, except that texts and lists are truncated to their bounds. Decoding does not: it returns
-None for invalid input.
+Encoding does not check its input, except that texts and lists are truncated to their bounds. Decoding checks
+everything, and returns None if the input is invalid.
 """
 
 from ..generated import Answer, Echo

@@ -44,7 +44,8 @@ def write_frame(frame: Frame) -> bytes:
 
 
 def read_data(body: bytes) -> DataContent | None:
-    """Returns None if the body is malformed: not protobuf, too many frames, or without a valid tx_time."""
+    """Returns None if the body is malformed, which means that it is not protobuf, has too many frames, or does not have
+    a valid tx_time."""
     try:
         message = parsed(pb.Datagram(), body)
     except DecodeError:

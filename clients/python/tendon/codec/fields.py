@@ -16,7 +16,7 @@ from ..generated import Mat3, Quat, Vec3
 
 
 class OutOfBounds(Exception):
-    """A value is out of bounds."""
+    """This is raised if a value is out of bounds."""
 
     def __init__(self, field: str) -> None:
         super().__init__(field)

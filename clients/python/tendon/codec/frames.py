@@ -13,8 +13,8 @@ from .fields import OutOfBounds
 
 
 class Refused(OutOfBounds):
-    """A request or answer that is out of bounds. `frame` is used instead, because dropping it would block the
-    following ones."""
+    """Replaces a request or an answer that is out of bounds. `frame` is used instead, because dropping it would block
+    the following ones."""
 
     def __init__(self, field: str, frame: Control | ControlAck) -> None:
         super().__init__(field)
@@ -22,7 +22,7 @@ class Refused(OutOfBounds):
 
 
 def read(message: pb.Frame) -> Frame | None:
-    """Returns None for frames that only newer peers know."""
+    """Returns None if the frame is only known to newer peers."""
     if message.HasField("control"):
         return _read_control(message.control)
     if message.HasField("control_ack"):
@@ -61,7 +61,8 @@ def write_into(message: pb.Frame, frame: Frame) -> None:
 
 
 def read_states(message: pb.DeviceStates) -> list[DeviceState]:
-    """Expands states in columns. Each column has one entry for each device, or none if it is optional."""
+    """Expands states that are encoded in columns. If a column is optional, it can be empty. Otherwise, it has one entry
+    for each device."""
     devices = [device for device in range(limits.MAX_DEVICES) if message.devices >> device & 1]
     count = len(devices)
     vectors = (message.position_m, message.velocity_mps, message.force_applied_n)

@@ -98,7 +98,7 @@ TEST(Chai3d, AProgramFindsTheDeviceAndMovesWithItOneTurnAStep) {
   EXPECT_GT(most, 0.010);
   std::printf("%.1f %% of a core, %.0f turns in %.3f s, getter p99 %.2f us\n", 100 * used / took,
               number_in(end, "turns"), took, number_in(end, "getter_p99_us"));
-  // Measured: 8 % of a core on an idle machine. The bound only detects a loop that does not sleep.
+  // Measured: 8 % of a core on an idle machine. The bound can only detect a loop that does not sleep.
   EXPECT_LT(used / took, 0.25) << "of a core";
 }
 
@@ -159,7 +159,7 @@ TEST(Chai3d, ASecondBridgeIsToldThatTheChannelIsTaken) {
   EXPECT_EQ(first.wait(), 0);
 }
 
-/// Pushes along the device's x axis. The scene has no limiter, so the device outputs the requested force.
+/// Pushes along the x axis of the device. There is no limiter in the scene, so the device applies the requested force.
 struct Pushing {
   explicit Pushing(const ScratchFolder& folder)
       : server(folder.path(), write(folder.path() / "hand.toml", kPressingHand), {"--without-limiter"}),

@@ -226,7 +226,7 @@ TEST(Ros2, ReliableAndBestEffortReadersGetEachTopicOfADevice) {
     const std::string line = peer->until([](const std::string& all) {
       return number(all, "pose_n") > 100 && number(all, "twist_n") > 100 && number(all, "wrench_n") > 100 &&
              number(all, "joy_n") > 10 && number(all, "joint_states_n") > 100 && number(all, "servo_twist_n") > 100 &&
-             number(all, "diagnostics_values") == 12;  // the last one is the safety layer
+             number(all, "diagnostics_values") == 12;  // the last one of them is the safety layer
     });
     EXPECT_EQ(text_in(line, "pose_frame"), "device_base");
     EXPECT_EQ(text_in(line, "servo_twist_frame"), "device_servo");

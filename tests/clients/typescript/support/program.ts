@@ -8,7 +8,7 @@ import { kRoot } from "./paths.js";
 
 const kPatienceMs = 30_000;
 
-/** A running program and the lines of its stdout and stderr. It is killed at the end of the test. */
+/** A running program and the lines that it has written to stdout and stderr. It is killed when the test has ended. */
 export class Program {
   readonly lines: string[] = [];
   readonly #process: ChildProcess;

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A client (A), a server (Z) and a network between them on virtual time. A is the ForceClient under test. Z is
-// assembled from the parts of the protocol. The network loses, delays, reorders and duplicates datagrams according to
-// a seed.
+// A client (A) and a server (Z) in virtual time, and a network between them. A is the ForceClient that is tested. Z
+// consists of parts of the protocol. The network loses, delays, reorders and duplicates datagrams according to a seed.
 import { decodeHelloMessage, encodeAnswerMessage, type ControlAck } from "../../../../clients/typescript/src/codec.js";
 import {
   CipherSuite, concat, decodeHello, encodeAnswer, encodeRetry, equal, helloHeader, type HelloDatagram,

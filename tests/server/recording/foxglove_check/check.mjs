@@ -2,9 +2,9 @@
 //
 // node check.mjs FILE [TOPIC=COUNT …]
 //
-// Reads an MCAP file like Foxglove: through its index, or as a stream if the file has no end. The protobuf schema of
-// each channel is taken from the file. All messages are decoded, and the result is printed as one line of JSON. The
-// exit status is 1 if there is an error in the file, or if a topic does not have the expected number of messages
+// Reads an MCAP file like Foxglove: through its index, or as a stream if the file has no end. For each channel, it uses
+// the protobuf schema in the file. All messages are decoded, and the result is printed as one line of JSON. The exit
+// status is 1 if there is an error in the file, or if a topic does not have the expected number of messages
 // ("TOPIC=COUNT", or "TOPIC=some" for at least one).
 
 import { open, readFile } from "node:fs/promises";
