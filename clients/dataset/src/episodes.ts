@@ -83,8 +83,10 @@ const kSilence = 0.5;
 /** s, because times are in ns and sums of floating-point numbers are not exact. */
 const kRounding = 1e-7;
 
-/** Returns the sequences in which a robot followed the hand. Each of them starts when the robot is engaged. It does not
- * end if the clutch is held. */
+/**
+ * Returns the sequences in which a robot followed the hand. Each of them starts when the robot is engaged. It does not
+ * end if the clutch is held.
+ */
 function followed(moments: readonly Moment[]): Moment[][] {
   const found: Moment[][] = [];
   let open = false;

@@ -29,7 +29,8 @@ export interface Felt {
 export interface Tool {
   /** The initial pose in the scene file. It corresponds to the origin of the device. */
   readonly home: Pose;
-  /** Must be called before a step of `seconds`. `pose` is the pose of the hand at the end of the step. The hand moves
+  /**
+   * Must be called before a step of `seconds`. `pose` is the pose of the hand at the end of the step. The hand moves
    * there at constant speed.
    */
   lead(pose: Pose, seconds: number): void;
@@ -52,8 +53,9 @@ export interface Coupling {
   readonly angularStiffness: number;
 }
 
-/** A mocap body that is at the position of the hand and does not rotate. The hand feels the contact forces on this
- * body. */
+/**
+ * A mocap body that is at the position of the hand and does not rotate. The hand feels the contact forces on this body.
+ */
 class LedTool implements Tool {
   readonly home: Pose;
   readonly #data: MjData;
@@ -115,8 +117,10 @@ class HeldTool implements Tool {
   /** The damping of the six degrees of freedom, N·s/m and N·m·s/rad. Rotations are about the axes of the tool. */
   readonly #damping: readonly number[];
   #hand: Pose;
-  /** The damper forces that are caused by the motion of the hand, N and N·m. MuJoCo adds those that are caused by the
-   * motion of the tool. */
+  /**
+   * The damper forces that are caused by the motion of the hand, N and N·m. MuJoCo adds those that are caused by the
+   * motion of the tool.
+   */
   #dragged: readonly number[] = [0, 0, 0, 0, 0, 0];
 
   constructor(mj: MainModule, model: MjModel, data: MjData, body: number, name: string, coupling: Coupling, derives: boolean) {

@@ -18,8 +18,9 @@ export interface SceneConfig {
   readonly tool: string;
   /** The stiffness of the coupling if the tool is held. Default: 1000 N/m and 2 N·m/rad. */
   readonly coupling?: Partial<Coupling>;
-  /** For a held tool. Requires 14 evaluations of the scene for each answer, without collision detection. Default:
-   * true. */
+  /**
+   * For a held tool. Requires 14 evaluations of the scene for each answer, without collision detection. Default: true.
+   */
   readonly sendStiffness?: boolean;
   /** Rotation from device frame to scene frame, row-major. Default: identity. See zUp() for scenes with z up. */
   readonly rotation?: readonly number[];
@@ -43,8 +44,10 @@ export interface SceneStats {
   readonly steps: number;
   /** The number of positions that were not finite or whose orientation was invalid. They were not simulated. */
   readonly badPositions: number;
-  /** The number of answers in which the hand was faster than maxToolSpeed or maxToolSpin, so that the tool did not
-   * reach it. */
+  /**
+   * The number of answers in which the hand was faster than maxToolSpeed or maxToolSpin, so that the tool did not reach
+   * it.
+   */
   readonly lagging: number;
   /** The number of times that the scene was reset because MuJoCo had lost the solution. */
   readonly restarts: number;
@@ -261,8 +264,10 @@ export class TouchableScene {
     });
   }
 
-  /** Returns an error message if the state is invalid, or an empty string. In this case, MuJoCo has only incremented a
-   * counter and has restarted at time 0. */
+  /**
+   * Returns an error message if the state is invalid, or an empty string. In this case, MuJoCo has only incremented a
+   * counter and has restarted at time 0.
+   */
   #lost(): string {
     const now = this.#warnings();
     const kinds = this.mujoco.mjtWarning;

@@ -33,8 +33,10 @@ export interface Guest {
   readonly welcome: Welcome | undefined;
   /** Description of the device. Absent until it arrives; it is only requested if `device` or `channel` is named. */
   readonly description: DeviceDescription | undefined;
-  /** Orientation of the device relative to the operator, and names of the buttons. Absent if the server does not
-   * support it. */
+  /**
+   * Orientation of the device relative to the operator, and names of the buttons. Absent if the server does not support
+   * it.
+   */
   readonly handle: HandleDescription | undefined;
   /** Whether this client holds the channel. Otherwise the physics callback is not called. */
   readonly holds: boolean;
@@ -42,8 +44,10 @@ export interface Guest {
   readonly report: LinkReport | undefined;
   /** The newest report on the loop of the device, which is sent once per second. Requires `diagnostics`. */
   readonly deviceReport: DeviceReport | undefined;
-  /** The newest report on the engine of each channel. If the engine leaves, the report is not removed. Requires
-   * `diagnostics`. */
+  /**
+   * The newest report on the engine of each channel. If the engine leaves, the report is not removed. Requires
+   * `diagnostics`.
+   */
   readonly peerReports: ReadonlyMap<number, PeerReport>;
   stats(): ClientStats;
   rearm(): boolean;
@@ -105,8 +109,10 @@ class RealTimeGuest implements Guest {
   #timerDue: Nanoseconds = kNever;
   #deferred = false;
   #ended = false;
-  /** The number of datagrams since the last round of the event loop, and the number of rounds for which they have
-   * delayed the turn. */
+  /**
+   * The number of datagrams since the last round of the event loop, and the number of rounds for which they have
+   * delayed the turn.
+   */
   #arrived = 0;
   #rounds = 0;
 

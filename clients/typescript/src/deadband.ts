@@ -32,8 +32,10 @@ export function checkStateDeadband({ share, floor, maxSilenceUs }: StateDeadband
   expect(possible, "stateDeadband.maxSilenceUs", maxSilenceUs, "0, or a whole number from 1000 to 20000");
 }
 
-/** The distance from the center to the end of a handle, m. It is used to convert the floor of a force (N) to that of a
- * torque (N·m). */
+/**
+ * The distance from the center to the end of a handle, m. It is used to convert the floor of a force (N) to that of a
+ * torque (N·m).
+ */
 const kHandleLever = 0.05;
 const kZero: Vec3 = { x: 0, y: 0, z: 0 };
 
@@ -46,8 +48,10 @@ export class Deadband {
     this.#config = config;
   }
 
-  /** Returns true if one of the three values must be sent, or if it has appeared or disappeared. In this case, all of
-   * them are recorded as sent. */
+  /**
+   * Returns true if one of the three values must be sent, or if it has appeared or disappeared. In this case, all of
+   * them are recorded as sent.
+   */
   passes(now: Nanoseconds, value: Pick<ForceCommand, "force" | "torque" | "gripForce">): boolean {
     const { floor, longestSilenceMs } = this.#config;
     const { x, y, z } = value.force;
@@ -85,8 +89,9 @@ function turned({ w, x, y, z }: Quat, { x: b, y: c, z: d }: Vec3, seconds: numbe
   return { w: q.w / length, x: q.x / length, y: q.y / length, z: q.z / length };
 }
 
-/** Predicts the state `later` after `sent` with constant velocities of position, rotation and gripper, in whole
- * periods. */
+/**
+ * Predicts the state `later` after `sent` with constant velocities of position, rotation and gripper, in whole periods.
+ */
 export function predict(sent: DeviceState, later: Nanoseconds, hapticPeriod: Nanoseconds): DeviceState {
   const periods = later > 0n ? later / hapticPeriod : 0n;
   const seconds = Number(periods * hapticPeriod) / 1e9;

@@ -15,8 +15,10 @@ import {
 import { Session, type LinkStats } from "./session.js";
 import { earliest, fromMilliseconds, kNever, latest, type Nanoseconds } from "./time.js";
 
-/** The physics engine as a callback. If a newer state arrives during the computation, it replaces the older one. If the
- * callback returns null, no force is sent. */
+/**
+ * The physics engine as a callback. If a newer state arrives during the computation, it replaces the older one. If the
+ * callback returns null, no force is sent.
+ */
 export type Physics = (hand: DeviceState) => Vec3 | Touch | null;
 
 /** Callback of an observer. */
@@ -26,8 +28,10 @@ const kValidPeriods = 3;
 const kMinValidForMs = 20;
 /** If the gap is longer, it is not used as a period. If an engine is slower than 10 Hz, it must set rateHz. */
 const kMaxObservedPeriodMs = 100;
-/** There must be at least this time between two requests for a lease, because the current holder renews its lease
- * continuously. */
+/**
+ * There must be at least this time between two requests for a lease, because the current holder renews its lease
+ * continuously.
+ */
 const kAskLeaseAgain = fromMilliseconds(50);
 
 /** Indices used if neither device nor channel is named. */
@@ -205,8 +209,10 @@ export class ForceClient {
   get holds(): boolean {
     return this.#holds;
   }
-  /** Requests the lease of the channel. If it is lost before the answer, the request is sent again. Returns false as
-   * rearm() does. */
+  /**
+   * Requests the lease of the channel. If it is lost before the answer, the request is sent again. Returns false as
+   * rearm() does.
+   */
   takeLease(): boolean {
     const { device, channel } = this.#place;
     const asked = this.#session?.request({ kind: "takeLease", device, channel });
@@ -262,8 +268,10 @@ export class ForceClient {
   get deviceReport(): DeviceReport | undefined {
     return this.#deviceReport;
   }
-  /** The newest report on the engine of each channel. If the engine leaves, the report is not removed. Requires
-   * `diagnostics`. */
+  /**
+   * The newest report on the engine of each channel. If the engine leaves, the report is not removed. Requires
+   * `diagnostics`.
+   */
   get peerReports(): ReadonlyMap<number, PeerReport> {
     return this.#peerReports;
   }
@@ -449,8 +457,10 @@ export class ForceClient {
     }
   }
 
-  /** Returns the state that is predicted for `now`. Returns undefined if there is nothing new, or if the last state is
-   * too old. */
+  /**
+   * Returns the state that is predicted for `now`. Returns undefined if there is nothing new, or if the last state is
+   * too old.
+   */
   #predicted(now: Nanoseconds): DeviceState | undefined {
     const age = now - this.#newestArrived;
     if (!this.#newest || age > this.#silence()) return undefined;

@@ -21,8 +21,10 @@ export const kFeatureJoints = "joints";
 /** Feature: the client receives the outputs of the device and can set them (`outputs` in the config). */
 export const kFeatureOutputs = "outputs";
 
-/** Feature: the client can be one of the ends of a coupling. It sends Couple, and PortStates are sent in both
- * directions. */
+/**
+ * Feature: the client can be one of the ends of a coupling. It sends Couple, and PortStates are sent in both
+ * directions.
+ */
 export const kFeatureTeleoperation = "teleoperation";
 
 /** Feature: an engine names its methods, and each force contains the method that computed it. */
@@ -43,8 +45,9 @@ export interface Quat extends Vec3 {
   readonly w: number;
 }
 
-/** N/m, −∂force/∂position, positive for a spring. 1 entry k: k·I. 3 entries: the diagonal. 9 entries: row-major
- * matrix. */
+/**
+ * N/m, −∂force/∂position, positive for a spring. 1 entry k: k·I. 3 entries: the diagonal. 9 entries: row-major matrix.
+ */
 export type Stiffness = readonly number[];
 
 const kReasons = [

@@ -43,8 +43,10 @@ export const rekey = (key: Uint8Array): Uint8Array =>
 /** Identifies the key to the server without revealing it: 8 bytes. */
 export const keyId = (key: Uint8Array): Uint8Array => sha256(concat(ascii("tendon-key-id"), key)).slice(0, 8);
 
-/** The hash and key that both sides have mixed so far. This is immutable, so that it is not changed by an invalid
- * message. */
+/**
+ * The hash and key that both sides have mixed so far. This is immutable, so that it is not changed by an invalid
+ * message.
+ */
 export class SymmetricState {
   private constructor(
     readonly hash: Uint8Array,
@@ -115,8 +117,10 @@ export interface Finished {
   readonly hash: Uint8Array;
 }
 
-/** Derives a key of suite 2 from the key of a direction, bound to Hello and Answer and different from all keys of
- * suite 1. */
+/**
+ * Derives a key of suite 2 from the key of a direction, bound to Hello and Answer and different from all keys of suite
+ * 1.
+ */
 export const keyOfSuite2 = (key: Uint8Array, hash: Uint8Array): Uint8Array =>
   hmac(sha256, key, concat(ascii("tendon-suite-2"), hash));
 

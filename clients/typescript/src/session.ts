@@ -27,8 +27,10 @@ export interface LinkStats {
   lostOutgoing: number;
   /** The number of datagrams that were accepted but are older than a previous one. */
   reordered: number;
-  /** The number of datagrams that were dropped because they were received before, are older than the window, or belong
-   * to the handshake. */
+  /**
+   * The number of datagrams that were dropped because they were received before, are older than the window, or belong
+   * to the handshake.
+   */
   duplicated: number;
   /** The number of datagrams that were dropped because they do not belong to this session. */
   malformed: number;
@@ -78,8 +80,9 @@ export type SessionEvent =
   | { readonly kind: "port"; readonly port: PortState }
   | { readonly kind: "request"; readonly id: number; readonly request: Request }
   | ({ readonly kind: "answered" } & ControlAck)
-  /** This is the last event if the peer has sent a Bye. Code.TIMED_OUT: the peer was silent. Code.EXPIRED: the maximum
-   * age was reached.
+  /**
+   * The last event of a session, which was closed by a Bye of the peer, because the peer was silent (Code.TIMED_OUT), or
+   * because the maximum age was reached (Code.EXPIRED).
    */
   | { readonly kind: "closed"; readonly code: Code; readonly reason: string };
 
