@@ -23,7 +23,7 @@ struct Stage {
   bool after_validity = false;  ///< "v + 20 ms": counted from the end of the validity, not from the arrival
   Duration entered{};
   Mode mode{};
-  Duration time_constant{};  ///< "e^(−t / 50 ms)", "t / 100 ms"
+  Duration time_constant{};  ///< in the table: "e^(−t / 50 ms)", "t / 100 ms"
 };
 
 Duration milliseconds_in(const std::string& cell) {

@@ -525,10 +525,10 @@ TEST(FrictionMap, TheLeastOfTheNearestPlaceAndOfAllWithinReachHolds) {
                                     {Vec3(0.1, 0, 0), {.coulomb = 0.2, .viscous = 0.4}}},
                          .reach = 0.06});
   EXPECT_EQ(map.at(Vec3(0.01, 0, 0)).coulomb, 0.3);
-  EXPECT_EQ(map.at(Vec3(0.05, 0, 0)).coulomb, 0.2);  // the larger of both
+  EXPECT_EQ(map.at(Vec3(0.05, 0, 0)).coulomb, 0.2);  // the larger value of both cells
   EXPECT_EQ(map.at(Vec3(0.05, 0, 0)).viscous, 0.1);
   EXPECT_EQ(map.at(Vec3(0.09, 0, 0)).viscous, 0.4);
-  EXPECT_EQ(map.at(Vec3(5, 0, 0)).coulomb, 0.2);  // outside all cells: the nearest
+  EXPECT_EQ(map.at(Vec3(5, 0, 0)).coulomb, 0.2);  // outside of all cells, the nearest one is used
   EXPECT_THROW(FrictionMap({.places = {}, .reach = 0}), std::invalid_argument);
 }
 

@@ -386,7 +386,7 @@ LocalTime now() { return LocalTime(std::chrono::duration_cast<Duration>(Clock::n
 struct Killed {
   double pushed_for_ms = 0;
   bool pushes = true;                   ///< after the end of the last process that could stop it
-  std::vector<std::uint8_t> last_word;  ///< received by the device: endpoint and packet
+  std::vector<std::uint8_t> last_word;  ///< endpoint and packet that the device received last
   std::uint8_t lamps = 0;
 };
 

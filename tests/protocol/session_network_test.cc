@@ -111,7 +111,7 @@ TEST(SessionOverAPerfectNetwork, TheRoundTripIsExactWhateverTheClocks) {
   EXPECT_EQ(world.a.stats().round_trip, there + back);
   EXPECT_EQ(world.z.stats().round_trip, there + back);
   EXPECT_EQ(world.a.stats().smoothed_round_trip, there + back);
-  EXPECT_LE(world.a.stats().round_trip_variation, Duration{4});  // the rounding error of its division
+  EXPECT_LE(world.a.stats().round_trip_variation, Duration{4});  // rounding error of the division
   EXPECT_EQ(world.a.stats().lost, 0U);
 }
 

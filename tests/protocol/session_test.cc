@@ -229,7 +229,7 @@ TEST_F(TwoEnds, ReportsOnDevicesAndEnginesAreNewestWinsEachForItself) {
 
   z_.send(of_device(0, 2));
   z_.send(of_channel(1, 4));
-  z_.send(of_channel(0, 4));  // newest of its channel
+  z_.send(of_channel(0, 4));  // the newest force of its channel
   deliver(a_, now_, pull(z_, now_));
   EXPECT_EQ(only<Session::PeerReportArrived>(a_).report.channel, 0U);
   EXPECT_EQ(a_.stats().stale, 2U);

@@ -72,7 +72,7 @@ struct Pushed {
   std::uint64_t sequence = 0;
   std::uint32_t source = 0;
   Duration valid_for = milliseconds(20);
-  std::optional<double> error{};  ///< reported by the engine, like `way`
+  std::optional<double> error{};  ///< reported by the engine together with `way`
   std::uint8_t way = 0;
 };
 

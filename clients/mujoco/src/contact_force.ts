@@ -23,7 +23,7 @@ export class ContactForce {
     for (let i = 0; i < contacts.size(); ++i) {
       const contact = contacts.get(i)!;
       const [first, second] = contact.geom;
-      // The force acts on the second geom. Flexes are not in the set.
+      // The force acts on the second geom. If it is on a flex, the geom is not in the set.
       const sign = Number(this.#geoms.has(second)) - Number(this.#geoms.has(first));
       if (sign !== 0) {
         this.#mj.mj_contactForce(this.#model, data, i, this.#wrench);

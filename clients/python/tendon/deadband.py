@@ -20,7 +20,7 @@ class ForceDeadband:
     share: float = 0.10
     """0 … 1. The just noticeable difference of force is 7 to 15 %."""
     floor: float = 0.05
-    """N. Smaller changes are omitted until the longest silence."""
+    """N. Smaller changes are omitted, but only for the longest silence."""
     longest_silence_s: float = 0.02
     """This limits how long an old force is rendered by the device after a packet loss."""
 

@@ -24,8 +24,8 @@ export interface Touch {
   /** The error of the force as estimated by the engine, N. */
   readonly error?: number | undefined;
   /**
-   * N·m, acting on the hand, axes of the base frame, about the handle's position. For handles with additional
-   * actuators (`handle`). Other servers are sent the force without it and the next two fields (ClientStats.leftOut).
+   * The torque on the hand about the position of the handle, in base frame axes, N·m. It requires a handle with
+   * additional actuators (`handle`). Otherwise, this and the next two fields are not sent (ClientStats.leftOut).
    */
   readonly torque?: Vec3 | undefined;
   /**

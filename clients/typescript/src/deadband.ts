@@ -11,7 +11,7 @@ import { fromMilliseconds, type Nanoseconds } from "./time.js";
 export interface ForceDeadband {
   /** 0 … 1, typically 0.1. The just noticeable difference of force is 7 to 15 %. */
   readonly share: number;
-  /** N, typically 0.05. Smaller changes are omitted until the longest silence. */
+  /** N, typically 0.05. Smaller changes are omitted, but only for the longest silence. */
   readonly floor: number;
   /** Typically 20. This limits how long an old force is rendered by the device after a packet loss. */
   readonly longestSilenceMs: number;

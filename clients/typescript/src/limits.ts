@@ -25,5 +25,5 @@ export const kMaxWays = 8;
 export const kMaxLoopHz = 1_000_000;
 /** How many times a Bye is sent. */
 export const kByes = 3;
-/** An encrypted session ends after this number of forged datagrams, which bounds guessing of authentication tags. */
+/** An encrypted session ends after this number of forged datagrams, which limits how often a tag can be guessed. */
 export const kMaxForged = 2 ** 36;

@@ -126,7 +126,7 @@ export class Session {
   #forceToSend: ForceCommand | undefined;
   #reportToSend: LinkReport | undefined;
   readonly #diagnosesToSend = new Map<string, Diagnosis>();
-  /** By device, channel and end, as for received ones. */
+  /** The key is the device, the channel and the end, as for received port states. */
   readonly #portsToSend = new Map<string, PortState>();
   readonly #asked = new OutgoingRequests();
   #bye: Frame | undefined;

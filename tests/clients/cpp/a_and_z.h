@@ -90,7 +90,7 @@ class Server {
   void say_bye(LocalTime now, Code code);
   const LinkStats& link_stats() const { return session_->stats(); }
 
-  std::optional<Refused> refusal;  ///< if set, every client is refused with it
+  std::optional<Refused> refusal;  ///< if this is set, all clients are refused with it
   bool features = true;
   static constexpr int kLoopHz = 1000;
   int state_hz = kLoopHz;

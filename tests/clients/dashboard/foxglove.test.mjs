@@ -39,8 +39,8 @@ it("gives Foxglove's client every step until it unsubscribes", async (test) => {
     const { count, span, inOrder } = ticksOf(steps);
     const hz = (span - 1) / (Number((steps.at(-1).time - steps[0].time) / 1000n) / 1e6);
     test.diagnostic(`${name}: ${count} steps of ${arrived} states that came, of ${span} ticks; ${hz.toFixed(1)} in a second, ${after} after it unsubscribed`);
-    // On a busy machine some states never arrive. States received at the low rate before and after are not sent as
-    // steps.
+    // On a busy machine, some states never arrive. The states at the low rate, before and after the subscription, are
+    // not sent as steps.
     assert.ok(inOrder && count >= arrived - 250 && count >= 0.7 * span, `${count} of ${arrived} of ${span}`);
     assert.ok(hz > 900 && hz < 1020, `${hz}`);
     assert.ok(after <= 100, `${after} steps came after that`);

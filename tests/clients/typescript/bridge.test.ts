@@ -156,7 +156,7 @@ it("webSocket() opens another WebSocket after the bridge was gone", async (test)
   await until("the first has arrived", () => arrived.length === 1);
   await bridge.close();
   await until("it is gone", () => bridge.counts.peers === 0);
-  transport.send(datagram(2)); // lost: no socket is there
+  transport.send(datagram(2)); // this is lost, because there is no socket
   const again = await Bridge.open({ listen: url.slice("ws://".length), to: `127.0.0.1:${server.address().port}` });
   test.after(() => again.close());
   await until("another has arrived", () => {

@@ -122,7 +122,7 @@ describe("the handshake", () => {
     const [first, second, third, next] = sent;
     assert.deepEqual(second, first);
     assert.deepEqual(third, first);
-    assert.equal(sent.length, 5); // at 0, 100 and 200 ms; abandoned at 250, then at 350 and 450 ms
+    assert.equal(sent.length, 5); // at 0, 100 and 200 ms, and in the next attempt at 350 and 450 ms
     assert.ok(sent.every((datagram) => datagram.length === 1200));
     const differs = (from: number, to: number): boolean =>
       Buffer.compare(first!.subarray(from, to), next!.subarray(from, to)) !== 0;

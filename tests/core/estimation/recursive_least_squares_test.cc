@@ -53,7 +53,7 @@ void expect_equals_batch(std::uint64_t seed) {
     const Vec3 phi(gaussian(dice), gaussian(dice), gaussian(dice));
     regressors.row(i) = phi;
     outputs[i] = phi.dot(kTruth) + 0.1 * gaussian(dice);
-    // During the first samples, the cap on forgetting that the header describes is active.
+    // The limit on forgetting (recursive_least_squares.h) is active during the first samples.
     forgotten[i] = std::max(kForgetting, std::min(1.0, estimator.trace() / (3 * kPrior)));
     ASSERT_TRUE(estimator.observe(phi, outputs[i]));
   }

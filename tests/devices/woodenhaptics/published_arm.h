@@ -15,7 +15,7 @@
 /// instead of sums of sines, and circle intersection instead of the law of cosines.
 namespace tendon::published_arm {
 
-/// variant; 3 capstans, 3 lengths, 3 bodies; origin, radius; 3 torque constants; full scale; 6 counts per turn; force,
+/// The values of a row are: variant; 3 capstans, 3 lengths, 3 bodies; origin, radius; 3 torque constants; full scale; 6 counts per turn; force,
 /// stiffness, damping; masses, centers of mass, g; 6 calibration counts; 3 of "motor and body aligned".
 using Row = std::array<double, 41>;
 

@@ -98,7 +98,7 @@ void FalconStage::arm() {
   go_to(kOutside);
   wait_for_commands(20);  // time to detect that the button is released
   button_ = true;
-  wait_for_commands(600);  // 50 of rest, and the ramp
+  wait_for_commands(600);  // 50 at rest, and then the ramp
 }
 
 void FalconStage::arm_and_press() {

@@ -59,7 +59,7 @@ class FalconStage {
   struct Killed {
     double pushed_for_ms = 0;          ///< duration of the force after the signal was sent
     double dead_ms = 0;                ///< time from the signal to the exit of the process
-    bool pushes = true;                ///< at the end
+    bool pushes = true;                ///< whether there is a force at the end
     std::vector<std::uint8_t> last{};  ///< the last received endpoint and packet
     std::uint64_t by_guardian = 0;     ///< packets written directly to the device node
   };
@@ -94,7 +94,7 @@ class FalconStage {
   std::atomic<bool> button_{false};
   std::atomic<bool> homes_{false};
   std::atomic<double> speed_{0.1};
-  std::optional<LocalTime> used_;  ///< by the Falcon's thread
+  std::optional<LocalTime> used_;  ///< used by the thread of the Falcon
   mutable std::mutex mutex_;
   Felt felt_;
 

@@ -42,7 +42,7 @@ TEST(LinkMeter, AnExchangeToldAgainIsOneWayThereAndSeveralWaysBack) {
   }
   const auto report = meter.report(kStart + seconds(1));
   EXPECT_EQ(report.to_peer->median, milliseconds(90));    // 10, 90, 90
-  EXPECT_EQ(report.from_peer->median, milliseconds(40));  // ten of 40, two of 20
+  EXPECT_EQ(report.from_peer->median, milliseconds(40));  // ten are 40 ms, two are 20 ms
 }
 
 TEST(LinkMeter, ForgetsWithEachReportAndSaysNothingOfWhatItDidNotSee) {
@@ -59,7 +59,8 @@ TEST(LinkMeter, TheLongestGapIsBetweenTwoDatagramsOrSinceTheLast) {
   EXPECT_EQ(meter.report(kStart + milliseconds(100)).longest_gap, milliseconds(50));
   EXPECT_EQ(meter.report(kStart + milliseconds(300)).longest_gap, milliseconds(220));
   meter.heard(kStart + milliseconds(310));
-  EXPECT_EQ(meter.report(kStart + milliseconds(310)).longest_gap, milliseconds(230));  // began in the previous report
+  EXPECT_EQ(meter.report(kStart + milliseconds(310)).longest_gap,
+            milliseconds(230));  // this gap began in the previous report
 }
 
 TEST(LinkMeter, AFloodIsThinnedEvenlyAndItsQuantilesHold) {

@@ -103,7 +103,7 @@ TEST(RateAdaptation, TriesAHigherRateMoreAndMoreRarelyWhenThatKeepsFailing) {
   link.run(seconds(100), 700);
   link.take_times();
   link.run(seconds(300), 700);
-  EXPECT_LT(link.take_times()[1], seconds(6));  // of 300 s, because it only tries for a few 100 ms every 80 s
+  EXPECT_LT(link.take_times()[1], seconds(6));  // it only tries for a few 100 ms every 80 s
 }
 
 TEST(RateAdaptation, LossLowersTheRateAndATenthBreaksTheCircuitAtTheLowest) {

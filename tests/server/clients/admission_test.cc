@@ -61,7 +61,7 @@ TEST_F(SealedServer, SealsByAesWhereBothCanAndServesWhoCannot) {
   EXPECT_EQ(phase(a), Phase::kOpen);
   Client old = controller(other_, "192.0.2.2:4000", {.suites = {Suite::kNoise}});
   Client screen = observer(screen_, "192.0.2.3:4000", {.suites = {Suite::kNoise}});
-  std::set<std::uint8_t> suites;  // of the datagrams in the session with the screen
+  std::set<std::uint8_t> suites;  // suites of the datagrams to and from the screen
   run(milliseconds(300), {&a, &old, &screen}, [&](const Datagram& datagram) {
     if (datagram.to == screen.end->self && (datagram.bytes[1] & std::byte{0x0F}) == std::byte{3}) {
       suites.insert(std::to_integer<std::uint8_t>(datagram.bytes[3]));
@@ -177,7 +177,7 @@ TEST_F(SealedServer, AReplayedPlainHelloTakesNothingFromWhoCameAfterIt) {
 TEST_F(SealedServer, DatagramsOfAClientThatHasLeftAreNobodysAtOnce) {
   restart_without_keys();
   Client a = opened(std::nullopt, "127.0.0.1:4000");
-  a->stop(now_);  // three Byes in one turn of the server
+  a->stop(now_);  // the server receives all three Byes in the same turn
   run(milliseconds(2), {&a});
   EXPECT_EQ(stats().unknown_connection, 2U);
 }

@@ -223,7 +223,7 @@ TEST_F(Diagnosed, WhereTheLogThreadSaysNothingThereIsNoReportOnADevice) {
   ASSERT_TRUE(b->device_report().has_value());
   measured_ = false;
   run(seconds(3), {&b});
-  EXPECT_EQ(b->device_report()->number, 2U);  // from before it stopped sending
+  EXPECT_EQ(b->device_report()->number, 2U);  // the last report before it stopped
   health_.steps_lost += 100;                  // exceeded the capacity of the ring
   measured_ = true;
   run(seconds(1), {&b});
@@ -299,7 +299,7 @@ TEST_F(EngineWithWays, TheStepAndTheCountsOfTheServerSayTheWay) {
 
 TEST_F(EngineWithWays, TheNextEngineIsNotBlamedForTheDoubtsOfTheOneBefore) {
   Client a = engine({"tabulated", "near"});
-  run(milliseconds(1990), {&a, &b});  // there is a report at 2 s
+  run(milliseconds(1990), {&a, &b});  // the next report is at 2 s
   a->stop(now_);
   Client c = controller(other_, "192.0.2.3:4000");
   run(milliseconds(400), {&a, &b, &c});

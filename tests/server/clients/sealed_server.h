@@ -192,7 +192,7 @@ class SealedServer : public Servers {
   std::uint64_t steps_a_turn_ = 1;  ///< if above 1, the network thread is late and only sees the newest step
   DeviceState look_;                ///< set by the loops of the devices
   std::optional<Vec3> wanted_;      ///< set by the loops of the devices
-  bool measured_ = false;           ///< the log thread reports health
+  bool measured_ = false;           ///< whether the log thread reports the health
   Health health_;
   std::uint64_t seed_ = 10;
   Hello foreign_{.role = Role::kController, .name = "foreign", .features = {}};  ///< of run_foreign()

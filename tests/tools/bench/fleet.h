@@ -26,7 +26,7 @@ struct Fleet {
   std::uint32_t force_hz = 1000;
   bool recorded = false;                             ///< records every step to a file
   Duration settle = std::chrono::milliseconds(300);  ///< time to wait after the last session has been opened
-  Duration length = std::chrono::seconds(2);         ///< measurement; extended until a state arrives
+  Duration length = std::chrono::seconds(2);         ///< of the measurement, extended until a state arrives
   std::uint64_t seed = 1;
   /// The SCHED_FIFO priority of the clients and of the threads of the server, except for the haptic ones. If this is 0,
   /// the default scheduling is used.
@@ -39,15 +39,15 @@ struct FleetResult {
   bool all_came = false;  ///< true if all sessions were open at the start
   double seconds = 0;     ///< measured duration
 
-  Duration started{};          ///< from exec to listening
+  Duration started{};          ///< time from exec until the server listens
   std::uint64_t resident = 0;  ///< resident memory of the server, bytes
   std::uint64_t steps = 0;     ///< of all devices
   std::uint64_t overruns = 0;  ///< steps after an interval longer than the assumed bound
   std::uint64_t forces_sent = 0;
-  std::uint64_t forces_taken = 0;  ///< handed to the haptic loops
+  std::uint64_t forces_taken = 0;  ///< forces that reached the haptic loops
   std::uint64_t lost_steps = 0;    ///< steps missing in a recording
 
-  injector::DurationHistogram loop_age;   ///< age of the motion that the force in use answers, per state
+  injector::DurationHistogram loop_age;   ///< for each state: age of the motion that its force answers
   injector::DurationHistogram state_age;  ///< receive time in the client's kernel − sample time
   std::uint64_t states_owed = 0;
   std::uint64_t states_received = 0;

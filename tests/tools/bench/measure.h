@@ -32,7 +32,7 @@ struct Turns {
   std::vector<double> times;  ///< the time per call in ns for each block
   std::vector<double> floor_times;
   std::vector<double> ratios;
-  std::optional<double> instructions{};  ///< of one call, median, if available
+  std::optional<double> instructions{};  ///< median per call, if available
 };
 
 /// Discards the first pair of blocks, which runs with cold caches.

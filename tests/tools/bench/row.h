@@ -29,9 +29,9 @@ struct Row {
     bool met = false;
   };
   std::optional<Target> target{};
-  std::optional<double> instructions{};  ///< of one call in user space, if the kernel permits counting
+  std::optional<double> instructions{};  ///< per call, in user space, if the kernel permits counting
   std::string note;
-  /// Values of the note for a chart, by name and in the order of the chart.
+  /// The values in the note that are plotted in a chart, with their names, in the order of the chart.
   std::vector<std::pair<std::string, double>> figures{};
 };
 

@@ -80,8 +80,8 @@ TEST(Chai3d, AProgramFindsTheDeviceAndMovesWithItOneTurnAStep) {
   const double took = number_in(end, "took_s");
   EXPECT_EQ(old.wait(), 0);
   EXPECT_EQ(number_in(end, "failed"), 0);
-  // One turn per haptic step, or per 2 ms if the machine pauses. At a turning point, several steps have the same
-  // encoder counts.
+  // The loop of the program has one iteration per haptic step, or per 2 ms if the machine pauses. The hand does not move
+  // in all of them, because several steps have the same encoder counts where it reverses.
   EXPECT_GT(number_in(end, "moved"), 0.4 * number_in(end, "turns"));
   EXPECT_LT(number_in(end, "turns"), 1.02 * 1000 * number_in(end, "took_s") + 10);
   EXPECT_GT(number_in(end, "turns"), 0.5 * 1000 * number_in(end, "took_s"));

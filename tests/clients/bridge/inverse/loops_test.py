@@ -119,7 +119,7 @@ def test_a_device_class_that_wants_arm_and_grip_is_served_by_a_falcon(tmp_path):
 
 
 async def steps_until_nothing(uri: str, act) -> int:
-    """Observes until a force is applied, calls `act`, and returns the haptic steps until the force is zero."""
+    """Waits for a force and calls `act`. Returns the number of haptic steps until the force is zero."""
     async with websockets.connect(uri) as socket:
         first = json.loads(await socket.recv())
         device = first["inverse3"][0]["device_id"]

@@ -205,7 +205,7 @@ TEST(SelfTest, JudgesTheStiffnessOfAnEngineThatGoesOnOnlyWithSaveAndRestore) {
   Creeping engine;
   const Physics physics = [&](const DeviceState& hand) { return engine.answer(hand); };
   SelfTestScript script;
-  script.work_tolerance = 1;  // stored before the path begins, and released on it
+  script.work_tolerance = 1;  // energy that was stored before is released on the path
   const SelfTest without = self_test(physics, script);
   EXPECT_EQ(count(without, kNotJudged, "stiffness"), 4) << without.text();
   EXPECT_NE(without.text().find("provide save and restore"), std::string::npos) << without.text();
