@@ -100,7 +100,7 @@ TEST(HostileDatagrams, AreCountedAndChangeNothing) {
   const std::uint64_t strangers = count_in(end, "malformed") + count_in(end, "unknown_connection");
   const std::uint64_t duplicated = count_in(end, "duplicated");
   const std::uint64_t sampled = strangers_in(recording.arrived, relay.clients_address());
-  // It is allowed that the kernel drops up to half of them.
+  // The kernel may drop up to half of them.
   EXPECT_GE(strangers, static_cast<std::uint64_t>(kGarbage) / 2);
   EXPECT_GE(duplicated, said.size() / 2);
   EXPECT_LE(duplicated, said.size());

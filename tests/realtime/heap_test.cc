@@ -86,7 +86,7 @@ TEST(HapticLoop, AMillionStepsMakeNoHeapCall) {
       now = loop.step(now);
       calls += guard.calls();
     }
-    while (i > 500'000) {  // the log thread only runs in the second half, so the ring is full before
+    while (i > 500'000) {  // the log thread only runs in the second half, so the ring is full in the first half
       const StepRecord* step = mail->steps.front();
       if (step == nullptr) break;
       if (step->reasons.has(Reason::kEnergy)) ++limited;

@@ -78,7 +78,7 @@ class Config:
     retry_min_s: float = 0.1
     """The time to wait before the first retry. It is doubled after each attempt."""
     retry_max_s: float = 2.0
-    """The upper limit of this time. When a session receives its first state, the time is reset."""
+    """The upper limit of the time before a retry. When a session receives its first state, this time is reset."""
 
     def __post_init__(self) -> None:
         def expect_at_most(most: int, text: str, field: str) -> None:
