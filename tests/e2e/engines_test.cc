@@ -29,8 +29,7 @@ TEST(Engines, TheForcesOfTwoAddUpOnOneDevice) {
   wait_until_felt(echo, 0.3);
   Client two("virtual_wall", server.address(), folder.path(), {"--channel", "two", "--stiffness-n-per-m", "150"});
   two.wait_for_line("connected");
-  // A wall of 150 N/m that is 15 mm deep is pressed by a grip of 300 N/m: 15 mm / 3, 1.5 N. With two walls: 7.5 mm,
-  // 2.25 N.
+  // A wall of 150 N/m, 15 mm deep, and a grip of 300 N/m: 15 mm / 3, 1.5 N. With two walls: 7.5 mm, 2.25 N.
   wait_until_felt(echo, 1.9);
   const std::string end = server.stop();
   EXPECT_NE(end.find(R"("name":"one","forces":)"), std::string::npos) << end;

@@ -125,8 +125,7 @@ TEST(FalconServer, StoppedInMidForceItLetsGoAndPushesAgainOnlyAfterArming) {
       EXPECT_EQ(stage.falcon().seen().pushes_begun, pushes_begun) << "before it was armed\n"
                                                                   << stage.server().process().err();
       stage.arm();
-      // The button may have to be pressed more than once, because the ledger assumes that the force was held during the
-      // whole pause.
+      // It may need more than one press, because the ledger assumes that the force was held during the pause.
       const auto pushed = [&stage] {
         stage.go_to(-0.015);
         stage.go_to(0.004);

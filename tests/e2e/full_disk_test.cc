@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// If the disk is full, only the recording must be paused. The recording must continue when there is space again, and
-// the exit code must report the gap.
+// If the disk is full, only the recording is paused, until there is space again. The exit code reports the gap.
 #include <gtest/gtest.h>
 
 #include <cstddef>

@@ -6,8 +6,7 @@
 #include "protocol/discovery.h"
 #include "tests/fuzz/target.h"
 
-// A name must either be rejected or be unchanged by writing and parsing. It must be possible to write and parse a
-// parsed TXT record again.
+// A name must be rejected or unchanged by writing and parsing. A parsed TXT record can be written and parsed again.
 
 using namespace tendon;
 

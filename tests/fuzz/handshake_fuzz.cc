@@ -28,8 +28,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     if (!suites.empty()) config.suites = suites;
     return ClientHandshake(config, now);
   };
-  // The clients are copied, because half of the cost of a run is the elliptic curve. They have no key, only suite 1, or
-  // all suites.
+  // Copied, because half of the cost of a run is the elliptic curve. They have no key, only suite 1, or all suites.
   static const std::array<ClientHandshake, 3> fresh = {client_of({}), client_of({Suite::kNoise}), client_of(all)};
   std::array<ClientHandshake, 3> clients = fresh;
   const Address here = parse_address("127.0.0.1:4000");

@@ -3,8 +3,7 @@
 #include "protocol/wire/header.h"
 #include "tests/fuzz/target.h"
 
-// Parses the unencrypted header and the layout of the handshake. If a value can be parsed, it must encode to the same
-// bytes.
+// Parses the unencrypted header and the layout of the handshake. Parsed values must encode to the same bytes.
 
 using namespace tendon;
 

@@ -4,8 +4,7 @@
 #include "tests/fuzz/target.h"
 #include "tests/protocol/wire/told.h"
 
-// The input is encrypted with the key of the peer and passed to a session. The fast parser and the parser for fields in
-// arbitrary order must agree.
+// The input is encrypted and passed to a session. The fast parser and the one for any order of fields must agree.
 
 using namespace tendon;
 

@@ -63,8 +63,7 @@ Observed bad_network(std::uint64_t seed, bool limiter, bool decay) {
   return bench.seen();
 }
 
-// Oracle: passive, bounded, quiet. There must not be any force from 760 ms after the last arrival until the engine is
-// back.
+// Oracle: passive, bounded, quiet. There must be no force from 760 ms after the last arrival until the engine is back.
 TEST(HardLoop, FiveHertzOutOfOrderThenSilenceIsPassiveAndFadesToZero) {
   constexpr Duration kWithin = seconds(1);
   const Observed seen = kept(kWithin, [](std::uint64_t seed) { return bad_network(seed, true, true); });
@@ -88,8 +87,7 @@ Observed restart(std::uint64_t seed, bool ramp) {
   const LocalTime back = bench.world.now();
   set.engine.seed = 2;
   bench.world.restart_controller(bench.engine, set.engine, set.physics);
-  // The force may grow at most as fast as the largest force of the wall over the ramp of 100 ms, plus a quarter for the
-  // motion of the hand.
+  // The force may grow at most as fast as the deepest force of the wall over the ramp of 100 ms, plus a quarter.
   const double fastest = 1.25 * set.stiffness * 0.02 / 0.1;
   std::optional<LocalTime> engaged;
   bench.expect_of_steps([=](const StepRecord& step) mutable -> std::string {
@@ -192,8 +190,7 @@ TEST(HardLoop, ContactThatChattersOnAnEdgeStaysPassive) {
 
 Observed pull_through(std::uint64_t seed, bool limiter) {
   Case set(seed);
-  // A plate of 8 mm, which pushes toward the nearer side. If a hand has touched it, it is held up to a distance of 5
-  // mm.
+  // A plate of 8 mm, which pushes toward the nearer side. It holds a hand that has touched it up to 5 mm.
   set.physics = [n = set.into, k = set.stiffness, stuck = false](const DeviceState& hand) mutable -> Touch {
     const double depth = hand.position.dot(n);
     const double out = depth < 0.004 ? depth : depth - 0.008;  // distance to the nearer side; > 0 is inside near the

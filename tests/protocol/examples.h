@@ -64,8 +64,7 @@ inline ForceCommand force() {
           .valid_for = std::chrono::milliseconds(20)};
 }
 
-/// All fields are set. The tool is 2 mm deep in a surface with the normal −x, and there is a table of the forces at
-/// other depths.
+/// All fields are set. The tool is 2 mm deep in a surface with the normal −x, with a table for other depths.
 inline ForceCommand force_with_all() {
   ForceCommand all = force();
   all.sequence = 101;
@@ -244,8 +243,7 @@ inline DeviceState state_with_buttons() {
   return state;
 }
 
-/// All parts are set. The handle has been rotated by 106° about y and is moving. The fingers are closing on a soft
-/// object.
+/// All parts are set. The handle is rotated by 106° about y and is moving. The fingers close on a soft object.
 inline DeviceState state_with_handle() {
   DeviceState state = examples::state();
   state.buttons = 1;
@@ -372,8 +370,7 @@ inline Couple couple() {
           .period = std::chrono::milliseconds(1)};
 }
 
-/// This is sent to an observer. The fields are those of a whole aligned handle. They cannot be sent together by a
-/// single end.
+/// This is sent to an observer. No single end can send these fields of a whole aligned handle together.
 inline PortFrame port_with_all() {
   PortFrame port = port_by_model();
   port.phase = PortPhase::kAligning;

@@ -34,11 +34,9 @@ TEST_F(TurnProof, AStateAndItsForceTakeTwoDatagramsAndFewInstructions) {
             << static_cast<double>(sent) / kTurns << " datagrams\n";
   EXPECT_EQ(forces, kTurns) << "not every state was answered in its turn";
   EXPECT_EQ(sent, 2 * kTurns);
-  // There are two polls at each end, the first one without a result. There is another poll of the server after it has
-  // sent a state.
+  // Each end polls twice, the first time without a result. The server polls again after it has sent a state.
   EXPECT_EQ(looks, 5 * kTurns);
-  // The clock is read after each of the first four polls, after the doorbell of the step, and after the engine's
-  // answer.
+  // The clock is read after each of the first four polls, after the doorbell, and after the engine's answer.
   EXPECT_EQ(readings, 6 * kTurns);
   EXPECT_LE(instructions, kMost);
   EXPECT_GE(instructions, 0.5 * kMost) << "this is no whole turn, or this bound is old";

@@ -39,8 +39,7 @@ void turn(ForceClient& client, Transport& transport) {
   transport.wait(std::min<Duration>(due - clock::now(), kLook));
 }
 
-/// The sessions use kHomes local addresses (127.1.0.1 and up), because HelloLimit accepts only a few clients per second
-/// from one address.
+/// Uses kHomes local addresses (127.1.0.1 and up), because HelloLimit accepts only a few clients per second from one.
 class Home : public Link {
  public:
   static constexpr std::uint64_t kHomes = 200;

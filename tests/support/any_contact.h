@@ -6,8 +6,7 @@
 
 namespace tendon {
 
-/// Returns a valid contact (core/remote/answer.h) with the tool at `position`. It is a contact with a wall at x = 0, or
-/// has no surface.
+/// Returns a valid contact (core/remote/answer.h) with the tool at `position`, and a wall at x = 0 or no surface.
 inline Contact any_contact(Dice& dice, const Vec3& position) {
   Contact contact{.normal = -Vec3::UnitX(), .gap = -position.x()};
   if (dice.chance(0.3)) contact = {.normal = dice.direction(), .gap = dice.within(-0.01, 0.01)};

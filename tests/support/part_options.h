@@ -10,8 +10,7 @@
 
 namespace tendon {
 
-/// Adds `--units` and `--from` for SweptWork. `units` is used in the help, for example "0 to 17: the rows of the
-/// table".
+/// Adds `--units` and `--from` for SweptWork. `units` is for the help: "0 to 17: the rows of the table".
 inline void add_part_options(CLI::App& verb, Part& part, const std::string& units) {
   part.progress = isatty(STDERR_FILENO) != 0;
   CLI::Option* const these =

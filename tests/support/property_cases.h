@@ -6,8 +6,7 @@
 
 namespace tendon {
 
-/// Returns TENDON_PROPERTY_CASES, or 2000 if it is not set. ctest sets it to 10 000 for the tests that are listed as
-/// LONG in tendon_test().
+/// Returns TENDON_PROPERTY_CASES, which ctest sets to 10 000 for tests listed as LONG in tendon_test(), or 2000.
 inline int property_cases() {
   const char* const cases = std::getenv("TENDON_PROPERTY_CASES");
   return cases == nullptr ? 2000 : std::stoi(cases);

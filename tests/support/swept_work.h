@@ -23,8 +23,7 @@
 
 namespace tendon {
 
-/// The part of the work that is done by this process. If neither `units` nor `from` is set, this is all units
-/// (part_options.h).
+/// The part of this process. If neither `units` nor `from` is set, this is all units (part_options.h).
 struct Part {
   std::optional<Units> units{};                 ///< the units of this shard
   std::optional<std::filesystem::path> from{};  ///< the file with the results of the shards

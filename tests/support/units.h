@@ -56,8 +56,7 @@ class UnitDigest {
   std::uint64_t moment_ = 0;
 };
 
-/// All totals and extremes are integers. With floating-point numbers, the last bit of a sum would depend on the
-/// partition.
+/// All totals and extremes are integers. The last bit of a floating-point sum would depend on the partition.
 ///
 ///     {"kind":"end","first":1,"count":500,"totals":{…},"least":{…},"largest":{…},"digest":"…","moment":"…"}
 struct ShardEnd {

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reads the file that is written by `tendon-replay --merge`. It contains both ends of a coupling, with times on the
-// clock of the leader.
+// Reads the output of `tendon-replay --merge`: both ends of a coupling, with times on the clock of the leader.
 import { createFileRegistry, fromBinary, type DescMessage, type FileRegistry } from "@bufbuild/protobuf";
 import { FileDescriptorSetSchema } from "@bufbuild/protobuf/wkt";
 import { McapStreamReader } from "@mcap/core";

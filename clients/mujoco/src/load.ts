@@ -3,19 +3,13 @@
 // corrected or reported here, with the measured effect (README.md).
 import type { MainModule, MjModel, MjSpec } from "@mujoco/mujoco";
 
-/**
- * The default contact of MuJoCo, which is soft. If the tool is pressed 2 mm into block B1, it penetrates the surface by
- * 0.85 to 1.35 mm.
- */
+/** MuJoCo's default contact is soft: if the tool is pressed 2 mm into B1, it penetrates by 0.85 to 1.35 mm. */
 const kDefaultSolref = [0.02, 1];
 const kDefaultSolimp = [0.9, 0.95, 0.001];
 /** With these values, the penetration is 0.03 to 0.06 mm of the 2 mm, and finer meshes converge. */
 const kStiffSolref = [0.004, 1];
 const kStiffSolimp = [0.99, 0.999, 0.0001];
-/**
- * Above this value of Poisson's ratio, tetrahedra lock. Block B1 is 1.7 times too stiff at 0.45, and 12 times too stiff
- * at 0.499.
- */
+/** Above this value, tetrahedra lock: B1 is 1.7 times too stiff at 0.45, and 12 times too stiff at 0.499. */
 const kLargestPoisson = 0.45;
 
 /** The files that are used in the scene: "liver.msh" → content. MuJoCo cannot read any other files. */

@@ -53,9 +53,7 @@ export interface Coupling {
   readonly angularStiffness: number;
 }
 
-/**
- * A mocap body that is at the position of the hand and does not rotate. The hand feels the contact forces on this body.
- */
+/** A mocap body that is at the hand and does not rotate. The hand feels the contact forces on it. */
 class LedTool implements Tool {
   readonly home: Pose;
   readonly #data: MjData;
@@ -117,10 +115,7 @@ class HeldTool implements Tool {
   /** The damping of the six degrees of freedom, N·s/m and N·m·s/rad. Rotations are about the axes of the tool. */
   readonly #damping: readonly number[];
   #hand: Pose;
-  /**
-   * The damper forces that are caused by the motion of the hand, N and N·m. MuJoCo adds those that are caused by the
-   * motion of the tool.
-   */
+  /** The damper forces that the motion of the hand causes, N and N·m. MuJoCo adds those of the tool. */
   #dragged: readonly number[] = [0, 0, 0, 0, 0, 0];
 
   constructor(mj: MainModule, model: MjModel, data: MjData, body: number, name: string, coupling: Coupling, derives: boolean) {

@@ -44,10 +44,7 @@ export interface SceneStats {
   readonly steps: number;
   /** The number of positions that were not finite or whose orientation was invalid. They were not simulated. */
   readonly badPositions: number;
-  /**
-   * The number of answers in which the hand was faster than maxToolSpeed or maxToolSpin, so that the tool did not reach
-   * it.
-   */
+  /** The number of answers in which the hand was too fast (maxToolSpeed, maxToolSpin), so that the tool lagged. */
   readonly lagging: number;
   /** The number of times that the scene was reset because MuJoCo had lost the solution. */
   readonly restarts: number;

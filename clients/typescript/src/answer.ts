@@ -63,10 +63,7 @@ export function objection(touch: Touch): string {
   return good ? "" : "its stiffness, radius, contact or error is not finite, or out of the bounds in WIRE.md";
 }
 
-/**
- * Returns the part of an answer that is supported by a server with these features, and a description of the omitted
- * part.
- */
+/** Returns the part of an answer that a server with these features supports, and what was omitted. */
 export function usable(
   touch: Touch, hand: DeviceState, features: readonly string[],
 ): { readonly answer: Pick<ForceCommand, "force" | "model" | "torque" | "gripForce">; readonly leftOut: string } {

@@ -46,10 +46,7 @@ export function encodeFrame(frame: Frame): Uint8Array {
   return toBinary(pb.DatagramSchema, create(pb.DatagramSchema, { frames: [{ body }] }));
 }
 
-/**
- * Returns undefined if the body is malformed, which means that it is not protobuf, has too many frames, or does not
- * have a valid time.
- */
+/** Returns undefined if the body is not protobuf, has too many frames, or does not have a valid time. */
 export function decodeData(body: Uint8Array): DataContent | undefined {
   const datagram = parse(pb.DatagramSchema, body);
   if (!datagram || datagram.frames.length > limits.kMaxFrames) return undefined;

@@ -13,10 +13,7 @@ import { kUsableSuites, namesOf } from "./suites.js";
 export interface ClientConfig {
   /** This name is used in the log of the server. It has at most 64 bytes. */
   readonly name?: string;
-  /**
-   * The names of the device and its channel, which have at most 24 bytes each. If a name is empty, this is the first
-   * one of the server.
-   */
+  /** The device and its channel, with names of at most 24 bytes. Empty: the first one of the server. */
   readonly device?: string;
   readonly channel?: string;
   /**
@@ -30,9 +27,7 @@ export interface ClientConfig {
   readonly suites?: readonly CipherSuite[];
   /** How often the callback is called per second, 0.001 … 100 000. If it is 0, it is called for each new state. */
   readonly rateHz?: number;
-  /**
-   * The number of states per second that is requested from the server. If it is 0, this is the default of the server.
-   */
+  /** The number of states per second that the server should send. 0: the default of the server. */
   readonly stateHz?: number;
   /**
    * How long after its arrival the server may use a force; at most 10 s. 0: max(3 T, 20 ms) with the period T between

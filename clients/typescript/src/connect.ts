@@ -44,10 +44,7 @@ export interface Guest {
   readonly report: LinkReport | undefined;
   /** The newest report on the loop of the device, which is sent once per second. Requires `diagnostics`. */
   readonly deviceReport: DeviceReport | undefined;
-  /**
-   * The newest report on the engine of each channel. If the engine leaves, the report is not removed. Requires
-   * `diagnostics`.
-   */
+  /** The newest report on the engine of each channel, also after it has left. Requires `diagnostics`. */
   readonly peerReports: ReadonlyMap<number, PeerReport>;
   stats(): ClientStats;
   rearm(): boolean;
@@ -109,10 +106,7 @@ class RealTimeGuest implements Guest {
   #timerDue: Nanoseconds = kNever;
   #deferred = false;
   #ended = false;
-  /**
-   * The number of datagrams since the last round of the event loop, and the number of rounds for which they have
-   * delayed the turn.
-   */
+  /** The datagrams since the last round of the event loop, and for how many rounds they delayed the turn. */
   #arrived = 0;
   #rounds = 0;
 

@@ -32,10 +32,7 @@ export function checkStateDeadband({ share, floor, maxSilenceUs }: StateDeadband
   expect(possible, "stateDeadband.maxSilenceUs", maxSilenceUs, "0, or a whole number from 1000 to 20000");
 }
 
-/**
- * The distance from the center to the end of a handle, m. It is used to convert the floor of a force (N) to that of a
- * torque (N·m).
- */
+/** The length of a handle from its center, m. It converts the floor of a force (N) to that of a torque (N·m). */
 const kHandleLever = 0.05;
 const kZero: Vec3 = { x: 0, y: 0, z: 0 };
 

@@ -28,10 +28,7 @@ const kValidPeriods = 3;
 const kMinValidForMs = 20;
 /** If the gap is longer, it is not used as a period. If an engine is slower than 10 Hz, it must set rateHz. */
 const kMaxObservedPeriodMs = 100;
-/**
- * There must be at least this time between two requests for a lease, because the current holder renews its lease
- * continuously.
- */
+/** The time between two requests for a lease, because the holder renews its lease continuously. */
 const kAskLeaseAgain = fromMilliseconds(50);
 
 /** Indices used if neither device nor channel is named. */
@@ -209,10 +206,7 @@ export class ForceClient {
   get holds(): boolean {
     return this.#holds;
   }
-  /**
-   * Requests the lease of the channel. If it is lost before the answer, the request is sent again. Returns false as
-   * rearm() does.
-   */
+  /** Requests the lease, again if it is lost before the answer. Returns false as rearm() does. */
   takeLease(): boolean {
     const { device, channel } = this.#place;
     const asked = this.#session?.request({ kind: "takeLease", device, channel });
@@ -268,10 +262,7 @@ export class ForceClient {
   get deviceReport(): DeviceReport | undefined {
     return this.#deviceReport;
   }
-  /**
-   * The newest report on the engine of each channel. If the engine leaves, the report is not removed. Requires
-   * `diagnostics`.
-   */
+  /** The newest report on the engine of each channel, also after it has left. Requires `diagnostics`. */
   get peerReports(): ReadonlyMap<number, PeerReport> {
     return this.#peerReports;
   }
@@ -457,10 +448,7 @@ export class ForceClient {
     }
   }
 
-  /**
-   * Returns the state that is predicted for `now`. Returns undefined if there is nothing new, or if the last state is
-   * too old.
-   */
+  /** Returns the state that is predicted for `now`, unless there is nothing new or the last state is too old. */
   #predicted(now: Nanoseconds): DeviceState | undefined {
     const age = now - this.#newestArrived;
     if (!this.#newest || age > this.#silence()) return undefined;

@@ -8,9 +8,7 @@ export interface ClientKey {
   readonly key: Uint8Array;
 }
 
-/**
- * In 32 random bytes, there are about 30 different values. The probability that there are fewer than 18 is one in 10¹¹.
- */
+/** In 32 random bytes there are about 30 different values. Fewer than 18 occur once in 10¹¹ keys. */
 const kFewestDifferent = 18;
 const kExpected = "expected one line, `controller` or `observer` and 64 hexadecimal digits";
 

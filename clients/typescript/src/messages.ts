@@ -21,10 +21,7 @@ export const kFeatureJoints = "joints";
 /** Feature: the client receives the outputs of the device and can set them (`outputs` in the config). */
 export const kFeatureOutputs = "outputs";
 
-/**
- * Feature: the client can be one of the ends of a coupling. It sends Couple, and PortStates are sent in both
- * directions.
- */
+/** Feature: the client can be one end of a coupling. It sends Couple, and both ends send PortStates. */
 export const kFeatureTeleoperation = "teleoperation";
 
 /** Feature: an engine names its methods, and each force contains the method that computed it. */

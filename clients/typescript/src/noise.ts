@@ -43,10 +43,7 @@ export const rekey = (key: Uint8Array): Uint8Array =>
 /** Identifies the key to the server without revealing it: 8 bytes. */
 export const keyId = (key: Uint8Array): Uint8Array => sha256(concat(ascii("tendon-key-id"), key)).slice(0, 8);
 
-/**
- * The hash and key that both sides have mixed so far. This is immutable, so that it is not changed by an invalid
- * message.
- */
+/** The hash and key that both sides have mixed so far. An invalid message cannot change them. */
 export class SymmetricState {
   private constructor(
     readonly hash: Uint8Array,

@@ -23,9 +23,7 @@ export class OutgoingRequests {
   /** The upper limit of the exponential back-off, unless the round trip is longer. */
   static readonly kMaxWait = kSecond;
 
-  /**
-   * The requests are in the order of their ids. The first one is the oldest request whose answer has not been taken.
-   */
+  /** In the order of the ids. The first one is the oldest request whose answer has not been taken. */
   readonly #asked: Asked[] = [];
   #next = 1;
 

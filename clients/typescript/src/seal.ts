@@ -11,10 +11,7 @@ export interface Seal {
   readonly overhead: number;
   /** Returns the datagram. */
   close(now: Nanoseconds, connectionId: number, packetNumber: bigint, body: Uint8Array): Uint8Array;
-  /**
-   * Returns the body. The result is "forged" if the authentication failed, and "oldKey" if the key has expired or is
-   * too far ahead.
-   */
+  /** Returns the body, "forged" if it is not authentic, or "oldKey" if the key has expired or is too far ahead. */
   open(now: Nanoseconds, header: Header, datagram: Uint8Array): Uint8Array | "forged" | "oldKey";
 }
 

@@ -39,8 +39,7 @@ it("measures", { timeout: 120_000 }, async (test) => {
   }, 20);
   await until("enough steps come", () => steps.length >= kSteps);
   clearInterval(pinging);
-  // A report contains the same instant twice: on the server's clock (CLOCK_MONOTONIC, like hrtime), and as converted
-  // for Foxglove.
+  // A report has the same time on the server's clock (CLOCK_MONOTONIC, like hrtime) and in Foxglove.
   const report = reports.at(-1);
   const offset = report.time - BigInt(report.until_ns);
   const late = steps.map((step) => Number(step.now - (step.time - offset)) / 1e6);

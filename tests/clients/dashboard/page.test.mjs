@@ -115,10 +115,7 @@ it("says that there is no such page, and shows the pages there are", async (test
   await page.locator("main.live").waitFor();
 });
 
-/**
- * The hand is 8 mm deep in a wall and does not move. The device has been armed by a request, and the operator has its
- * own channel.
- */
+/** The hand is 8 mm deep in a wall. A request armed the device, and the operator has its own channel. */
 const kGuarded = `
 [device]
 kind = "simulated"

@@ -52,10 +52,7 @@ name = "operator"
 keys = "keys"
 `;
 
-/**
- * Starts a device with a safety layer, which is armed from the page, and an engine behind a network with a delay of 20
- * ms.
- */
+/** Starts a device that is armed from the page, and an engine behind a network with a delay of 20 ms. */
 async function armed(test, name, fastest) {
   const folder = scratch(test);
   await makeKeys(test, folder, ["engine", "operator"]);

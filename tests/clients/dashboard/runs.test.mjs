@@ -146,8 +146,7 @@ it("opens a recording at its first instant, and says one number of steps", async
   assert.equal(await tile("state", "note"), `all ${steps} steps are shown`);
   assert.doesNotMatch(await tile("loss", "note"), /\d{3}/, "no third number of steps");
 
-  // At the end, the server has set the force to zero. If there is no limiter, the energy account of the device is
-  // negative.
+  // At the end, the force is zero. Without a limiter, the energy account of the device is negative.
   const box = await page.locator("[data-chart=force] .u-over").boundingBox();
   await page.mouse.move(box.x + box.width - 2, box.y + 20);
   await until("the tiles tell of the end", async () => Number((await tile("energy", "name")).match(/at ([\d.]+)/)?.[1]) > 2.5);

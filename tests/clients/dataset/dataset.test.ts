@@ -19,10 +19,7 @@ function scratch(test: TestContext): string {
 
 const scene = (map: string): string => `[teleoperation]\nrole = "leader"\n[teleoperation.map]\n${map}`;
 
-/**
- * The recording is six seconds long, with 1 kHz. The coupling is engaged from 1 s to 3 s and from 4 s to 6 s. The
- * leader is moved along its x axis.
- */
+/** Six seconds at 1 kHz, engaged from 1 s to 3 s and from 4 s to 6 s. The leader moves along its x axis. */
 function coupling({ contact = true, map = "" } = {}): Coupling {
   const leader = { steps: [], ports: [] } as Coupling["leader"];
   const follower = { steps: [], ports: [] } as Coupling["follower"];

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// This test runs tendond with a simulated device and hand, and MuJoCo. TENDON_PROGRAMS is the folder that contains
-// tendond.
+// Runs tendond with a simulated device and hand, and MuJoCo. TENDON_PROGRAMS is the folder of tendond.
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import { join } from "node:path";

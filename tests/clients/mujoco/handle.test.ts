@@ -106,8 +106,7 @@ describe("a held tool", () => {
       const { torque, angularStiffness: k } = settle(fixed, kOrigin, about(axis, degrees));
       const angle = (degrees * Math.PI) / 180;
       near(list(torque!), axis.map((value) => -0.5 * Math.sin(angle) * value), 0.003, `${degrees}°`);
-      // This is −∂τ/∂θ about the same axis. It is negative if the angle is above 90°, and a negative stiffness must not
-      // be sent.
+      // This is −∂τ/∂θ about the same axis. It is negative above 90°, and must then not be sent.
       const along = toScene(k!, axis).reduce((sum, value, i) => sum + value * axis[i]!, 0);
       near([along], [Math.max(0.5 * Math.cos(angle), 0)], 0.01, `stiffness at ${degrees}°`);
     }

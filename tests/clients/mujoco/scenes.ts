@@ -11,10 +11,7 @@ export interface Block {
   readonly contact?: string;
 }
 
-/**
- * Block B1: 100 × 100 × 50 mm, 10 kPa, fixed at the bottom. At the start, a sphere with a radius of 10 mm is 5.5 mm
- * above the block.
- */
+/** Block B1: 100 × 100 × 50 mm, 10 kPa, fixed at the bottom. A sphere of 10 mm is 5.5 mm above it at the start. */
 export function block({ n, option = 'timestep="0.002" integrator="discrete"', poisson = 0.45, contact = kStiff }: Block): string {
   const spacing = 0.1 / n;
   return `<mujoco>

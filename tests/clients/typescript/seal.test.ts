@@ -127,8 +127,7 @@ describe("ReplayWindow", () => {
         assert.equal(window.highest, highest);
         assert.equal(window.missing, highest + 1n - BigInt(inserted.size));
         if (i % 10 === 0) {
-          // An authentic but malformed datagram is not echoed, whether it has the newest packet number or an earlier
-          // one.
+          // An authentic but malformed datagram is not echoed, with the newest number or with an earlier one.
           for (const of of [highest, highest - BigInt(random.below(40))]) {
             let mask = 0;
             for (let bit = 0; bit < 32; ++bit) {

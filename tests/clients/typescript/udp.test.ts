@@ -37,8 +37,7 @@ describe("the name of a server", () => {
     const way = udp(`LOCALHOST:${port}`)((datagram) => came.push(datagram[0]!), assert.fail);
     test.after(() => way.close());
     for (let i = 0; i < 20; ++i) way.send(Uint8Array.of(i));
-    // If the system resolves the name to ::1 first, the next address must be tried, because there is no server at this
-    // address.
+    // If the name resolves to ::1 first, no server answers, and the next address must be tried.
     for (let round = 0; came.length === 0 && round < 50; ++round) {
       await new Promise((resolve) => setTimeout(resolve, 100));
       if (came.length > 0) break;

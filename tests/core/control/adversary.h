@@ -236,8 +236,7 @@ int broken_by_static_worlds(Make make, int seeds, const Walls& walls = {}, int p
   return broken;
 }
 
-/// If a demand is not finite, it is replaced by zero and must not be booked. The energy must be equal to the ledger of
-/// the port.
+/// If a demand is not finite, it is replaced by zero and must not be booked. The energy is equal to the ledger.
 template <int N, class Law>
 requires StabilityController<Law, N>
 void expect_the_common_promises(Law law, const Friction& friction) {

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The ledger of the test uses exact positions, the exact friction and the applied force. The law sees positions in
-// encoder counts.
+// The ledger of the test uses exact positions and forces. The law sees positions in encoder counts.
 #include "core/control/aol_plus.h"
 
 #include <gtest/gtest.h>

@@ -15,8 +15,7 @@ using std::chrono::milliseconds;
 
 constexpr Friction kFriction{0.05, 0.26};
 
-// Returns the depth (m) of the hand in a wall that is at 0. The hand is pressed into the wall and released again, with
-// tremor.
+// Returns the depth (m) of a hand that is pressed into a wall at 0 and released again, with tremor.
 double depth(int step) {
   const double t = step * 1e-3;
   return std::abs(8e-3 * std::sin(3 * t) + 2e-3 * std::sin(17 * t) + 1e-4 * std::sin(190 * t));
@@ -61,8 +60,7 @@ TEST(PortHamiltonian, TheStateLagsBehindThePositionByWhatTheLeapsCost) {
   EXPECT_GT(least_work, -1e-5);  // J, for the environment without friction; the spring exchanges 75 mJ
 }
 
-// For every demand and every K, the storage must never be negative, and it must be at most the received energy plus the
-// debt.
+// The storage must never be negative, and it must be at most the received energy plus the debt.
 TEST(PortHamiltonian, HoldsNoMoreThanHasGoneInAndWhatItHasBookedAsDebt) {
   for (std::uint64_t seed = 0; seed < 200; ++seed) {
     Dice dice(seed);
@@ -116,8 +114,7 @@ TEST(PortHamiltonian, UpToTwoBOverTNoAdversaryDrawsEnergy) {
   EXPECT_EQ(broken<6>(1, 100), 0);
 }
 
-// If the hand moves by d into the contact from rest and then performs the worst motion out of it, it gains b d²/T (1 −
-// (K T/2b)²).
+// Moving by d into the contact from rest and then out by the worst motion gains b d²/T (1 − (K T/2b)²).
 TEST(PortHamiltonian, FivePercentAboveTwoBOverTTheFirstLeapCanBeCashedIn) {
   const auto energy = [](double excess) {
     const Friction friction{0, 0.26};

@@ -37,8 +37,7 @@ struct Hosts {
   }
 };
 
-/// This is a bad Wi-Fi network. The delay is usually just above 1 ms, but one in 14 datagrams is in a stall with a long
-/// tail.
+/// Bad Wi-Fi: the delay is just above 1 ms, but one in 14 datagrams is in a stall with a long tail.
 Duration wifi(Dice& dice) {
   const double little = -0.15e-3 * std::log(1 - dice.uniform());
   const double stall = dice.chance(0.07) ? 4e-3 / (1 - dice.uniform()) : 0;

@@ -13,8 +13,7 @@ inline double gaussian(Dice& dice) {
   return size * std::cos(2 * std::numbers::pi * dice.uniform());
 }
 
-/// Returns s, s + 1e-4 r and a constant. These regressors are nearly parallel, which is difficult for a covariance
-/// update.
+/// Returns s, s + 1e-4 r and a constant: nearly parallel regressors, which are hard for a covariance update.
 template <class Scalar>
 Eigen::Matrix<Scalar, 3, 1> nearly_collinear(Dice& dice) {
   const double s = gaussian(dice);

@@ -215,8 +215,7 @@ TEST(OutputBound, TheLargestScaleSpendsTheBudgetAndNotMore) {
   }
 }
 
-// Regression: with a budget of 2e-42 J, a corner was rounded to just above the Coulomb friction, which left the wrench
-// unbounded.
+// Regression: with a budget of 2e-42 J, a corner rounded to just above f_c left the wrench unbounded.
 TEST(OutputBound, AlmostNoBudgetPermitsFrictionAndNoMoreThanEachPartAlone) {
   Dice dice(29091);
   for (int trial = 0; trial < 20000; ++trial) {

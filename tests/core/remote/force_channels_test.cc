@@ -44,8 +44,7 @@ TEST(ForceChannels, TheSumIsThatOfTheFreshForcesAndTheirStiffness) {
   const auto both = two.wanted(at(milliseconds(1), Vec3(0.01, 0, 0)));
   EXPECT_TRUE(both.force.isApprox(Vec3(1 - 100 * 0.01, 2, 0), 1e-12));
   EXPECT_EQ(both.stiffness(0, 0), 100);
-  // Only the first engine continues to send. The sum must not contain the old force of the other engine, and the device
-  // must not stop.
+  // Only the first engine continues to send. The sum must not contain the old force, and the device must not stop.
   RemoteForce later = stiff;
   later.received = LocalTime(milliseconds(400));
   two.observe(0, later);

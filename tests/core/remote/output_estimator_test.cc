@@ -240,8 +240,7 @@ TEST(OutputEstimator, CooldownEndsConstantResettingWhenTheModelCannotFit) {
 }
 
 TEST(OutputEstimator, AnOutputRecursiveModelRunsAwayOnlyWithAFreePole) {
-  // This is the same least-squares estimator, but with a free pole. It is used at 1 kHz, although the answers arrive at
-  // 25 Hz.
+  // The same estimator with a free pole. It is used at 1 kHz, although the answers arrive at 25 Hz.
   UdLeastSquares<2> raw({.forgetting = 0.95, .prior_variance = 1e8});
   std::vector<double> output(kSteps, 0.0);
   double largest_raw = 0;

@@ -22,8 +22,7 @@ struct Swing {
   double late = 0;   ///< m/s, largest speed in the last tenth
 };
 
-/// Starts at the rest position of the spring, which is on the edge between two encoder counts. This is the worst case.
-/// `speed` is in m/s.
+/// Starts at the spring's rest position on the edge between two counts, the worst case. `speed` is in m/s.
 Swing let_swing(const SampledSpring& spring, double speed, Duration span) {
   SimulatedDevice::Config config;
   config.mass = spring.mass;

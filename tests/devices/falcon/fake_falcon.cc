@@ -14,8 +14,7 @@ constexpr std::size_t kPayload = 62;
 /// Encoder counts before homing.
 constexpr std::array<int, 3> kNoOrigin = {711, -402, 95};
 
-/// The descriptors of the device, its configuration, its interface, and two bulk endpoints of 64 bytes. This is an
-/// FT232R with the IDs of the Falcon, without strings.
+/// The descriptors of an FT232R with the IDs of the Falcon: two bulk endpoints of 64 bytes, no strings.
 constexpr std::array<std::uint8_t, 50> kDescriptors = {18,   1,    0,    2, 0,  0,   0,   64,   0x03,
                                                        0x04, 0x48, 0xCB, 0, 4,  0,   0,   0,    1,     //
                                                        9,    2,    32,   0, 1,  1,   0,   0xC0, 0xFA,  //

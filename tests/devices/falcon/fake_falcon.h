@@ -65,8 +65,7 @@ class FakeFalcon final : public UsbModel {
   void plug() override { plugged_ = true, ++times_plugged_; }
   void unplug() override;
   void move_to(const Vec3& position) { position_ = position; }  ///< m, device frame
-  /// Moves the grip to both stops, which is how a user homes the device. This has no effect unless the host has
-  /// requested it.
+  /// Moves the grip to both stops, which homes the device. This has no effect unless the host has requested it.
   void pull_through();
   void press(std::uint8_t buttons) { buttons_ = buttons; }
   void set_fault(Fault fault);

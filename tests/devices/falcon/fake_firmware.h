@@ -7,8 +7,7 @@
 
 namespace tendon {
 
-/// An image that the loader accepts. It contains the expected key and arbitrary bytes. (Novint's firmware is not in
-/// this repository.)
+/// An image that the loader accepts: the key and arbitrary bytes. (Novint's firmware is not in this repository.)
 inline std::vector<std::uint8_t> fake_firmware(std::size_t size) {
   std::vector<std::uint8_t> bytes(size);
   std::uint32_t state = 1;

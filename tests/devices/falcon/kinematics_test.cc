@@ -151,8 +151,7 @@ TEST(FalconKinematics, OneNewtonIs252CountsAlongZAnd606Across) {
   EXPECT_NEAR(largest(Vec3::UnitX()), 606, 6);
 }
 
-// If the force is saturated, its direction must not change. In the public driver, the values wrap around at 16 bits
-// instead.
+// If the force is saturated, its direction must not change. In the public driver, the values wrap at 16 bits.
 TEST(FalconKinematics, ATooLargeForceKeepsItsDirectionAndNeverWraps) {
   Dice dice(7);
   for (int i = 0; i < 20'000; ++i) {

@@ -105,8 +105,7 @@ TEST(FalconPacket, EveryWholeReplyIsFoundAmongAnyOtherBytes) {
       auto packet = packet_of(static_cast<std::int16_t>(dice.bits()));
       if (dice.chance(0.3)) {
         for (std::uint64_t n = dice.bits() % 40; n > 0; --n) {
-          // These bytes often occur in frames. '<' is excluded, because a packet could start there and end with the
-          // next one.
+          // Bytes that are common in frames, but not '<': a packet could start there and end with the next one.
           const auto noise = static_cast<std::uint8_t>(dice.chance(0.3) ? '>' : dice.bits());
           if (noise != '<') stream.push_back(noise);
         }

@@ -201,8 +201,7 @@ TEST(Workspace, HasNoStepsAnywhere) {
       const double share = workspace.share(asked, at);
       ASSERT_GE(share, 0);
       ASSERT_LE(share, 1);
-      // The tolerance is relative to the margin of 10 mm, and to the outward direction, which varies most near the
-      // edge.
+      // The tolerance is relative to the margin of 10 mm and the outward direction, which varies near the edge.
       ASSERT_NEAR(workspace.share(asked, moved), share, 1e-4);
     }
   }

@@ -208,8 +208,7 @@ TEST(SafeDevice, DisarmedInAnyStateItGivesNoForceUntilTheOperatorArms) {
         ASSERT_EQ(rig.step(kPush), Vec3::Zero());
         ASSERT_EQ(rig.puppet.told, Vec3::Zero());
       }
-      // The device must not be armed without a request, even if it is at rest, if the button is pressed, or if it is
-      // plugged in again.
+      // Without a request, the device must not be armed by rest, by the button, or by plugging it in again.
       for (const Device::State stage : {Device::State::kAbsent, Device::State::kHomed}) {
         rig.puppet.stage = stage;
         rig.steps(200);

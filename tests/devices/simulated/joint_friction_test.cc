@@ -114,8 +114,7 @@ TEST(JointFriction, TurnsRoundWithoutAPauseUnderAForceThatItCannotHold) {
         const double friction = torques[joint] / way.norm();
         config.start_velocity = v0 * way.normalized();
         Bench bench(config);
-        // The handle moves along this direction unless the other joints rotate. The friction of those joints holds the
-        // rest.
+        // The handle moves along this direction, unless the other joints rotate. Their friction holds the rest.
         bench.push(-5 * way.normalized(), 2ms);
         const double back = 2e-3 - config.mass * v0 / (5 + friction);
         EXPECT_NEAR(bench.truth().velocity.dot(way.normalized()), -(5 - friction) / config.mass * back,

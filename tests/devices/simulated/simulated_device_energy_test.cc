@@ -120,8 +120,7 @@ TEST(SimulatedDeviceEnergy, HandAndWallsNeverDoLessWorkThanEquation5Demands) {
 
       const double balance = brought + stored_at_start - stored(bench.truth()) - equation.energy;
       least = std::min(least, balance);
-      // The tolerance allows for rounding errors, which grow with the exchanged energy: 1e-12 J, and 1e-13 of the
-      // energy above 10 J.
+      // Rounding errors grow with the exchanged energy: 1e-12 J, and 1e-13 of the energy above 10 J.
       ASSERT_GE(balance, -1e-12 * std::max(1.0, turnover / 10)) << "seed " << seed << ", step " << step;
     }
   }

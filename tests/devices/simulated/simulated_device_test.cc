@@ -195,8 +195,7 @@ TEST(CoulombFriction, TurnsRoundWithoutAPauseUnderAForceThatItCannotHold) {
 }
 
 TEST(CoulombFriction, OpposesTheVelocityAlongACurvedPath) {
-  // The handle is sliding while there is a lateral force. The result is compared to Runge-Kutta for m dv/dt = F − f_c
-  // v/|v| in steps of 1 µs.
+  // A lateral force while sliding, compared to Runge-Kutta for m dv/dt = F − f_c v/|v| in steps of 1 µs.
   const double m = 0.075;
   const double f_c = 0.04;
   const Vec3 force(0, 0.1, 0.05);
@@ -338,8 +337,7 @@ TEST(Amplifier, FollowsAStepAsAFirstOrderLag) {
 TEST(Watchdog, TakesTheForceAwayAfterExactlyItsTime) {
   auto config = bare(0.075);
   config.watchdog = 5ms;
-  // An interval can end at the same time as the watchdog, before it, or long after it. The impulse is always force × 5
-  // ms.
+  // The interval ends before the watchdog, with it, or long after it. The impulse is always force × 5 ms.
   for (const Duration interval : {Duration(5ms), Duration(1700us), Duration(333'333), Duration(1s)}) {
     Bench bench(config);
     bench.device().apply({0.3, -0.6, 0.6});

@@ -122,8 +122,7 @@ TEST(SimulatedRotation, AHandBringsItWhereItWantsFromAnySide) {
 }
 
 TEST(SimulatedRotation, AHandThatTurnsAboutChangingAxesIsFollowed) {
-  // Only the damper moves the handle, at the angular velocity of the script. The rate of the rotation vector would
-  // drift.
+  // Only the damper moves the handle, at the script's angular velocity. The rotation vector's rate would drift.
   auto config = free_handle();
   config.inertia = 1e-7;
   const ScriptedMotion motion(

@@ -152,8 +152,7 @@ TEST(StructuralMode, StoresWhatItHasTakenIn) {
   EXPECT_GT(most, 1e-4);
 }
 
-/// Returns the matrix exponential. The exponent is scaled by 2⁻¹⁰, the series has 14 terms, and the result is squared
-/// ten times.
+/// Returns the matrix exponential: scaled by 2⁻¹⁰, a series of 14 terms, squared ten times.
 Eigen::MatrixXd exponential(const Eigen::MatrixXd& exponent) {
   const Eigen::MatrixXd small = exponent / 1024;
   Eigen::MatrixXd result = Eigen::MatrixXd::Identity(exponent.rows(), exponent.cols());

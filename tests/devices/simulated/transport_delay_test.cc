@@ -42,8 +42,7 @@ TEST(TransportDelay, ASampleIsThatOfTheInstantThatItSays) {
 }
 
 TEST(TransportDelay, AForceActsFromItsDelayUntilTheDelayOfTheNext) {
-  // The force is 2 N for 1 ms, so the impulse is 2 mN·s for every delay. The position shows the time at which the force
-  // was applied.
+  // The impulse is 2 N · 1 ms for every delay. The position shows the time at which the force was applied.
   for (const Duration delay : {Duration(1ns), Duration(999'999ns), Duration(300us), Duration(1ms), Duration(1'700us),
                                Duration(2ms), Duration(12'345'678ns)}) {
     Bench bench(free_mass(std::nullopt, delay));

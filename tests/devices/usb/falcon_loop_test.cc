@@ -89,8 +89,7 @@ TEST(FalconLoop, AWallIsFeltThroughTheRealLibraryWithoutAHeapCallInTheLoop) {
   loop.stop();
   EXPECT_EQ(heap_calls, 0U);
   EXPECT_GT(pushed, 0U);  // a sign error would pull
-  // After a late step, the hand and the levers have moved. If a reply has timed out, it is used as the answer to the
-  // next request.
+  // After a late step, the hand has moved. If a reply has timed out, it answers the next request.
   EXPECT_LE(at_odds, loop.stats().overruns + loop.stats().unseen);
 }
 

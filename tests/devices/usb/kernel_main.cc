@@ -135,8 +135,7 @@ TEST(UsbKernel, FromThePlugToTheForce) {
                                  Vec3::Zero()));
 }
 
-/// Returns the time from a packet to its reply for each of the packets. A single thread uses blocking calls to measure
-/// this.
+/// Returns the time from each packet to its reply, measured by a single thread with blocking calls.
 std::vector<double> bare_round_trips_ms(const std::string& node, int count) {
   const int file = open(node.c_str(), O_RDWR | O_CLOEXEC);
   unsigned interface = 0;

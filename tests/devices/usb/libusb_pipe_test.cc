@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// These tests run in real time, with a model of the kernel and a model of a Falcon. They do not depend on the speed of
-// the machine.
+// These tests use models of the kernel and a Falcon in real time. The speed of the machine does not matter.
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -42,8 +42,7 @@ class MockPort {
 
   /// Uses a new address each time, like the kernel.
   void plug();
-  /// This does the same as the kernel: the transfers end, the node fails, the device is removed from sysfs, and udev
-  /// sends an event.
+  /// As with the kernel, transfers end, the node fails, the device is removed from sysfs, and udev sends an event.
   void unplug();
 
   std::string node() const;       ///< of the plugged device: "/dev/bus/usb/001/002"

@@ -23,8 +23,7 @@ int refuse(int error) {
   return -1;
 }
 
-/// A guardian can only use the inherited node. The data that is written to it is sent to the master end, together with
-/// the endpoint and the size.
+/// A guardian can only use the inherited node. Its data is sent to the master end with the endpoint and the size.
 int bulk_through(int file, const usbdevfs_bulktransfer& transfer) {
   std::array<std::uint8_t, 66> frame{};
   if (transfer.len > frame.size() - 2) return refuse(EINVAL);
@@ -205,8 +204,7 @@ off_t UsbfsNode::seek(off_t to) {
 
 }  // namespace tendon
 
-// The functions of this file are used by libusb instead of those of the C library, because the program exports them or
-// they are preloaded.
+// libusb uses these functions instead of those of the C library, because they are exported or preloaded.
 extern "C" {
 
 int ioctl(int file, unsigned long request, ...) noexcept {

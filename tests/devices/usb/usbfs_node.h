@@ -55,8 +55,7 @@ class UsbfsNode {
   /// Called when libusb has called poll, but no transfer has ended.
   virtual void look() {}
 
-  // Must be called by the derived class while mutex_ is held. It takes ownership of the slave end and closes the
-  // previous one.
+  // The derived class calls this with mutex_ held. It owns the slave end from now on. The previous one is closed.
   void set_file(int slave);
   int file() const { return file_; }
   void finish(usbdevfs_urb* urb, int status, int size);

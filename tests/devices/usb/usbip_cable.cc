@@ -22,8 +22,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-// Big-endian. The 48 bytes are five common fields, five fields of the command, and the setup packet of a control
-// transfer.
+// Big-endian, 48 bytes: five common fields, five fields of the command, and the setup packet of a control transfer.
 constexpr std::uint32_t kSubmit = 1;
 constexpr std::uint32_t kUnlink = 2;
 constexpr std::uint32_t kSubmitted = 3;

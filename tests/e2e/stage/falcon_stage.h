@@ -43,8 +43,7 @@ class FalconStage {
   // outside of the wall and presses no button.
   void go_to(double x, double speed = 0.1);
   void home() { homes_ = true; }
-  /// Arms the device when its lamps are green, with the hand outside of the wall. Returns after the time of the force
-  /// ramp.
+  /// Arms the device with the hand outside of the wall when its lamps are green. Returns after the force ramp.
   void arm();
   void arm_and_press();
 

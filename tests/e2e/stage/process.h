@@ -14,8 +14,7 @@
 
 namespace tendon::e2e {
 
-/// The timeout that is used when a test waits. It is long because machines pause, and because builds may be run in
-/// parallel.
+/// The timeout of every wait. It is long because machines pause, and because builds may be run in parallel.
 inline constexpr std::chrono::seconds kPatience{30};
 
 /// Killed by the destructor. The output is read only during wait_for_line() and wait(), so between them the program

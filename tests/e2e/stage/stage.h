@@ -43,15 +43,13 @@ safe_stop_ms = 1000
 /// Returns the path for a command line.
 std::string write(const std::filesystem::path& file, std::string_view text);
 
-/// Returns the number for `key`. If the value is an array, this is its first number. Throws std::runtime_error if it
-/// does not exist.
+/// Returns the number for `key`, or the first one of an array. Throws std::runtime_error if it does not exist.
 double number_in(std::string_view json, const std::string& key);
 std::uint64_t count_in(std::string_view json, const std::string& key);
 /// The text must not contain any escapes.
 std::string text_in(std::string_view json, const std::string& key);
 
-/// A program that prints its address because it uses port 0. If the test is killed, the program exits after two
-/// minutes.
+/// A program that prints its address because it uses port 0. It exits after two minutes if the test is killed.
 class Service {
  public:
   /// The address is `key` of the JSON event `event`.

@@ -11,8 +11,7 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-// If the link was slow, the timeout can be many seconds. If the link is fast again and the next copy is lost, this
-// would be the time to wait.
+// After a slow link, the timeout can be many seconds. On a fast link, a lost copy would then cost this time.
 TEST(OutgoingRequests, AreSentAgainWithinASecondHoweverSlowTheLink) {
   for (const Duration timeout : {Duration(milliseconds(20)), Duration(seconds(1)), Duration(seconds(12))}) {
     OutgoingRequests requests;

@@ -12,8 +12,7 @@
 #include "tests/support/property_cases.h"
 #include "tests/support/refusal.h"
 
-// Tests the handshake in suite 1. The tests check which clients are admitted, which of them do not get an answer, and
-// what this costs.
+// Tests the handshake in suite 1: which clients are admitted, which of them get no answer, and what this costs.
 
 namespace tendon::sealed_handshake_test {
 namespace {

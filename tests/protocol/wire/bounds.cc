@@ -116,8 +116,7 @@ std::int64_t whole(const std::string& text) {
   return std::stoll(text);
 }
 
-/// The validity of these fields also depends on another field. Even if a value is within its own bound, it may be
-/// refused.
+/// These fields also depend on another field. Even if a value is within its own bound, it may be refused.
 bool is_bound_to_others(const std::string& path) {
   static const std::regex kOthers(R"(.*\.(normal|workspace_min_m|workspace_max_m|operator_from_device|orientation|)"
                                   R"(at_orientation|rotation|turn\.turn)\..*)");

@@ -8,8 +8,7 @@
 
 namespace tendon::bounds {
 
-/// A message in which one field is at a bound of tendon.proto or just beyond it. The other fields are the same as in an
-/// example of examples.h.
+/// One field is at a bound of tendon.proto or just beyond it. The other fields are those of an example (examples.h).
 struct Case {
   std::string message;          ///< of the body: "Datagram", "Hello" or "Answer"
   std::string field;            ///< "DeviceState.position_m.x"

@@ -282,8 +282,7 @@ Key renewed(Suite suite, const Key& key) {
   return suite == Suite::kAesGcm ? crypto::AesGcm(key).renewed() : crypto::renewed(key);
 }
 
-/// Returns the example with the token of suite 2. The client adds it at the end, and the server adds it at the
-/// beginning.
+/// Returns the example with the token of suite 2. A client appends it, and a server puts it first.
 Hello offering(Suite suite) {
   Hello hello = examples::hello();
   if (suite == Suite::kAesGcm) hello.features.emplace_back(kFeatureAesGcm);
@@ -379,8 +378,7 @@ std::string sealed_file(Suite suite) {
     const Key& split = welcome.split.responder_to_initiator;
     drop("in suite 1, with the key that Split() gave", "malformed", sealed(Suite::kNoise, split, good, state));
     drop("the key that Split() gave", "forged", sealed(suite, split, good, state));
-    // As in a little-endian implementation, the bytes of the number in the nonce are reversed. The number in the header
-    // is correct.
+    // The number in the nonce is reversed, as in a little-endian implementation. The number in the header is correct.
     const auto clear = encode_header({.suite = suite, .connection_id = examples::kConnection, .packet_number = 1});
     Bytes turned(clear.begin(), clear.end());
     turned.resize(kHeaderSize + state.size() + crypto::kTagSize);

@@ -22,8 +22,7 @@ const Names kPagesElsewhere = {"docs/spec.md"};
 
 constexpr std::string_view kProofs = "core/PROOFS.md";
 
-/// Returns the text of a page, or the comments of a source. The comment marks are removed, but lines and columns do not
-/// change.
+/// Returns the text of a page, or the comments of a source without their marks, with the same lines and columns.
 std::string prose_of(const File& file) {
   const std::string_view text = file.text;
   if (file.path.ends_with(".md")) {

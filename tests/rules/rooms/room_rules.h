@@ -41,8 +41,7 @@ std::vector<File> read_tree(const std::filesystem::path& root);
 /// Returns `path:line: rule`, which editors and terminals turn into a link.
 std::string to_string(const Finding& finding);
 
-/// Comments and strings are replaced by spaces, so that the lines and columns do not change. The file name in #include
-/// "…" is not replaced.
+/// Replaces comments and strings by spaces, so that lines and columns do not change, except in #include "…".
 std::string without_comments_and_strings(std::string_view text);
 
 }  // namespace tendon::rooms

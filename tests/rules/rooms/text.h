@@ -15,8 +15,7 @@ using Names = std::vector<std::string_view>;
 
 inline const Names kRoomFolders = {"clients", "core", "deploy", "devices", "protocol", "server", "tests"};
 
-/// Returns true if one of the `patterns` is equal to the path, is a folder that contains it ("core/"), or is its end
-/// ("*.h").
+/// Returns true if one of the `patterns` is the path, a folder that contains it ("core/"), or its end ("*.h").
 inline bool one_of(std::string_view path, const Names& patterns) {
   return std::ranges::any_of(patterns, [&](std::string_view pattern) {
     if (pattern.starts_with('*')) {

@@ -130,8 +130,7 @@ TEST_F(SealedServer, TheSameKeyTakesItsPlaceAtOnceAndTheOneBeforeStaysAway) {
 
 TEST_F(SealedServer, AReplayedHelloTakesNothingFromAnybody) {
   Client a = opened(wall_, "192.0.2.1:4000");
-  // The Hello is sent from the original address, so its cookie is valid. The server has dropped the Answer of this
-  // attempt.
+  // The address is the original one, so the cookie is valid. The server has dropped the Answer of this attempt.
   const Bytes hello = newest_hello(wire_);
   a->stop(now_);
   run(milliseconds(10), {&a});

@@ -27,8 +27,7 @@ class Handle : public SealedServer {
                     [&seen](const DeviceState& state, const LinkStats&) { seen.push_back(state.buttons); });
   }
 
-  /// Runs a foreign observer that requests `feature` (none if it is empty), and calls `see` for each state. Returns the
-  /// number of states.
+  /// Runs an observer that requests `feature` (none if empty) and calls `see` for each state. Returns their number.
   template <class See>
   std::size_t for_each_state_seen(std::string_view feature, Duration length, const See& see) {
     std::vector<std::string> features;

@@ -122,8 +122,7 @@ TEST(Lateness, ASilenceWithLossesOrTooShortAStandstillIsOfTheNetwork) {
   EXPECT_EQ(after_silence(milliseconds(150), 0).late_network, 1U) << "explains little of the delay";
 }
 
-/// The forces are in time, and there is a state for each millisecond. After that, our own process is stopped for
-/// `pause`.
+/// The forces are in time, with a state in each millisecond. After that, our own process is stopped for `pause`.
 Engine stopped(Duration pause, bool same_machine) {
   Engine engine(same_machine);
   for (int i = 0; i < 200; ++i) {

@@ -127,8 +127,7 @@ class SealedServer : public Servers {
   void turn() {
     for (std::size_t i = 0; i < shards_; ++i) assembly_->turn_network(i, now_);
   }
-  /// Distributes datagrams like UdpLink::several: data to the shard that owns the connection, and other datagrams to
-  /// the first shard.
+  /// Like UdpLink::several, data goes to the shard that owns the connection, and all other datagrams to the first.
   void deliver(const Address& from, const Bytes& bytes) {
     const auto header = decode_header(bytes);
     const bool of_session = header && header->type == DatagramType::kData;

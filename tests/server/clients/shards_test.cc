@@ -15,8 +15,7 @@ using std::chrono::milliseconds;
 
 constexpr std::uint32_t kDevices = 40;
 
-/// An encrypted server that has two shards and 40 devices, "d-0" to "d-39". There is one bank in the first shard, and
-/// there are two in the second one.
+/// Encrypted, with two shards and 40 devices, "d-0" to "d-39": one bank in the first shard, and two in the second.
 class Shards : public SealedServer {
  protected:
   Shards() { restart_with_many(kDevices, 2); }

@@ -71,8 +71,7 @@ TEST(RecordedMotion, RefusesAScaleThatWouldMakeThePositionVanish) {
 }
 
 TEST(RecordedMotion, AHumanHandOnAFoamDrivesTheDevice) {
-  // The recording cannot be distributed. It is a recording of an operator that is 4.4 s long and was sampled at 2 kHz,
-  // with a lever arm of 0.075 m.
+  // This recording of an operator (4.4 s at 2 kHz, lever arm 0.075 m) cannot be distributed.
   const char* data = std::getenv("TENDON_DATA");  // NOLINT(concurrency-mt-unsafe): one thread
   if (data == nullptr) GTEST_SKIP() << "TENDON_DATA is not set: the recorded human motion is not there";
 

@@ -65,8 +65,7 @@ const std::vector<Section>& sections();
 /// This must be called in a child right after fork(). The child is then killed by the kernel when its parent dies.
 void end_with_parent();
 
-/// Sets the real-time priority of the calling thread and removes its timer slack. If the priority is 0, it does
-/// nothing.
+/// Sets the real-time priority of the calling thread and removes its timer slack. Does nothing if it is 0.
 class AtPriority {
  public:
   /// Throws std::system_error if the kernel refuses.

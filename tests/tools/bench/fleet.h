@@ -12,15 +12,13 @@ namespace tendon::bench {
 /// Measures the real `tendond` with many simulated devices. The clients are in another process, and UDP on the loopback
 /// is used. The devices only use one substep per step, so that their cost does not affect the measurement.
 ///
-/// The clients are a single thread. They answer each state with a force. The load on the cores is about the same as
-/// that of the server.
+/// The clients are a single thread, which answers each state. It loads the cores about as much as the server does.
 struct Fleet {
   std::size_t devices = 16;
   std::size_t channels = 1;  ///< per device
   /// If this is true, one session controls all devices of a bank. Otherwise, each channel has its own session.
   bool one_session_for_16 = false;
-  /// If this is 0, there is one session for each device or channel. Sessions beyond the number of channels observe one
-  /// device each.
+  /// If this is 0, there is one session for each device or channel. Additional sessions observe one device each.
   std::size_t sessions = 0;
   std::uint32_t state_hz = 1000;
   std::uint32_t force_hz = 1000;
@@ -28,8 +26,7 @@ struct Fleet {
   Duration settle = std::chrono::milliseconds(300);  ///< time to wait after the last session has been opened
   Duration length = std::chrono::seconds(2);         ///< of the measurement, extended until a state arrives
   std::uint64_t seed = 1;
-  /// The SCHED_FIFO priority of the clients and of the threads of the server, except for the haptic ones. If this is 0,
-  /// the default scheduling is used.
+  /// SCHED_FIFO priority of the clients and of all non-haptic threads of the server. 0: the default scheduling.
   int priority = 0;
 };
 

@@ -45,8 +45,7 @@ class GuestSocket {
 
   int fd() const { return fd_; }
   void send(std::span<const std::byte> datagram) { ::send(fd_, datagram.data(), datagram.size(), 0); }
-  /// Receives a datagram and returns its size. The result is 0 if there is no datagram. `at` is the receive time (Unix
-  /// time).
+  /// Receives a datagram and returns its size, or 0 if there is none. `at` is the receive time (Unix time).
   std::size_t receive(std::span<std::byte> buffer, Duration& at) {
     iovec piece{buffer.data(), buffer.size()};
     alignas(cmsghdr) std::array<char, CMSG_SPACE(sizeof(timespec))> control;

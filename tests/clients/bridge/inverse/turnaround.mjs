@@ -70,8 +70,7 @@ if (process.argv[2] === "echo") {
   console.log(`request to reply     ${us(ours.slice(100))}`);
   console.log(`  a plain echo       ${us(floor.slice(100))}`);
 
-  // The time from a force request to the first state in which the force is reported as applied. The limiter does not
-  // change forces this small.
+  // The time until a requested force is reported as applied. The limiter does not change forces this small.
   const felt = [];
   for (let i = 0; i < 500; ++i) {
     const wanted = 0.1 + 0.01 * (i % 10) + (i % 2) * 0.05;
@@ -95,8 +94,7 @@ if (process.argv[2] === "echo") {
     console.log(`${name.padEnd(20)} ${(turns / (performance.now() - begin) * 1000).toFixed(0)} a second`);
   }
 
-  // Measures the CPU time of the bridge with one silent client, with one client at 1 kHz, and with eight clients at 500
-  // Hz.
+  // The CPU time of the bridge with one silent client, one client at 1 kHz, and eight clients at 500 Hz.
   const paced = async (one, hz, into) => {
     const begin = performance.now();
     for (let i = 1; performance.now() - begin < 1000 * seconds; ++i) {

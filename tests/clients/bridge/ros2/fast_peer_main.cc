@@ -105,8 +105,7 @@ class Reader {
   virtual void write(ordered_json& line, bool last) = 0;
 };
 
-/// The events on `wrench` that the peer waits for: the toggled force along y, and a force of zero after the last
-/// command.
+/// The peer waits for these events on `wrench`: the force along y is toggled, and the force is zero.
 struct Awaited {
   std::mutex mutex;
   double value = 0;

@@ -107,8 +107,7 @@ TEST(UnicastDiscovery, AnAnswerToAnotherQuestionIsNone) {
 }
 
 TEST(UnicastDiscovery, NamesThatPointAtEachOtherLeadNowhere) {
-  // The target of this record points to itself. There are a header, a question, 12 bytes of record header, and 6 bytes
-  // of data.
+  // Points to itself, after a header, a question, 12 bytes of record header, and 6 bytes of data.
   const std::string problem = problem_with([](const Question& question, bool) {
     const auto here = static_cast<unsigned>(12 + question.bytes.size() + 12 + 6);
     return answer(question, {srv(0, 0, 47100, two(0xC000U | here))});

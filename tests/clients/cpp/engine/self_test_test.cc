@@ -188,8 +188,7 @@ TEST(SelfTest, DoesNotJudgeAStiffnessWhereASurfaceIsWithinAStep) {
   EXPECT_TRUE(result.passed()) << result.text();
 }
 
-/// The rest position creeps towards the hand over time. This is passive, but the force is not a function of the
-/// position.
+/// The rest position creeps towards the hand. This is passive, but the force is not a function of the position.
 struct Creeping {
   Vec3 rest = Vec3::Zero();
   Vec3 saved = Vec3::Zero();

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// fake_worker [WAY [AFTER]] SCENE: a worker that pulls the hand to the origin. WAY selects how it fails after AFTER
-// answers.
+// fake_worker [WAY [AFTER]] SCENE: pulls the hand to the origin. WAY selects how it fails after AFTER answers.
 #include <unistd.h>
 
 #include <csignal>
