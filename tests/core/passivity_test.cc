@@ -25,7 +25,7 @@ namespace {
 
 struct Outcome {
   double least_energy = 0;
-  double worst_shortfall = 0;  // J, how much the energy is below the minimum for this hold
+  double worst_shortfall = 0;  // J, difference to the minimum for this hold
   double worst_excess = 0;     // N above the bound
   bool all_finite = true;
 };

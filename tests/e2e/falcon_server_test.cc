@@ -125,7 +125,7 @@ TEST(FalconServer, StoppedInMidForceItLetsGoAndPushesAgainOnlyAfterArming) {
       EXPECT_EQ(stage.falcon().seen().pushes_begun, pushes_begun) << "before it was armed\n"
                                                                   << stage.server().process().err();
       stage.arm();
-      // It may need more than one press, because the ledger assumes that the force was held during the pause.
+      // This can require several presses, because the ledger assumes that the force was held during the pause.
       const auto pushed = [&stage] {
         stage.go_to(-0.015);
         stage.go_to(0.004);

@@ -9,7 +9,7 @@
 #include "server/recording/recording_reader.h"
 #include "tests/fuzz/target.h"
 
-// Every sequence of bytes must yield records and then the end, or an error. Encoding and decoding keeps a record.
+// Every sequence of bytes must yield records and then the end, or an error. Encoding must not change a record.
 
 using namespace tendon;
 

@@ -300,10 +300,10 @@ Observed clock_goes_back(std::uint64_t seed, bool decay) {
   return bench.seen();
 }
 
-// Oracle: passive, bounded, quiet. If the clock of an engine is set back, the engine waits for that time, and its force
-// fades. After that, it returns immediately, or when it has detected that the session has ended. The server has only
-// one clock, CLOCK_MONOTONIC (server/machine/clock.cc; tests/rules/rooms forbids reading others), which cannot be set.
-// If the time stamps of a device go back, this must not change any force.
+// Oracle: passive, bounded, quiet. If the clock of an engine is set back, the engine waits until it has the same time
+// again, while its force fades. It then returns immediately, or when it has detected the end of the session. The server
+// has only one clock, CLOCK_MONOTONIC (server/machine/clock.cc; tests/rules/rooms forbids reading others), which cannot
+// be set. If the time stamps of a device go back, this must not change any force.
 TEST(HardLoop, AClockThatIsSetBackKicksNobody) {
   constexpr Duration kWithin = seconds(5);
   const Observed seen = kept(kWithin, [](std::uint64_t seed) { return clock_goes_back(seed, true); });

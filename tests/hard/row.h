@@ -10,7 +10,7 @@ struct Row {
   std::string hard;    ///< the reason why this case is difficult
   std::string oracle;  ///< the property that is checked; this must be the same text in every run
   std::string result;
-  std::optional<double> margin = {};  ///< bound / measured value; above 1 if the bound holds
+  std::optional<double> margin = {};  ///< bound / measured value, which should be above 1
   std::string without;                ///< the result if the protection is disabled
 };
 

@@ -243,7 +243,7 @@ inline DeviceState state_with_buttons() {
   return state;
 }
 
-/// All parts are set. The handle is rotated by 106° about y and is moving. The fingers close on a soft object.
+/// All parts are set. The handle is moving, and it is rotated by 106° about y. The fingers close on a soft object.
 inline DeviceState state_with_handle() {
   DeviceState state = examples::state();
   state.buttons = 1;

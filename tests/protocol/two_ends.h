@@ -71,7 +71,7 @@ inline Bytes raw(std::uint64_t packet_number, const RawProtobuf& body) {
   return bytes;
 }
 
-/// A and Z use the same clock. The test moves the datagrams from one to the other.
+/// A and Z use the same clock. The datagrams must be passed on by the test.
 class TwoEnds : public ::testing::Test {
  protected:
   LocalTime now_ = kOpened;

@@ -34,7 +34,7 @@ TEST_F(TurnProof, AStateAndItsForceTakeTwoDatagramsAndFewInstructions) {
             << static_cast<double>(sent) / kTurns << " datagrams\n";
   EXPECT_EQ(forces, kTurns) << "not every state was answered in its turn";
   EXPECT_EQ(sent, 2 * kTurns);
-  // Each end polls twice, the first time without a result. The server polls again after it has sent a state.
+  // There are two polls at each end, the first one without a result, and another one after the server has sent a state.
   EXPECT_EQ(looks, 5 * kTurns);
   // The clock is read after each of the first four polls, after the doorbell, and after the engine's answer.
   EXPECT_EQ(readings, 6 * kTurns);

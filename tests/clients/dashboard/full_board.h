@@ -6,7 +6,7 @@
 
 namespace tendon::dash {
 
-/// The scales are 1. The leader has given 30 mJ to the follower, which has received 25 mJ.
+/// The scales are 1. The follower has received 25 of the 30 mJ that the leader has given.
 inline Board::Ports both_ends() {
   Board::Ports ports;
   PortFrame& leader = ports.own;

@@ -65,7 +65,7 @@ it("draws what a state holds and nothing else", async (test) => {
   assert.equal(full.opening, 0.25);
   assert.deepEqual(full.buttons, [{ name: "front", held: true }, { name: "rear", held: false }, { name: "button 2", held: true }]);
   assert.equal(wordsOf(full), "a stylus, a force, a torque, two fingers, a surface, front held, button 2 held");
-  // These steps have no state of the handle, and there are so many that the columns must grow.
+  // There is no state of the handle in these steps, and there are so many steps that the columns must grow.
   for (let i = 2; i < 5000; ++i) track.push({ ...kSample, t: i / 1000 });
   assert.equal(poseAt(track, 0).orientation, undefined);
   assert.deepEqual(poseAt(track, 1).orientation, [1, 0, 0, 0]);

@@ -21,7 +21,7 @@ export function scratch(test) {
   return folder;
 }
 
-/** A running program and the lines that it has written to stdout and stderr. It is killed when the test has ended. */
+/** A running program and the lines of its stdout and stderr. The test kills it at the end. */
 export class Program {
   lines = [];
   constructor(test, name, args, folder) {

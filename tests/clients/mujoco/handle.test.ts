@@ -106,7 +106,7 @@ describe("a held tool", () => {
       const { torque, angularStiffness: k } = settle(fixed, kOrigin, about(axis, degrees));
       const angle = (degrees * Math.PI) / 180;
       near(list(torque!), axis.map((value) => -0.5 * Math.sin(angle) * value), 0.003, `${degrees}°`);
-      // This is −∂τ/∂θ about the same axis. It is negative above 90°, and must then not be sent.
+      // This is −∂τ/∂θ about the same axis. If it is negative, which is the case above 90°, it must not be sent.
       const along = toScene(k!, axis).reduce((sum, value, i) => sum + value * axis[i]!, 0);
       near([along], [Math.max(0.5 * Math.cos(angle), 0)], 0.01, `stiffness at ${degrees}°`);
     }
@@ -251,7 +251,7 @@ describe("a scene whose z points up", () => {
   });
 });
 
-/** The scene is that of the example. The tool is moved in the directions of the axes of the scene. */
+/** The scene of the example. The tool is moved in the directions of the axes of the scene. */
 const kExample = readFileSync(join(kRoot, "clients/mujoco/examples/peg_in_hole.ts"), "utf8");
 const kPeg = /`([\s\S]*)`/.exec(kExample)![1]!.replace('name="peg"', 'name="tool"');
 const kProbes = [[1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 0], [1, -1, 0], [1, 0, 1], [1, 0, -1], [0, 1, 1], [0, 1, -1], [1, 1, 1]];

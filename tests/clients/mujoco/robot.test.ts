@@ -106,8 +106,8 @@ it("an arm in MuJoCo follows a far hand, is felt, and waits for the act", async 
     assert.ok(apart(a.tool, b.tool) <= Math.min(allowed, 5e-3), `engaging moved the robot by ${apart(a.tool, b.tool)} m`);
   }
 
-  // The scale is one half. The hand is at rest for one second, and is 20 mm below the position where it was engaged.
-  // (The y axis of the device is the z axis of the robot.)
+  // The scale is one half. The hand does not move for one second, 20 mm below the position where it was engaged. (The y
+  // axis of the device is the z axis of the robot.)
   const start = following![0]!;
   const resting = following!.filter(({ hand, tool }) => Math.abs(hand.y + 0.02) < 0.002 && tool.z > 0.172);
   const settled = resting.slice(Math.floor(resting.length / 4), Math.floor(resting.length / 2)).at(-1)!;

@@ -133,7 +133,7 @@ def example(folder: Path, name: str, *arguments: str | Path) -> Process:
 
 
 def said_by_example(name: str, *arguments: str) -> tuple[int, str, str]:
-    """Runs an example that ends immediately. Returns the exit code and the contents of stdout and stderr.
+    """Runs an example and returns its exit code and the contents of stdout and stderr.
 
     It runs in this process, because a new process needs a third of a second to import the package.
     """

@@ -36,7 +36,7 @@ def test_two_hands_hold_one_liver_and_are_answered_together(tmp_path, servers):
         with Process(tmp_path, command) as engine:
             for _ in range(2):
                 engine.wait_for_line("connected to")
-            # Waits until the engine has squeezed the liver, and until it has answered both hands for one second.
+            # Waits until the liver has been squeezed, and until both hands have received answers for one second.
             with Process(tmp_path, [*ECHO, "--server", addresses[1], "--device", "right", "--duration-s", "30"]) as look:
                 first, last, squeezed = None, 0, False
                 while not squeezed or last - first < 1000:

@@ -278,7 +278,7 @@ TEST(AolPlus, AfterAnIntervalThatIsNoNumberThePlainBoundHolds) {
   EXPECT_EQ(law.limit(push).permitted, plain.limit(push).permitted);
 }
 
-/// Moves the handle in free space for 30 s. The frequency is 4 Hz, and the amplitude is 30 mm.
+/// Moves the handle in free space for 30 s at 4 Hz, with an amplitude of 30 mm.
 template <class Law>
 void wave(Law& law) {
   double x = 0;

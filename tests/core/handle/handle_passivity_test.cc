@@ -169,7 +169,7 @@ TEST_P(HandlePassivity, NoHandAndNoEngineMakesItsAccountsNegative) {
 INSTANTIATE_TEST_SUITE_P(Laws, HandlePassivity, ::testing::Values(Law::kAol, Law::kAolPlus),
                          [](const auto& test) { return test.param == Law::kAol ? "Aol" : "AolPlus"; });
 
-/// Fills the account and moves along `scale` times the permitted wrench. Returns the minimum energy, J.
+/// Returns the minimum energy (J) of a motion along `scale` times the permitted wrench, with a full account.
 double after_a_wrench(double scale, double share_of_torque) {
   const std::array friction{Friction{0.02, 0.26}, Friction{1e-4, 1e-3}};
   WrenchPort port({.law = Law::kAol, .friction = friction, .longest_hold = kLongest});

@@ -17,7 +17,7 @@ TEST(EnergyLedger, StartsAtZero) { EXPECT_EQ(EnergyLedger(kFriction).energy(), 0
 
 TEST(EnergyLedger, BooksEquationFiveTermByTerm) {
   EnergyLedger ledger(kFriction);
-  // The force is 2 N along −x, and the hand moves by 3 mm along +x. This is 6 mJ of work plus friction.
+  // If the force is 2 N along −x and the hand moves by 3 mm along +x, this is 6 mJ of work plus friction.
   const double energy = ledger.observe(Vec3(-2, 0, 0), Vec3(0.003, 0, 0), milliseconds(1));
   EXPECT_NEAR(energy, 2 * 0.003 + 0.05 * 0.003 + 0.26 * 0.003 * 0.003 / 0.001, 1e-15);
 }

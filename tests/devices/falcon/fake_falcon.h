@@ -24,7 +24,7 @@ class FakeFalcon final : public UsbModel {
     bool has_firmware = true;
     bool is_homed = false;
     std::size_t firmware_bytes = 8192;   ///< the image starts after this many bytes
-    bool answers_greeting_late = false;  ///< after a byte 00, as on some machines
+    bool answers_greeting_late = false;  ///< some machines receive a byte 00 first
     bool knows_flush_character = true;
     /// Firmware and home position outlive the cable, which then only powers the chip.
     bool own_supply = false;

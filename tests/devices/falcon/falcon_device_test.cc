@@ -187,7 +187,7 @@ TEST(FalconDevice, WhatIsReturnedIsWhatTheMotorsGive) {
     const Vec3 wanted = dice.within(0, 40) * dice.direction();
     bench.run(5ms, wanted);
     ASSERT_TRUE(bench.sample);
-    // The position is only known to one count, so the force may be wrong by a few thousandths.
+    // The force can be wrong by a few thousandths, because the position is only known to one count.
     ASSERT_LT((bench.written - bench.falcon.force()).norm(), 0.01 * bench.written.norm() + 1e-3);
     ASSERT_LE(bench.written.norm(), wanted.norm() + 0.005);  // each torque is rounded separately
     ASSERT_GT(bench.written.normalized().dot(wanted.normalized()), 0.99);

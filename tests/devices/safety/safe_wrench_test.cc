@@ -98,7 +98,7 @@ TEST(SafeWrench, AHandleThatSpinsIsLetGo) {
     rig.puppet.orientation = Quat{};
     rig.arm();
     Effort given;
-    for (int i = 0; i < 1000; ++i) {  // the quaternion may have either sign beyond 180°
+    for (int i = 0; i < 1000; ++i) {  // the quaternion can have either sign if the angle is more than 180°
       const Quat q = rotation_by(Vec3(1, 2, 2) / 3 * (speed * 1e-3 * i));
       rig.puppet.orientation = i % 2 == 0 ? q : Quat{-q.w, -q.x, -q.y, -q.z};
       given = rig.step_all(kAll);

@@ -337,7 +337,7 @@ TEST(Amplifier, FollowsAStepAsAFirstOrderLag) {
 TEST(Watchdog, TakesTheForceAwayAfterExactlyItsTime) {
   auto config = bare(0.075);
   config.watchdog = 5ms;
-  // The interval ends before the watchdog, with it, or long after it. The impulse is always force × 5 ms.
+  // The intervals are shorter than the watchdog, equal to it, or much longer. The impulse is always force × 5 ms.
   for (const Duration interval : {Duration(5ms), Duration(1700us), Duration(333'333), Duration(1s)}) {
     Bench bench(config);
     bench.device().apply({0.3, -0.6, 0.6});

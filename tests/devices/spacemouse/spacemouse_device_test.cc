@@ -94,7 +94,7 @@ TEST(SpaceMouseDevice, RightIsXLiftedIsYTowardsTheUserIsZ) {
 }
 
 TEST(SpaceMouseDevice, ATwistTurnsItAboutTheAxisThatTheOperatorSees) {
-  const Vec3 axes[] = {{1, 0, 0}, {0, 0, 1}, {0, -1, 0}};  // about the axes right, towards the user, down
+  const Vec3 axes[] = {{1, 0, 0}, {0, 0, 1}, {0, -1, 0}};  // axes: right, to the user, down
   for (const bool split : {false, true}) {
     for (std::size_t i = 0; i < 3; ++i) {
       Bench bench({.dead_band = 0.1, .turn_speed = 0.5});

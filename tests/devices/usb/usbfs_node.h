@@ -55,7 +55,7 @@ class UsbfsNode {
   /// Called when libusb has called poll, but no transfer has ended.
   virtual void look() {}
 
-  // The derived class calls this with mutex_ held. It owns the slave end from now on. The previous one is closed.
+  // Must be called with mutex_ held. This takes ownership of the slave end and closes the previous one.
   void set_file(int slave);
   int file() const { return file_; }
   void finish(usbdevfs_urb* urb, int status, int size);

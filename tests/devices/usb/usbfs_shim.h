@@ -27,7 +27,7 @@ class UsbfsShim final : public UsbfsNode {
     kNone,
     kOverflow,  ///< IN: more data than requested
     kStall,     ///< IN: the endpoint is halted
-    kMute,      ///< IN: there is no data, and no chip status
+    kMute,      ///< IN: contains neither data nor the chip status
     kHang,      ///< OUT: never completes
   };
   void set_trouble(Trouble trouble);

@@ -41,7 +41,7 @@ TEST(WoodenHapticsDevice, FromThePlugToTheForceItTakesEveryStep) {
     ASSERT_TRUE(bench.sample);
     EXPECT_LT(bench.sample->position.norm(), 2 * bench.device.info().position_resolution);
     EXPECT_TRUE(bench.arm.pushes());
-    // This excludes errors of sign and scale. One wrong count changes the force by a few thousandths.
+    // This excludes errors of sign and scale. If there is one wrong count, the force is wrong by a few thousandths.
     EXPECT_LT((bench.arm.force() - bench.written).norm(), 0.01 * bench.written.norm());
     EXPECT_GT(bench.written.normalized().dot(kForce.normalized()), 0.999);
   }

@@ -16,8 +16,8 @@ namespace tendon::e2e {
 
 using Datagram = std::vector<std::byte>;
 
-/// A man in the middle that is between one client and the server. It stores the datagrams of the client, and can be
-/// used to forge datagrams of the client. Thread-safe: yes. It has its own thread.
+/// A man in the middle. It stores the datagrams that a client sends to the server, and can be used to forge others.
+/// Thread-safe: yes. It has its own thread.
 class Relay {
  public:
   explicit Relay(const Address& server);

@@ -18,8 +18,8 @@ std::filesystem::path program(const std::string& name);
 
 std::filesystem::path demo_scene();
 
-/// In this scene, the hand is moved into the wall and is then held there. The forces are held and faded over a longer
-/// time than the pauses of a machine, so that every stage of the age policy is tested.
+/// In this scene, the hand is moved into the wall and is then held there. Forces are held and faded for longer than the
+/// pauses of a machine, so that every stage of the age policy is tested.
 inline constexpr std::string_view kPressingHand = R"([device]
 kind = "simulated"
 profile = "falcon"

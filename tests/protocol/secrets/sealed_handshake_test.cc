@@ -12,7 +12,7 @@
 #include "tests/support/property_cases.h"
 #include "tests/support/refusal.h"
 
-// Tests the handshake in suite 1: which clients are admitted, which of them get no answer, and what this costs.
+// Tests the handshake in suite 1, in particular which clients are admitted or get no answer, and the cost of this.
 
 namespace tendon::sealed_handshake_test {
 namespace {
@@ -239,7 +239,7 @@ TEST_F(SealedHandshake, NoReplyIsEverLongerThanWhatItAnswers) {
   }
 }
 
-const Suites kOld = {Suite::kNoise};  ///< a peer that does not support suite 2, or has no hardware for AES
+const Suites kOld = {Suite::kNoise};  ///< if the peer does not support suite 2 or the hardware has no AES
 const Suites kNew = all_suites();
 const Suites kAesOnly = {Suite::kAesGcm};
 

@@ -8,7 +8,7 @@
 
 namespace tendon::bounds {
 
-/// One field is at a bound of tendon.proto or just beyond it. The other fields are those of an example (examples.h).
+/// One field is at a bound of tendon.proto or just beyond it. All other fields are the same as in examples.h.
 struct Case {
   std::string message;          ///< of the body: "Datagram", "Hello" or "Answer"
   std::string field;            ///< "DeviceState.position_m.x"

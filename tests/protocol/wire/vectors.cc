@@ -282,7 +282,7 @@ Key renewed(Suite suite, const Key& key) {
   return suite == Suite::kAesGcm ? crypto::AesGcm(key).renewed() : crypto::renewed(key);
 }
 
-/// Returns the example with the token of suite 2. A client appends it, and a server puts it first.
+/// Returns the example with the token of suite 2, which is the last one of a client and the first one of a server.
 Hello offering(Suite suite) {
   Hello hello = examples::hello();
   if (suite == Suite::kAesGcm) hello.features.emplace_back(kFeatureAesGcm);

@@ -16,7 +16,7 @@ import sys
 PROJECT = re.compile(r"^project\(tendon VERSION (\d+\.\d+\.\d+)", re.M)
 RELEASE = re.compile(r"^## \[(\d\S*)\] - \d{4}-\d\d-\d\d$", re.M)
 PAGES = r"(?!CHANGELOG).*\.(?:md|cmake\.in)"
-# Each place in a text has a name, files, and a pattern. It must be found at least once.
+# The name, files and pattern of the places in a text, which must be found at least once.
 PLACES = (
     ("wheel", r"clients/python/pyproject\.toml", re.compile(r'^version = "(.*)"', re.M)),
     ("citation", r"CITATION\.cff", re.compile(r"^version: (.*)", re.M)),

@@ -104,11 +104,11 @@ TEST(Explain, SaysHowACouplingIsFeltByEachMethod) {
 }
 
 TEST(Explain, ACostIsTheDifferenceToTheSceneWithoutThePart) {
-  // In each round of 200 steps, the clock is advanced by one tick. The exception is the first trial in which a part is
-  // left out, which is the viscous friction. This part therefore seems to cost as much as a whole step.
+  // The clock is advanced by one tick in each round of 200 steps, but not in the first trial without a part (viscous
+  // friction). This part therefore seems to cost as much as a whole step.
   const Scene scene = shipped("demo_parts.toml");
   std::size_t looks = 0;
-  const std::size_t trials = 3 + 11;  // two for the whole scene, one without its device, and 11 without a part
+  const std::size_t trials = 3 + 11;  // two trials with all parts, one without the device, and 11 without a part
   Duration now{};
   const auto time = [&] {
     const std::size_t trial = looks++ / 2 % trials;

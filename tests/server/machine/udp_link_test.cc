@@ -149,7 +149,7 @@ TEST(UdpLink, OnAllAddressesOfIpv6ItHearsBothFamilies) {
   EXPECT_EQ(to_string(answered_from(four, parse_address("127.0.0.2" + port), link, link)), "127.0.0.2" + port);
 }
 
-// The first link receives each Hello, but the answer may be sent by another one.
+// The answer can be sent by another link than the first one, which receives each Hello.
 TEST(UdpLink, SeveralOnAllAddressesKnowWhereAPeerHasAskedOneOfThem) {
   for (const char* all : {"0.0.0.0:0", "[::]:0"}) {
     const auto links = UdpLink::several(parse_address(all), Reach::kAnywhere, 2);

@@ -73,7 +73,7 @@ TEST(McapWriter, WritesTheBytesOfTheSpecification) {
       "5200000000000000 7100000000000000"             // chunk at 82, 113 bytes
       "0a000000 0100 c300000000000000"                // index of channel 1 at 195
       "2f00000000000000"                              // 47 bytes of indexes
-      "00000000 4000000000000000 4000000000000000");  // not compressed: both sizes are 64 bytes
+      "00000000 4000000000000000 4000000000000000");  // both sizes are 64 bytes, since it is not compressed
   const std::string summary_offsets = bytes(
       "0e 1100000000000000  03 ff00000000000000 1a00000000000000"
       "0e 1100000000000000  04 1901000000000000 1c00000000000000"

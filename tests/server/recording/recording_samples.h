@@ -33,7 +33,7 @@ inline Recorder::Config sample_config() {
   return config;
 }
 
-/// Returns step `tick` of a hand that oscillates at 1 Hz, at 1 kHz. No field has its default value.
+/// Returns step `tick` of a hand that oscillates at 1 Hz. There is one step per ms, and no field has its default value.
 inline StepRecord sample_step(std::uint64_t tick) {
   const auto t = static_cast<double>(tick) * 1e-3;
   const LocalTime due = ms(static_cast<std::int64_t>(tick));

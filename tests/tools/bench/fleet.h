@@ -12,7 +12,7 @@ namespace tendon::bench {
 /// Measures the real `tendond` with many simulated devices. The clients are in another process, and UDP on the loopback
 /// is used. The devices only use one substep per step, so that their cost does not affect the measurement.
 ///
-/// The clients are a single thread, which answers each state. It loads the cores about as much as the server does.
+/// The clients are a single thread, which answers each state. Its load is about the same as that of the server.
 struct Fleet {
   std::size_t devices = 16;
   std::size_t channels = 1;  ///< per device

@@ -94,7 +94,7 @@ TEST(Chai3dHost, ATorqueGoesToADeviceThatHasMotorsForIt) {
   for (const double most : {0.0, 0.2}) {
     Theatre theatre("peg.toml", {}, {1, 0, 0, 0}, most);
     theatre.asks = true;
-    theatre.asked.torque = {0, 0, 0.01};  // about the z axis of CHAI3D, which points up
+    theatre.asked.torque = {0, 0, 0.01};  // about CHAI3D's vertical z axis
     theatre.run(600);
     ASSERT_TRUE(theatre.bridged.state());
     ASSERT_TRUE(theatre.bridged.state()->torque_applied);

@@ -325,7 +325,7 @@ TEST(Ros2, ASecondPublisherIsDroppedAndTold) {
   }
 }
 
-/// Returns the time until a reader at 10 Hz sees no force. The force must not be zero at the start.
+/// Returns the time until the force is zero for a reader at 10 Hz. The force must not be zero at the start.
 double seconds_to_no_force(Peer& reader) {
   const auto start = read_clock();
   reader.until_pushed(0);

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests tendon-bridge vrpn over real sockets. The client was written from VRPN.md alone."""
+"""Tests tendon-bridge vrpn with real sockets and vrpn_client.py, which only uses VRPN.md."""
 
 from __future__ import annotations
 

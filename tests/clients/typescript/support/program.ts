@@ -8,7 +8,7 @@ import { kRoot } from "./paths.js";
 
 const kPatienceMs = 30_000;
 
-/** A running program and the lines that it has written to stdout and stderr. It is killed when the test has ended. */
+/** A running program and the lines of its stdout and stderr. The test kills it at the end. */
 export class Program {
   readonly lines: string[] = [];
   readonly #process: ChildProcess;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A client (A) and a server (Z) in virtual time, and a network between them. A is the ForceClient that is tested. Z
-// consists of parts of the protocol. The network loses, delays, reorders and duplicates datagrams according to a seed.
+// A client (A) and a server (Z) in virtual time, and a network between them. A is the ForceClient that is tested, and Z
+// is built from parts of the protocol. The network loses, delays, reorders and duplicates datagrams according to a
+// seed.
 import { decodeHelloMessage, encodeAnswerMessage, type ControlAck } from "../../../../clients/typescript/src/codec.js";
 import {
   CipherSuite, concat, decodeHello, encodeAnswer, encodeRetry, equal, helloHeader, type HelloDatagram,
