@@ -385,7 +385,7 @@ LocalTime now() { return LocalTime(std::chrono::duration_cast<Duration>(Clock::n
 
 struct Killed {
   double pushed_for_ms = 0;
-  bool pushes = true;                   ///< after the end of the last process that could stop it
+  bool pushes = true;                   ///< when all processes that could stop it have ended
   std::vector<std::uint8_t> last_word;  ///< endpoint and packet that the device received last
   std::uint8_t lamps = 0;
 };

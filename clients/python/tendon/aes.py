@@ -34,7 +34,7 @@ class AesGcm:
             return None
 
     def renewed(self) -> AesGcm:
-        """REKEY(key) of Noise. Returns the next key. It is not possible to derive this key from the next one."""
+        """REKEY(key) of Noise. Returns the next key, from which the current one cannot be derived."""
         return AesGcm(self.seal(2**64 - 1, b"", bytes(32))[:32])
 
 

@@ -43,7 +43,7 @@ def unseal(key: bytes, number: int, associated: bytes, sealed: bytes) -> bytes |
 
 
 def renewed(key: bytes) -> bytes:
-    """REKEY(key) of Noise. Returns the next key. It is not possible to derive this key from the next one."""
+    """REKEY(key) of Noise. Returns the next key, from which the current one cannot be derived."""
     return seal(key, 2**64 - 1, b"", bytes(KEY_SIZE))[:KEY_SIZE]
 
 

@@ -36,7 +36,7 @@ export function decrypt(key: Uint8Array, number: bigint, header: Uint8Array, sea
   }
 }
 
-/** Returns the next key. It is not possible to derive `key` from it. */
+/** Returns the next key, from which `key` cannot be derived. */
 export const rekey = (key: Uint8Array): Uint8Array =>
   encrypt(key, kMaxNonce, kNothing, new Uint8Array(kKeySize)).slice(0, kKeySize);
 

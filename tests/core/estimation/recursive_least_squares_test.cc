@@ -202,7 +202,7 @@ TEST(RecursiveLeastSquares, TheCapOnForgettingEndsCovarianceWindUp) {
   std::sort(capped.begin(), capped.end());
   EXPECT_GT(plain[50], 500);  // the parameter is 500
   EXPECT_LT(capped[50], 8);
-  EXPECT_LT(capped[100], 60);  // gain of at most √(tr P)/2, noise of 5
+  EXPECT_LT(capped[100], 60);  // the gain is at most √(tr P)/2, and the noise is 5
 }
 
 TEST(RecursiveLeastSquares, AResetKeepsTheEstimateAndBelievesWhatComesNext) {

@@ -78,8 +78,8 @@ TEST(JointFriction, AStuckJointLetsTheHandleGiveWayAside) {
 }
 
 TEST(JointFriction, BrakesAHandleThatTurnsOneJointAsTheClosedFormSays) {
-  // A distance so short that J is constant: m a = −Jᵀτ. The resting joints carry the lateral part, and along the motion
-  // a = τ / (m ‖way‖).
+  // The distance is so short that J is constant, so m a = −Jᵀτ. The joints at rest carry the lateral part. Along the
+  // motion, a = τ / (m ‖way‖).
   const Vec3 torques(0.02, 0.02, 0.02);
   for (const Mechanism::Kind& kind : all_kinds()) {
     for (Eigen::Index joint = 0; joint < 3; ++joint) {

@@ -185,7 +185,7 @@ class SealedServer : public Servers {
   NetworkLoop::Config config_;
   std::vector<Scene> scenes_ = {device_named("left")};
   std::size_t shards_ = 1;
-  std::size_t count_ = 0;  ///< delivered datagrams of the wire
+  std::size_t count_ = 0;  ///< datagrams that the wire has delivered
   std::uint64_t tick_ = 0;
   std::uint64_t tick_step_ = 1;
   std::uint64_t steps_a_turn_ = 1;  ///< if above 1, the network thread is late and only sees the newest step
