@@ -6,7 +6,7 @@
 #include "protocol/discovery.h"
 #include "tests/fuzz/target.h"
 
-// A name must be rejected or unchanged by writing and parsing. It must be possible to write a parsed TXT record.
+// A name must be rejected or unchanged by writing and parsing. A parsed TXT record can be parsed again.
 
 using namespace tendon;
 

@@ -87,7 +87,7 @@ Observed restart(std::uint64_t seed, bool ramp) {
   const LocalTime back = bench.world.now();
   set.engine.seed = 2;
   bench.world.restart_controller(bench.engine, set.engine, set.physics);
-  // The force may grow at most as fast as the deepest force of the wall over the ramp of 100 ms, plus a quarter.
+  // At most the deepest force of the wall over the ramp of 100 ms, plus a quarter for the motion of the hand.
   const double fastest = 1.25 * set.stiffness * 0.02 / 0.1;
   std::optional<LocalTime> engaged;
   bench.expect_of_steps([=](const StepRecord& step) mutable -> std::string {

@@ -83,7 +83,7 @@ const kSilence = 0.5;
 /** s, because times are in ns and sums of floating-point numbers are not exact. */
 const kRounding = 1e-7;
 
-/** Returns the sequences from each time that the robot is engaged. Holding the clutch does not end a sequence. */
+/** Returns the sequences in which the robot was engaged. Holding the clutch does not end a sequence. */
 function followed(moments: readonly Moment[]): Moment[][] {
   const found: Moment[][] = [];
   let open = false;

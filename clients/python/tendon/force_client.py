@@ -111,7 +111,7 @@ class ForceClient:
         self._ask_lease: Instant = NEVER  # time of the next lease request
         self._give_up = now  # timeout of the current attempt
         self._retry = now  # start of the next attempt
-        self._back_off = _ns(config.retry_min_s)  # the time to wait before the next attempt
+        self._back_off = _ns(config.retry_min_s)  # time to wait after the next attempt
         self._unseen: DeviceState | None = None  # newest state that was not returned
         self._pressed = 0  # buttons pressed in any state since the last returned one
         self._newest: DeviceState | None = None  # newest state, returned or not

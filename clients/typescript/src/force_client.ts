@@ -28,7 +28,7 @@ const kValidPeriods = 3;
 const kMinValidForMs = 20;
 /** If the gap is longer, it is not used as a period. If an engine is slower than 10 Hz, it must set rateHz. */
 const kMaxObservedPeriodMs = 100;
-/** The time between two requests for a lease, because the holder renews its lease continuously. */
+/** The minimum time between two requests for a lease, which the holder renews continuously. */
 const kAskLeaseAgain = fromMilliseconds(50);
 
 /** Indices used if neither device nor channel is named. */
@@ -73,7 +73,7 @@ export class ForceClient {
   #giveUp = 0n;
   /** Start of the next attempt. */
   #retry = 0n;
-  /** The time to wait before the next attempt. */
+  /** The time to wait after the next attempt, if it fails. */
   #backOff: Nanoseconds;
 
   /** The newest state that has not been passed to the callback. */

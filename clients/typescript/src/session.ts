@@ -27,7 +27,7 @@ export interface LinkStats {
   lostOutgoing: number;
   /** The number of datagrams that were accepted but are older than a previous one. */
   reordered: number;
-  /** The number of datagrams that were dropped because they were received before or belong to the handshake. */
+  /** The number of dropped datagrams that were received before, are too old, or belong to the handshake. */
   duplicated: number;
   /** The number of datagrams that were dropped because they do not belong to this session. */
   malformed: number;
