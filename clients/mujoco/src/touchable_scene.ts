@@ -262,8 +262,8 @@ export class TouchableScene {
   }
 
   /**
-   * Returns an error message if the state is invalid, or an empty string. In this case, MuJoCo has only incremented a
-   * counter and has restarted at time 0.
+   * If the state is invalid, MuJoCo only increments a counter and restarts at time 0. Returns an error message, or an
+   * empty string if the state is valid.
    */
   #lost(): string {
     const now = this.#warnings();
