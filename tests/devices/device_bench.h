@@ -13,7 +13,7 @@ class Bench {
  public:
   explicit Bench(SimulatedDevice::Config config) : device_(std::move(config)) { device_.read(now_); }
 
-  /// Returns the position of the encoder after `interval`.
+  /// Returns the position of the encoder after the given interval.
   Vec3 wait(Duration interval) {
     now_ += interval;
     return device_.read(now_)->position;

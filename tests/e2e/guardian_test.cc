@@ -128,7 +128,7 @@ TEST(Guardian, WritesTheZeroPacketWhenTheDriverIsKilledHoweverItDies) {
     SCOPED_TRACE(strsignal(signal));
     Heard device;
     const pid_t pid = driver([&] {
-      std::signal(signal, SIG_DFL);  // a sanitizer's handler would turn the signal into a normal exit
+      std::signal(signal, SIG_DFL);  // with a sanitizer, the handler would turn the signal into a normal exit
       Guardian guardian;
       guardian.guard(0, device.end_of_the_driver(), written(kZero));
       stream(device.end_of_the_driver());

@@ -9,8 +9,7 @@
 #include "tests/tools/injector/traces/trace.h"
 #include "tests/tools/injector/traces/trace_player.h"
 
-// A trace must be rejected with its file and line. Otherwise it must be unchanged by writing and parsing, it must be
-// possible to replay it, and no release may be before its arrival.
+// A trace is rejected with file and line, or is unchanged by writing and parsing and has no release before its arrival.
 
 using namespace tendon;
 using namespace tendon::injector;

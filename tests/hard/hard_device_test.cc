@@ -15,8 +15,7 @@
 namespace tendon::hard::hard_device_test {
 namespace {
 
-/// Presses along the normal. The hand is 12 mm deep until `since`. It then alternates between the depths `shallow` and
-/// `deep` for `then`, and finally rests at 12 mm.
+/// Presses 12 mm deep until `since`, alternates between `shallow` and `deep` for `then`, and rests at 12 mm.
 ScriptedMotion press(Case& set, Duration since, Duration then, double shallow, double deep) {
   ScriptedMotion::MinimumJerk reach;
   reach.back_and_forth = false;

@@ -190,7 +190,7 @@ TEST(HardPhysics, AnElementWithoutVolumeIsNamedAndASliverStepRefused) {
   const double thin = 6 * 3.6e-6;  // ratio of its volume to the cube of its edges: 3.6e-6
   const Solid sliver = solid(thin);
   const double limit = largest_step(sliver, 1000);
-  // The mass of the top node is proportional to h and the stiffness to 1/h, so 2/ω is proportional to h.
+  // The mass of the top node is proportional to h, and the stiffness to 1/h. Therefore, 2/ω is proportional to h.
   EXPECT_NEAR(limit / largest_step(solid(10 * thin), 1000), 0.1, 1e-3);
   const TouchSurface top(sliver.mesh(), Vec3::UnitZ(), 0.004);
   const auto engine = [&](double step) {
@@ -370,8 +370,7 @@ TEST(HardPhysics, TheRestOfABodyDoesNotDependOnTheStep) {
                      " % deeper with 10 ms than with 1 ms"});
 }
 
-// Oracle: 2/ω, with ω from Lanczos' method. Without damping, the rule must be bounded at 0.95 of this step and diverge
-// at 1.05.
+// Oracle: 2/ω, with ω from Lanczos' method. Undamped, the rule is bounded at 0.95 of it and diverges at 1.05.
 TEST(HardPhysics, AnExplicitStepIsStableBelowItsLimitAndRefusedAboveIt) {
   const Solid solid = pressed_block(Element::kTet4, 4, 0.45);
   const double limit = largest_step(solid, 1000);

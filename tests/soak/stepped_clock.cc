@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A library for LD_PRELOAD that adds an offset to the wall clock of a program. The offset is in nanoseconds (text) in
-// the file that is named by TENDON_CLOCK_STEP.
+// A library for LD_PRELOAD that shifts a program's wall clock by the ns (text) in the file TENDON_CLOCK_STEP names.
 #include <fcntl.h>
 #include <sys/syscall.h>
 #include <unistd.h>

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// An arm with six joints and links of 0.3 m and 0.3 m, over a table at z = 0.17. The tool points down and is 20 mm
-// above the table.
+// An arm of six joints with two links of 0.3 m, over a table at z = 0.17. Its tool points down, 20 mm above the table.
 const servo = (joint: string): string => `<position joint="${joint}" kp="200" kv="6"/>`;
 
 export const armScene = `<mujoco>

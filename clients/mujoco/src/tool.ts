@@ -36,7 +36,6 @@ export interface Tool {
   lead(pose: Pose, seconds: number): void;
   /** Returns the force of the newest step. The scene is not changed. */
   felt(): Felt;
-  /** This is called when the scene is reset. */
   restart(): void;
   delete(): void;
 }

@@ -18,9 +18,7 @@ export interface SceneConfig {
   readonly tool: string;
   /** The stiffness of the coupling if the tool is held. Default: 1000 N/m and 2 N·m/rad. */
   readonly coupling?: Partial<Coupling>;
-  /**
-   * For a held tool. Requires 14 evaluations of the scene for each answer, without collision detection. Default: true.
-   */
+  /** For a held tool. Each answer then needs 14 evaluations without collision detection. Default: true. */
   readonly sendStiffness?: boolean;
   /** Rotation from device frame to scene frame, row-major. Default: identity. See zUp() for scenes with z up. */
   readonly rotation?: readonly number[];
@@ -35,7 +33,6 @@ export interface SceneConfig {
   readonly maxSteps?: number;
   /** The files that are used in the scene. */
   readonly assets?: Assets;
-  /** This is called with warnings about the scene and the simulation. Default: console.warn. */
   readonly onWarning?: (text: string) => void;
 }
 
@@ -261,10 +258,7 @@ export class TouchableScene {
     });
   }
 
-  /**
-   * If the state is invalid, MuJoCo only increments a counter and restarts at time 0. Returns an error message, or an
-   * empty string if the state is valid.
-   */
+  /** Returns an error message or an empty string. MuJoCo itself only counts the error and restarts at time 0. */
   #lost(): string {
     const now = this.#warnings();
     const kinds = this.mujoco.mjtWarning;

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A page that is a physics engine. It renders a wall at x = 0, and uses the WebSocket bridge. Use `npm run page` to see
-// it.
+// A page that renders a wall at x = 0, using the WebSocket bridge. Use `npm run page` to see it.
 import { connect, parseKeyFile, webSocket, type DeviceState, type Guest } from "tendon-client";
 import { draw } from "./picture.js";
 

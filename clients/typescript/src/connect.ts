@@ -6,7 +6,6 @@ import type {
 } from "./messages.js";
 import { fromMilliseconds, kNever, toMilliseconds, type Nanoseconds } from "./time.js";
 
-/** Sends datagrams to a server and receives its datagrams. */
 export interface Transport {
   /** Sends a datagram. If this is not possible, the datagram is dropped. */
   send(datagram: Uint8Array): void;
@@ -33,10 +32,7 @@ export interface Guest {
   readonly welcome: Welcome | undefined;
   /** Description of the device. Absent until it arrives; it is only requested if `device` or `channel` is named. */
   readonly description: DeviceDescription | undefined;
-  /**
-   * Orientation of the device relative to the operator, and names of the buttons. Absent if the server does not support
-   * it.
-   */
+  /** The orientation of the device and the names of the buttons, if the server supports this. */
   readonly handle: HandleDescription | undefined;
   /** Whether this client holds the channel. Otherwise the physics callback is not called. */
   readonly holds: boolean;

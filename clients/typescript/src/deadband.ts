@@ -45,10 +45,7 @@ export class Deadband {
     this.#config = config;
   }
 
-  /**
-   * Returns true if one of the three values must be sent, or if it has appeared or disappeared. In this case, all of
-   * them are recorded as sent.
-   */
+  /** Returns true if one of the values must be sent or has (dis)appeared. All of them are then recorded as sent. */
   passes(now: Nanoseconds, value: Pick<ForceCommand, "force" | "torque" | "gripForce">): boolean {
     const { floor, longestSilenceMs } = this.#config;
     const { x, y, z } = value.force;
@@ -86,9 +83,7 @@ function turned({ w, x, y, z }: Quat, { x: b, y: c, z: d }: Vec3, seconds: numbe
   return { w: q.w / length, x: q.x / length, y: q.y / length, z: q.z / length };
 }
 
-/**
- * Predicts the state `later` after `sent` with constant velocities of position, rotation and gripper, in whole periods.
- */
+/** Predicts the state `later` after `sent`, in whole periods, with constant velocities of all parts. */
 export function predict(sent: DeviceState, later: Nanoseconds, hapticPeriod: Nanoseconds): DeviceState {
   const periods = later > 0n ? later / hapticPeriod : 0n;
   const seconds = Number(periods * hapticPeriod) / 1e9;

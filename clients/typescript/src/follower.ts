@@ -270,9 +270,7 @@ export class Follower {
     return this.#now - this.#base.ms - Number(this.#sampledNs - this.#base.sampledNs) / 1e6 - this.#usual;
   }
 
-  /**
-   * Records a new state and returns its age on arrival. The first state after a silence defines the base of the delay.
-   */
+  /** Records a new state and returns its age. The first one after a silence is the base of the delay. */
   #take(hand: DeviceState): number {
     if (!this.#base) {
       this.#base = { ms: this.#now, sampledNs: hand.sampledNs };

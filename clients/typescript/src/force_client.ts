@@ -15,10 +15,7 @@ import {
 import { Session, type LinkStats } from "./session.js";
 import { earliest, fromMilliseconds, kNever, latest, type Nanoseconds } from "./time.js";
 
-/**
- * The physics engine as a callback. If a newer state arrives during the computation, it replaces the older one. If the
- * callback returns null, no force is sent.
- */
+/** The physics engine. During a computation, newer states replace older ones. Null: no force is sent. */
 export type Physics = (hand: DeviceState) => Vec3 | Touch | null;
 
 /** Callback of an observer. */

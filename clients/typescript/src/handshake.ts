@@ -9,15 +9,11 @@ import { NoiseSeal, PlainSeal, type Seal } from "./seal.js";
 import { kFeatureAesGcm, kUsableSuites, namesOf } from "./suites.js";
 import { kMillisecond, kNever, type Nanoseconds } from "./time.js";
 
-/** The result of an attempt. */
 export type Outcome =
   | { readonly kind: "accepted"; readonly connectionId: number; readonly welcome: Welcome; readonly seal: Seal }
   | { readonly kind: "refused"; readonly refused: Refused };
 
-/**
- * An attempt of a client to connect, which does no I/O. It sends a Hello every 100 ms until there is an answer. It has
- * no timeout.
- */
+/** An attempt to connect, without I/O. It sends a Hello every 100 ms until it is answered. It has no timeout. */
 export class ClientHandshake {
   static readonly kResend = 100n * kMillisecond;
 

@@ -20,7 +20,6 @@ export const kRequestWindow = 16;
 export const kMaxName = 64;
 /** Bytes of UTF-8 in the name of a device or a channel. */
 export const kMaxLabel = 24;
-/** The maximum number of `ways`. */
 export const kMaxWays = 8;
 export const kMaxLoopHz = 1_000_000;
 /** How many times a Bye is sent. */

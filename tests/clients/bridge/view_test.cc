@@ -33,8 +33,7 @@ std::vector<Quat> axis_aligned_rotations() {
 }
 
 TEST(View, AMotionAlongEachAxisOfADeviceComesOutOnTheProgramsAxis) {
-  // In WoodenHaptics, x points forward, y to the left, and z up. In CHAI3D, x points to the user, y to the right, and z
-  // up.
+  // WoodenHaptics' base frame is x forward, y left, z up. CHAI3D's is x to the user, y right, z up.
   const Quat wooden = quaternion_of(operator_from_device("right=-y up=z user=-x"));
   const View view(*find_frame("chai3d"), wooden);
   EXPECT_TRUE(view.position(Vec3(1, 0, 0)).isApprox(Vec3(-1, 0, 0))) << "ahead is away from the user";

@@ -80,7 +80,7 @@ class Port : public Link {
   Address self_;
 };
 
-/// Serves a single client, which is the newest one. The simulated hand moves along a known path.
+/// Only serves the client that has connected last. The simulated hand moves along a known path.
 class Server {
  public:
   Server(Link& link, std::uint8_t secret) : link_(link), handshake_(handshake_config(secret)) {}

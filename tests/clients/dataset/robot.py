@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A robot that follows the hand at half scale over a table, and records its motion."""
+"""A robot that follows the hand over a table at half scale, and records how it moves."""
 import sys
 import time
 from pathlib import Path

@@ -244,8 +244,7 @@ describe("the stiffness", () => {
 describe("a scene whose z points up", () => {
   it("has the operator's right at x and what points to the operator at −y", () => {
     near(toScene(zUp(), [1, 2, 3]), [1, -3, 2], 1e-12, "x right, y up, z to the user");
-    // The x axis of the device points to the user, y points to the right, and z points up. The axes of the operator are
-    // y, z and x of the device.
+    // The device has x to the user, y right, z up. The axes of the operator are its y, z and x axes.
     const operatorFromDevice = { w: 0.5, x: -0.5, y: -0.5, z: -0.5 };
     near(toScene(zUp(operatorFromDevice), [1, 2, 3]), [2, -1, 3], 1e-12, "x to the user, y right, z up");
   });

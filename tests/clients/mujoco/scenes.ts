@@ -7,7 +7,6 @@ export interface Block {
   readonly n: number;
   readonly option?: string;
   readonly poisson?: number;
-  /** Contact parameters of the block and of the tool. */
   readonly contact?: string;
 }
 

@@ -86,8 +86,7 @@ World<N> delayed(World<N> world, int periods) {
   };
 }
 
-/// The demand can be huge, tiny, zero or NaN. It can be in the direction of the motion or in the opposite direction,
-/// and its stiffness can change.
+/// The demand is huge, tiny, zero or NaN, in any direction relative to the motion. Its stiffness changes.
 template <int N>
 World<N> hostile_world(Dice& dice) {
   return [&dice, last = Vec<N>(Vec<N>::Zero())](const Vec<N>& x) mutable {
@@ -213,7 +212,7 @@ int broken_by_hostile_worlds(Make make, int seeds, double overclaim = 1) {
 }
 
 /// This test is for laws that are only passive in static, convex worlds. `make` is also called with the largest slope
-/// of the world, `stiffest` (N/m).
+/// For laws that are only passive in static, convex worlds. `make` also gets the largest slope of the world (N/m).
 template <int N, class Make>
 int broken_by_static_worlds(Make make, int seeds, const Walls& walls = {}, int periods_late = 0) {
   int broken = 0;

@@ -39,7 +39,7 @@ TEST(Aol, JointFormIsTheSameInEveryFrameAndBoxFormPermitsWhatAxesDo) {
     const Vec3 joint = here.limit({.force = wanted}).force;
     EXPECT_LT((turn * joint - there.limit({.force = turn * wanted}).force).norm(), 1e-9 * joint.norm());
     EXPECT_LT(joint.cross(wanted).norm(), 1e-9 * joint.norm() * wanted.norm());
-    // The box form must pass every force that is permitted by the per-axis form.
+    // If a force is permitted by the per-axis form, it must also be permitted by the box form.
     const Vec3 by_axes = axes.limit({.force = wanted}).force;
     EXPECT_LT((box.limit({.force = by_axes}).force - by_axes).norm(), 1e-9 * by_axes.norm());
   }

@@ -16,9 +16,8 @@ struct Press {
   double least_work = 0;  ///< J, minimum of the hand's work plus the initial kinetic energy
 };
 
-/// The same parameters are used for all laws. Device 75 g, hand 50 g with 400 N/m and 0.3 N·s/m, b = 0.26 N·s/m, f_c =
-/// 0.02 N, 1 kHz. The hand starts 20 mm in front of the wall, and its target is 10 mm inside. The device saturates at
-/// 60 N.
+/// All laws use the same parameters. Device 75 g, hand 50 g with 400 N/m and 0.3 N·s/m, b = 0.26 N·s/m, f_c = 0.02 N, 1
+/// kHz. The hand starts 20 mm in front of the wall, and its target is 10 mm inside. The device saturates at 60 N.
 template <class Law>
 requires StabilityController<Law, 1> Press press(Law law, double wall) {
   using std::chrono::milliseconds;

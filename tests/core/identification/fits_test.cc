@@ -39,8 +39,7 @@ TEST(KellyFit, DoesNotCareWhenTheClockStarted) {
 }
 
 TEST(KellyFit, OnADesktopSeesTheFrictionThatTheSpecSays) {
-  // The travel is 0.25 m and f_c = 0.05 N. The expected value is that of a line through velocities; kelly_fit uses
-  // positions, which explains the 5 %.
+  // 0.25 m of travel, f_c = 0.05 N. The expected value is for a fit to velocities; kelly_fit uses positions (5 %).
   struct Row {
     double viscous, rate, kelly_viscous, kelly_coulomb;
   };

@@ -80,8 +80,7 @@ Vec3 worst_motion(const Vec3& force, const Friction& friction, Duration held) {
   return force / size * (seconds(held) * (size - friction.coulomb) / (2 * friction.viscous));
 }
 
-// Returns the minimum energy after `steps` steps. The motion is random, or it is the worst case. `scale` is the ratio
-// of the forces to the bound.
+// Returns the minimum energy after random and worst-case steps. `scale` is the ratio of the forces to the bound.
 double least_energy_against_adversary(double scale, std::uint64_t seed) {
   std::mt19937_64 random(seed);
   const auto uniform = [&random] { return static_cast<double>(random() >> 11) * 0x1p-53; };

@@ -76,8 +76,7 @@ TEST(AdaptiveLocalModel, NothingJumpsWhenAnAnswerArrivesEvenInABlend) {
   }
 }
 
-/// Returns the energy (J) that a hand can extract if it moves by 1 mm. At each reversal, the answer switches between a
-/// soft and a stiff spring, which is the worst case.
+/// Returns the energy (J) that a hand can extract by moving 1 mm in the worse of two springs at each reversal.
 double handed_out(const AdaptiveLocalModel::Config& config) {
   AdaptiveLocalModel model(config);
   double energy = 0;

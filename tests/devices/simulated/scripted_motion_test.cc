@@ -143,7 +143,7 @@ TEST(Recorded, IsHeldAtTheEndOrPlayedAgainFromTheStart) {
 }
 
 TEST(Recorded, FollowsASmoothMotionThatWasSampledWell) {
-  // The error of a slope is of second order, or of first order near an extremum: 0.2 % for 1 Hz at 100 Hz.
+  // The error of a slope is of second order, except near extrema. If 1 Hz is sampled at 100 Hz, it is 0.2 %.
   Recorded recorded;
   for (int i = 0; i <= 200; ++i) {
     recorded.samples.push_back({0.01 * i, std::sin(2 * std::numbers::pi * 0.01 * i)});

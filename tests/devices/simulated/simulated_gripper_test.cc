@@ -95,7 +95,7 @@ TEST(SimulatedGripper, AHandBringsItToItsOpeningOrPressesTheStop) {
 }
 
 TEST(SimulatedGripper, WorkOfTheHandIsNeverLessThanTheLedgerDemands) {
-  // The cases are at the stops and between them. Without friction and contact, the balance is exact.
+  // The cases are at the stops and between them. If there is no friction and no contact, the balance is exact.
   double least = 1e300;
   int met = 0;
   for (std::uint64_t seed = 0; seed < 2000; ++seed) {

@@ -33,8 +33,7 @@ class MockUsb {
 /// A port of the machine and the model of its device, in real time. Thread-safe.
 class MockPort {
  public:
-  /// Creates port `number` of bus 1, which must be from 1 to 9. There is no device in the port. `usb` and `model` must
-  /// outlive this object.
+  /// Creates port `number` (1 to 9) of bus 1 without a device. `usb` and `model` must outlive this object.
   MockPort(MockUsb& usb, int number, UsbModel& model);
   ~MockPort();
   MockPort(const MockPort&) = delete;

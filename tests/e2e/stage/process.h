@@ -22,8 +22,7 @@ inline constexpr std::chrono::seconds kPatience{30};
 /// if the wait cannot succeed any more. Thread-safe: no.
 class Process {
  public:
-  /// Starts the program in `folder`, without standard input. `more_environment`: "NAME=value". Throws std::system_error
-  /// on failure.
+  /// Starts the program in `folder` without stdin. `more_environment`: "NAME=value". Throws std::system_error.
   Process(const std::filesystem::path& program, const std::vector<std::string>& arguments,
           const std::filesystem::path& folder, std::vector<std::string> more_environment = {});
   ~Process();

@@ -59,8 +59,7 @@ TEST(LinkMeter, TheLongestGapIsBetweenTwoDatagramsOrSinceTheLast) {
   EXPECT_EQ(meter.report(kStart + milliseconds(100)).longest_gap, milliseconds(50));
   EXPECT_EQ(meter.report(kStart + milliseconds(300)).longest_gap, milliseconds(220));
   meter.heard(kStart + milliseconds(310));
-  EXPECT_EQ(meter.report(kStart + milliseconds(310)).longest_gap,
-            milliseconds(230));  // this gap began in the previous report
+  EXPECT_EQ(meter.report(kStart + milliseconds(310)).longest_gap, milliseconds(230));  // began in the previous report
 }
 
 TEST(LinkMeter, AFloodIsThinnedEvenlyAndItsQuantilesHold) {

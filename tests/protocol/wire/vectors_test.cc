@@ -82,8 +82,7 @@ TEST(Vectors, HmacGivesTheAnswersOfRfc4231) {
   }
 }
 
-/// Returns the packet number in a Noise nonce, which consists of four zeros and the number. If the nonce is different,
-/// the vector is for libraries that accept any nonce.
+/// Returns the number in a Noise nonce (four zeros, then the number). Others are for libraries that accept any.
 std::optional<std::uint64_t> number_in(const Bytes& nonce, Suite suite) {
   if (std::any_of(nonce.begin(), nonce.begin() + 4, [](std::byte b) { return b != std::byte{}; })) return {};
   std::uint64_t number = 0;

@@ -224,7 +224,7 @@ TEST_F(Diagnosed, WhereTheLogThreadSaysNothingThereIsNoReportOnADevice) {
   measured_ = false;
   run(seconds(3), {&b});
   EXPECT_EQ(b->device_report()->number, 2U);  // the last report before it stopped
-  health_.steps_lost += 100;                  // exceeded the capacity of the ring
+  health_.steps_lost += 100;                  // lost because the ring was full
   measured_ = true;
   run(seconds(1), {&b});
   const DeviceReport& report = *b->device_report();

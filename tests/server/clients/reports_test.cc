@@ -37,8 +37,8 @@ TEST_F(SealedServer, TellsControllersAloneOnceASecondHowTheirForcesFare) {
   EXPECT_FALSE(b->report().has_value());
 }
 
-/// The delay is 20 ms in each direction. In the middle of a turn, one of the ends is preempted for 36 ms. A datagram
-/// that arrives meanwhile is handled with the time at the beginning of the turn.
+/// The delay is 20 ms in each direction. One of the ends is preempted for 36 ms while it is in a turn. A datagram that
+/// arrives meanwhile is handled with the time at the beginning of the turn.
 class InterruptedTurn : public SealedServer, public testing::WithParamInterface<bool> {};
 
 TEST_P(InterruptedTurn, MakesNoWayLookShort) {

@@ -110,7 +110,7 @@ TEST(SceneReference, ListsEveryKeyWithUnitMeaningAndDefault) {
           "      Time from one haptic step to the next.\n"
           "      A number from 100 to 4000 µs. Default: 1000.\n"))
       << text;
-  // The tables and the effects are checked by Explain.NamesEveryPartThatASceneMayLeaveOut.
+  // The tables and the effects are checked in Explain.NamesEveryPartThatASceneMayLeaveOut.
   const std::string_view keys[] = {"profile",
                                    "start_position_mm",
                                    "upper_arm_mm",

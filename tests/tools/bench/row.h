@@ -31,7 +31,7 @@ struct Row {
   std::optional<Target> target{};
   std::optional<double> instructions{};  ///< per call, in user space, if the kernel permits counting
   std::string note;
-  /// The values in the note that are plotted in a chart, with their names, in the order of the chart.
+  /// The values of the note that are used in a chart, in this order.
   std::vector<std::pair<std::string, double>> figures{};
 };
 

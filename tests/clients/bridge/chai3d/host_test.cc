@@ -47,8 +47,7 @@ struct Theatre {
   HandNow hand;
 };
 
-// In the base frame of WoodenHaptics, x points forward, y to the left, and z up. In CHAI3D, x points to the user, y to
-// the right, and z up.
+// WoodenHaptics' base frame is x forward, y left, z up. CHAI3D's is x to the user, y right, z up.
 const Quat kWooden = quaternion_of(operator_from_device("right=-y up=z user=-x"));
 const std::vector<std::string> kDirections = {"[1, 0, 0]", "[0, 1, 0]", "[0, 0, 1]"};
 const std::vector<Vec3> kSeen = {Vec3(-1, 0, 0), Vec3(0, -1, 0), Vec3(0, 0, 1)};

@@ -156,8 +156,7 @@ TEST(InverseSession, ASpinningClientSendsOneForceForEachState) {
 }
 
 TEST(InverseSession, PositionAndForceAreRightAlongEachAxis) {
-  // In the base frame of WoodenHaptics, x points forward, y to the left, and z up. The hand moves along x, which is the
-  // y axis of the client.
+  // WoodenHaptics' base frame is x forward, y left, z up. The hand moves along x, the client's y axis.
   HandleDescription handle;
   handle.operator_from_device = quaternion_of(operator_from_device("right=-y up=z user=-x"));
   Bridge bridge("demo_parts.toml", {}, handle);

@@ -127,7 +127,7 @@ async def steps_until_nothing(uri: str, act) -> int:
         probe = json.dumps({"inverse3": [{"device_id": device, "commands": {"probe_position": {}}}]})
 
         async def look() -> tuple[float, int]:
-            # The bridge may connect before the first state of the device arrives.
+            # The bridge can be connected before the first state of the device has arrived.
             while True:
                 await socket.send(probe)
                 news = json.loads(await socket.recv())

@@ -19,8 +19,7 @@ namespace {
 
 constexpr double kQuarter = std::numbers::pi / 2;
 
-/// The axes of a Falcon are those of the operator, so x points to the right, y up, and z to the user. In REP 103, x
-/// points forward, y to the left, and z up.
+/// A Falcon has the operator's axes (x right, y up, z to the user). REP 103 has x forward, y left, z up.
 const std::optional<Quat> kFalcon = Quat{};
 /// The axes of WoodenHaptics are the same as in REP 103.
 const std::optional<Quat> kWooden = quaternion_of(operator_from_device("right=-y up=z user=-x"));

@@ -347,7 +347,7 @@ TEST_F(VrpnPeer, DescriptionsByDatagramAndPortsOfOthersAreNonsense) {
   EXPECT_FALSE(peer_.drawing(0).empty()) << "the sender is still Phantom0";
 }
 
-/// NAME.stream contains the data that was sent to a server by VRPN's own programs by TCP. It starts with the cookie.
+/// NAME.stream contains the data that VRPN's own programs sent to a TCP server. It starts with the cookie.
 TEST(VrpnCaptures, WhatRealProgramsSentIsUnderstood) {
   const char* const data = std::getenv("TENDON_DATA");  // NOLINT(concurrency-mt-unsafe): one thread
   if (data == nullptr) GTEST_SKIP() << "TENDON_DATA is not set: no bytes of real programs";

@@ -240,8 +240,7 @@ TEST(VrpnWorld, ASecondProgramIsToldAndTakesOverWhenTheFirstLeaves) {
 
 /// Returns the energy (J) with 20 ms of delay in each direction and the force of a wall for each pose.
 double given_out(bool limited, bool as_plane) {
-  // The hand is the same as in the first scene. The limiter parts of that scene are removed, because they cannot be
-  // used without a limiter.
+  // The same hand, without the parts of the limiter, which cannot be used if there is no limiter.
   Stage stage(limited ? "demo_parts.toml" : "left.toml",
               limited ? std::vector<std::string>{} : std::vector<std::string>{"limiter.kind=\"none\""}, 20);
   World& world = stage.world;

@@ -8,7 +8,7 @@ import { kRoot } from "./paths.js";
 
 const kPatienceMs = 30_000;
 
-/** A running program and the lines of its stdout and stderr. The test kills it at the end. */
+/** A running program and the lines of its stdout and stderr. It must be killed at the end of the test. */
 export class Program {
   readonly lines: string[] = [];
   readonly #process: ChildProcess;
