@@ -31,8 +31,8 @@ export interface SceneConfig {
   readonly maxToolSpin?: number;
   /** The maximum number of steps per answer. If more are due, simulated time falls behind. Default: 20. */
   readonly maxSteps?: number;
-  /** The files that are used in the scene. */
   readonly assets?: Assets;
+  /** This is called with warnings about the scene and the simulation. Default: console.warn. */
   readonly onWarning?: (text: string) => void;
 }
 

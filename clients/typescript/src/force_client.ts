@@ -509,11 +509,11 @@ export class ForceClient {
     return Math.min(Math.max(kValidPeriods * period, kMinValidForMs), kMaxValidForMs);
   }
 
-  /** the first tick that was not passed on */
+  /** Returns the time of the next callback. This is kNever if there is no new state. */
   #nextDue(): Nanoseconds {
     if (!this.#predicts) return this.#unseen ? this.#nextCall : kNever;
     if (!this.#newest) return kNever;
-    const ahead = latest(this.#seenTick + 1n - this.#newest.tick, 0n); // the first unseen tick
+    const ahead = latest(this.#seenTick + 1n - this.#newest.tick, 0n); // the first tick that was not passed on
     const due = latest(this.#nextCall, this.#newestArrived + ahead * this.#hapticPeriod());
     return due - this.#newestArrived <= this.#silence() ? due : kNever;
   }

@@ -471,7 +471,7 @@ std::string key_files() {
   };
   std::string counting;
   for (unsigned i = 0; i < 32; ++i) counting += hex(std::array{static_cast<std::byte>(i)});
-  // Appends `count` different bytes without a repeating order, then as many different steps between bytes.
+  // Returns 32 bytes with `count` different values, without a repeating order. The next one does this for the steps.
   const auto different_bytes = [](unsigned count) {
     std::string out;
     for (unsigned i = 0; i < 32; ++i) {

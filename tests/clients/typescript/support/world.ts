@@ -65,7 +65,7 @@ export interface ServerConduct {
   /** The number of datagrams and the time after which the server renews its key. */
   renewAfter: { datagrams: bigint; time: Nanoseconds };
   state: (tick: bigint) => DeviceState;
-  /** The number of ticks for each state that is sent. */
+  /** One state is sent for this number of ticks. */
   every: bigint;
   answer: (request: Request) => Omit<ControlAck, "id">;
 }
