@@ -65,6 +65,7 @@ void UsbfsNode::set_file(int slave) {
 
 // tcflow() is not thread-safe if several threads write to the terminal, but nothing else is written to it while this
 // process has the node.
+// NOLINTNEXTLINE(concurrency-mt-unsafe)
 void UsbfsNode::gate(bool open) const { tcflow(file_, open ? TCOON : TCOOFF); }
 
 void UsbfsNode::finish(usbdevfs_urb* urb, int status, int size) {
