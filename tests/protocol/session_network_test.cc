@@ -12,7 +12,7 @@ using std::chrono::milliseconds;
 using std::chrono::minutes;
 using std::chrono::seconds;
 
-/// If half of all datagrams are lost for half an hour, there are two seconds without any datagram.
+/// If 50 % of all datagrams are lost for half an hour, there are two seconds without any datagram.
 Session::Config patient() {
   Session::Config config;
   config.timeout = seconds(60);

@@ -114,7 +114,7 @@ export interface Finished {
   readonly hash: Uint8Array;
 }
 
-/** Derives a key of suite 2 from the key of one direction. It is bound to Hello and Answer. */
+/** Derives the key of suite 2 for one direction, bound to Hello and Answer, and unlike all keys of suite 1. */
 export const keyOfSuite2 = (key: Uint8Array, hash: Uint8Array): Uint8Array =>
   hmac(sha256, key, concat(ascii("tendon-suite-2"), hash));
 

@@ -163,7 +163,7 @@ TEST(FalconDevice, ButtonsComeWithThePosition) {
   EXPECT_EQ(bench.sample->buttons, 5U);
 }
 
-// The event character makes the chip send each reply. Otherwise the latency timer may delay every second one.
+// The event character makes the chip send each reply. Otherwise the latency timer (1 ms) may delay every second one.
 TEST(FalconDevice, EveryPeriodOfAMillisecondHasItsSample) {
   for (const bool flush : {true, false}) {
     Bench bench({.has_firmware = true, .is_homed = true, .knows_flush_character = flush});

@@ -42,7 +42,7 @@ TEST(LinkMeter, AnExchangeToldAgainIsOneWayThereAndSeveralWaysBack) {
   }
   const auto report = meter.report(kStart + seconds(1));
   EXPECT_EQ(report.to_peer->median, milliseconds(90));    // 10, 90, 90
-  EXPECT_EQ(report.from_peer->median, milliseconds(40));  // ten values are 40 ms
+  EXPECT_EQ(report.from_peer->median, milliseconds(40));  // ten are 40 ms, two are 20 ms
 }
 
 TEST(LinkMeter, ForgetsWithEachReportAndSaysNothingOfWhatItDidNotSee) {
