@@ -11,6 +11,10 @@
 // the same values. A receiver refuses and counts values that are out of bounds, and a sender truncates texts and lists.
 // tendon.proto contains the same bounds, which are tested with protocol/vectors/bounds.json.
 
+namespace tendon {
+inline constexpr std::uint32_t kProtocolVersion = 1;
+}
+
 namespace tendon::limits {
 
 /// For all physical quantities in SI units, per component. The server sets the physical limits. The cube of this value

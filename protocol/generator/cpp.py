@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Writes the C++ code of the wire (protocol/wire/generated/): the lists of fields, and the schema for AnyOrder."""
+"""Writes the C++ code of the wire (protocol/wire/generated/): the values, the lists of fields, and the schema for
+AnyOrder."""
 
 from __future__ import annotations
 
@@ -7,13 +8,9 @@ import re
 import shutil
 import subprocess
 
-from model import CPP, ROOT, Field, Member, Message, Range, Wire
-
-_HEAD = """\
-// SPDX-License-Identifier: Apache-2.0
-// Generated from tendon.proto by protocol/generate.
-#pragma once
-"""
+import cpp_values
+from cpp_values import HEAD
+from model import CPP, ROOT, Field, Member, Message, Range, Wire, constant
 
 # Messages whose code is written by hand.
 _BY_HAND = ("Datagram", "Frame", "DeviceStates", "Vec3", "Quat")
@@ -35,10 +32,6 @@ _SHAPES = {
 
 def _words(name: str) -> list[str]:
     return re.findall(r"[A-Z][a-z0-9]*", name)
-
-
-def _constant(short: str) -> str:
-    return "k" + "".join(word.capitalize() for word in short.split("_"))
 
 
 # ---- Bounds ----
@@ -166,7 +159,7 @@ class _List:
             return self._message(one, member)
         if one.kind == "enum":
             known = self.wire.enums[one.type].known
-            ends = [f"{one.type}::{_constant(value.short)}" for value in (known[0], known[-1])]
+            ends = [f"{one.type}::{constant(value.short)}" for value in (known[0], known[-1])]
             return ["choice", *ends, "1" if one.type in _ENUMS_FROM_0 else ""]
         if one.kind == "text":
             most = (bound.bytes.most if bound.bytes else None) or ""
@@ -181,7 +174,7 @@ class _List:
         if one.repeated:
             return ["counts"]
         if one.type == "double":
-            if member.field is not None and self.message.default(one.name, CPP):
+            if one.explicit and self.message.default(one.name, CPP):
                 return ["radius"]
             return ["maybe" if member.optional else "number", _within(bound.value)]
         if one.type == "fixed32":
@@ -295,7 +288,7 @@ def _in_order(wire: Wire, roots: list[str]) -> list[Message]:
 
 
 def _lists(wire: Wire, what: str, includes: list[str], messages: list[Message]) -> str:
-    out = _HEAD + "\n" + "".join(f'#include "{name}"\n' for name in includes)
+    out = HEAD + "\n" + "".join(f'#include "{name}"\n' for name in includes)
     out += f"\n// Lists of fields for {what}; see fields/field.h.\n\nnamespace tendon::wire {{\n"
     for message in messages:
         fields = _List(wire, message)
@@ -309,7 +302,7 @@ def _shape(one: Field) -> str:
 
 
 def _schema(wire: Wire) -> str:
-    out = _HEAD + '\n#include <array>\n\n#include "protocol/wire/any_order.h"\n'
+    out = HEAD + '\n#include <array>\n\n#include "protocol/wire/any_order.h"\n'
     out += "\n// The schema of each message, for AnyOrder.\n\nnamespace tendon::wire::schema {\n"
     for message in _in_order(wire, list(wire.messages)):
         shapes = []
@@ -342,6 +335,7 @@ def _made(wire: Wire) -> dict[str, str]:
 
     folder, frame = "protocol/wire/generated/", "protocol/wire/frame.h"
     return {
+        folder + "messages.h": cpp_values.text(wire),
         folder + "frame_fields.h": lists("frames", frames, frame),
         folder + "request_fields.h": lists("requests and their answers", requests, frame),
         folder + "handshake_fields.h": lists("the handshake", handshake, "protocol/wire/handshake_codec.h"),

@@ -112,6 +112,11 @@ def camel(name: str) -> str:
     return first + "".join(word[:1].upper() + word[1:] for word in rest)
 
 
+def constant(short: str) -> str:
+    """As C++ writes an enum value: "SAFE_STOP" is kSafeStop."""
+    return "k" + "".join(word.capitalize() for word in short.split("_"))
+
+
 # ---- The wire ----
 
 _TYPES = {
@@ -198,12 +203,12 @@ class Field:
 
     @property
     def is_optional(self) -> bool:
-        """Returns True if absence does not mean 0. A vector is optional if its comment has the word "absent:"."""
+        """Returns True if absence does not mean 0. A vector is optional if its comment says "absent if"."""
         if self.repeated:
             return self.is_matrix and 0 in self.bound.entries  # type: ignore[operator]
         if not self.has_presence or "absent is refused" in self.doc:
             return False
-        return self.type not in ("Vec3", "Quat") or re.search(r"\babsent:", self.doc, re.IGNORECASE) is not None
+        return self.type not in ("Vec3", "Quat") or re.search(r"\babsent if\b", self.doc, re.IGNORECASE) is not None
 
 
 @dataclass(frozen=True)
@@ -343,6 +348,7 @@ class Message:
 class Wire:
     messages: dict[str, Message]  # by name, in the order of the file
     enums: dict[str, Enum]
+    cpp_headers: dict[str, list[str]]  # headers of core, and the types that they define
 
     @cached_property
     def field_names(self) -> dict[str, set[str]]:
@@ -392,6 +398,7 @@ def _joined(lines: list[str]) -> str:
 def load(proto: Path = PROTO, values: Path = VALUES) -> Wire:
     file = _describe(proto)
     table = tomllib.loads(values.read_text())
+    cpp_headers = table.pop("cpp_headers")
     comments = {tuple(place.path): place for place in file.source_code_info.location}
 
     def around(*path: int) -> tuple[list[str], list[str]]:
@@ -453,7 +460,7 @@ def load(proto: Path = PROTO, values: Path = VALUES) -> Wire:
             )
         fields.sort(key=lambda each: each.number)
         messages[one.name] = Message(one.name, _joined(around(4, index)[0]), "", tuple(fields), table.get(one.name, {}))
-    wire = Wire(messages, enums)
+    wire = Wire(messages, enums, cpp_headers)
     for frame in wire.frames():
         messages[frame.type].sender = frame.doc
     unknown = set(table) - set(messages)

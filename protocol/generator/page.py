@@ -104,15 +104,15 @@ class _Tables:
             said.append("norm 1 ± 0.001")
         elif field.type == "Vec3":
             x = self._wire.messages["Vec3"].field("x")
-            said.append(f"{_range(x.bound.value, x, field.unit)} each")
+            said.append(f"{range_of(x.bound.value, x, field.unit)} each")
         elif field.type in self._wire.enums:
             known = self._wire.enums[field.type].known
             said.append(f"{known[0].number} … {known[-1].number}")
         if bound.entries is not None:
             said.append(_entries(bound.entries))
         if bound.bytes is not None:
-            said.append(f"{'each ' if field.repeated else ''}≤ {_number(bound.bytes.most or '', field)} bytes")
-        said.append(_range(bound.value, field, field.unit))
+            said.append(f"{'each ' if field.repeated else ''}≤ {number(bound.bytes.most or '', field)} bytes")
+        said.append(range_of(bound.value, field, field.unit))
         for check in message.checks:
             if re.search(r"\w+", check.removeprefix("sum("))[0] == field.name:  # type: ignore[index]
                 said.append(_check(check))
@@ -128,13 +128,13 @@ def _row(*cells: str) -> str:
     return "".join(f"| {cell} " if cell else "| " for cell in cells) + "|"
 
 
-def _range(bound: Range | None, field: Field, unit: str) -> str:
+def range_of(bound: Range | None, field: Field, unit: str) -> str:
     if bound is None:
         return ""
-    least = _number(bound.least, field)
+    least = number(bound.least, field)
     if bound.most is None:
         return f"≥ {least}" if least != "0" else ""
-    most = _number(bound.most, field)
+    most = number(bound.most, field)
     if bound.least == f"-{bound.most}":
         said = f"± {most}"
     elif bound.beyond:
@@ -144,7 +144,7 @@ def _range(bound: Range | None, field: Field, unit: str) -> str:
     return f"{said} {unit}".rstrip() + (" or +infinity" if bound.infinity else " or 0" if bound.zero else "")
 
 
-def _number(text: str, field: Field) -> str:
+def number(text: str, field: Field) -> str:
     """ "1e12" as 10¹², "2^60" as 2⁶⁰, "10000000" as 10 000 000."""
     sign, digits = ("−", text[1:]) if text.startswith("-") else ("", text)
     if found := re.fullmatch(r"(?:(2)\^|1e)(\d+)", digits):

@@ -6,7 +6,7 @@ from __future__ import annotations
 import re
 import textwrap
 
-from model import Field, Member, Message, Part, Wire
+from model import CPP, Field, Member, Message, Part, Wire, constant
 
 WIDTH = 120
 
@@ -18,8 +18,11 @@ class Words:
         self._wire = wire
         self._language = language
         self._absent = absent  # the value of a part that is absent
+        self._scope = "::" if language == CPP else "."
         self._enums = {
-            value.name: f"{enum.name}.{value.short}" for enum in wire.enums.values() for value in enum.values
+            value.name: f"{enum.name}{self._scope}{constant(value.short) if language == CPP else value.short}"
+            for enum in wire.enums.values()
+            for value in enum.values
         }
         self._members = {name: dict(self._paths(message)) for name, message in wire.messages.items()}
 
@@ -36,7 +39,7 @@ class Words:
         def of_other(found: re.Match[str]) -> str:
             other, name = found.groups()
             value = self._wire.messages[other].type_name(self._language) if other in self._wire.messages else other
-            return f"{value}.{self._members.get(other, {}).get(name, name)}"
+            return f"{value}{self._scope}{self._members.get(other, {}).get(name, name)}"
 
         def of_this(found: re.Match[str]) -> str:
             own = self._members[message].get(found[0])
@@ -52,16 +55,15 @@ class Words:
         `absent`. If `absent` is None, the field is always there."""
         said = "" if field.doc == "optional" else self.say(field.doc, field.message)
         if absent is None:
-            said = re.sub(r"(?:^|; |(?<=\.) )(?:absent|None)\b[^;.]*\.?$", "", said, flags=re.IGNORECASE)
+            said = re.sub(r"(?:^|; |(?<=\.) )absent\b[^;.]*\.?$", "", said, flags=re.IGNORECASE)
         else:
-            word = r"([Aa]bsent|None):" if field.is_matrix else r"([Aa]bsent):"
-            value = {"absent": absent, "Absent": capitalized(absent), "None": capitalized(absent)}
-            said = re.sub(rf"\b{word}", lambda found: f"{value[found[1]]}:", said)
+            said = re.sub(r"\babsent(?= if\b)", absent, said)
+            said = re.sub(r"\bAbsent(?= if\b)", capitalized(absent) if len(absent) > 3 else absent, said)
         if field.is_time or not unit or not field.unit:  # a time has its unit in its name
             return said
         if not said:
             return field.unit
-        joint = ". " if said[0].isupper() and not said.startswith(f"{absent}:") else ", "
+        joint = ". " if said[0].isupper() and not said.startswith(f"{absent} if") else ", "
         return f"{field.unit}{joint}{said}"
 
     def of_member(self, member: Member, absent: str | None) -> str:
@@ -74,8 +76,8 @@ class Words:
         """Returns what the absence of the part means."""
         first = part.members[0].field
         assert first is not None
-        found = re.search(r"(?:^|; |(?<=\.) )(?:both )?(?:absent|None): ([^.]*)", self.say(first.doc, first.message))
-        return f"{self._absent}: {found[1]}" if found else ""
+        found = re.search(r"\babsent if [^.]*", self.say(first.doc, first.message), re.IGNORECASE)
+        return f"{self._absent}{found[0][len('absent') :]}" if found else ""
 
     def of_message(self, message: Message) -> str:
         doc = self.say(message.doc, message.name)

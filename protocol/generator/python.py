@@ -101,7 +101,7 @@ class _Values:
         self._lines: list[str] = []
 
     def text(self) -> str:
-        quat = self._words.of_message(self._wire.messages["Quat"]).replace("quaternion,", "quaternion (w, x, y, z),")
+        quat = self._words.of_message(self._wire.messages["Quat"]).replace("quaternion", "quaternion (w, x, y, z)", 1)
         self._lines += [
             *("", "from collections.abc import Sequence", "from dataclasses import dataclass"),
             *("from enum import IntEnum", "from math import inf", "from typing import Union", ""),

@@ -20,12 +20,6 @@
 
 namespace tendon {
 
-/// Returns true if the state can be sent in columns, without optional fields for forces, rotation, gripper or joints.
-inline bool fits_columns(const DeviceState& state) noexcept {
-  return !state.force_wanted && !state.stiffness_wanted && !state.turning && !state.torque_applied && !state.grip &&
-         !state.grip_applied && !state.hand_force && !state.joints;
-}
-
 /// Rounds all values except the position to single precision, as in columns.
 void round_to_columns(DeviceState& state) noexcept;
 

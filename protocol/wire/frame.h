@@ -3,7 +3,6 @@
 
 #include <cstdint>
 #include <optional>
-#include <string>
 #include <string_view>
 #include <variant>
 
@@ -27,18 +26,6 @@ struct Control {
   std::uint32_t id = 0;
   std::optional<Request> request{};  ///< empty if unknown or invalid
   std::string_view invalid{};        ///< field that is out of bounds (static storage)
-};
-struct ControlAck {
-  std::uint32_t id = 0;
-  Code code = Code::kOk;
-  std::string detail;
-  Duration wait{};                            ///< for kBusy to a TakeLease; 0 = unknown
-  std::optional<DeviceDescription> device{};  ///< for kOk to a Describe
-  std::optional<HandleDescription> handle{};  ///< for kOk to a Describe with `handle`
-};
-struct Bye {
-  Code code = Code::kOk;
-  std::string reason;
 };
 
 using Frame =

@@ -6,7 +6,6 @@
 #include <cstdint>
 #include <optional>
 #include <span>
-#include <variant>
 #include <vector>
 
 #include "protocol/link.h"
@@ -51,8 +50,6 @@ std::size_t encode(const AnswerDatagram& answer, std::span<std::byte, kMaxDatagr
 std::optional<HelloDatagram> decode_hello(std::span<const std::byte> datagram) noexcept;
 std::optional<RetryDatagram> decode_retry(std::span<const std::byte> datagram) noexcept;
 std::optional<AnswerDatagram> decode_answer(std::span<const std::byte> datagram) noexcept;
-
-using Answer = std::variant<Welcome, Refused>;
 
 std::vector<std::byte> write_body(const Hello& hello);
 std::vector<std::byte> write_body(const Answer& answer);

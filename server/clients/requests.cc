@@ -256,16 +256,16 @@ constexpr Row row(std::string_view name) {
 constexpr std::array kRequests = {
     row<SetStateRate, From::kAnybody, set_state_rate>("set the state rate"),
     row<Rearm, From::kControllers, rearm>("rearm"),
-    row<Disarm, From::kControllers, disarm>("disarm"),
     row<Describe, From::kAnybody, describe>("describe a device"),
     row<TakeLease, From::kClaimants, take_lease>("take a lease"),
     row<GiveLease, From::kClaimants, give_lease>("give a lease"),
     row<LeaseLost, From::kAnybody, lease_lost>("lose a lease"),
     row<SetStateDeadband, From::kAnybody, set_state_deadband>("set the state deadband"),
+    row<Disarm, From::kControllers, disarm>("disarm"),
+    row<SetOutput, From::kControllers, set_output>("set an output"),
     row<Couple, From::kClaimants, couple>("couple a device"),
     row<Engage, From::kControllers, engage>("engage a coupling"),
     row<Disengage, From::kControllers, disengage>("disengage a coupling"),
-    row<SetOutput, From::kControllers, set_output>("set an output"),
     row<SetScale, From::kControllers, set_scale>("set the scales of a coupling"),
     row<SetShare, From::kControllers, set_share>("set the share of a leader"),
 };

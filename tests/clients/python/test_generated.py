@@ -94,7 +94,7 @@ def test_a_new_field_needs_no_other_file(tmp_path):
     text = model.PROTO.read_text(encoding="utf-8")
     for message, field in (
         ("DeviceState", "double grip_energy_j = 99;  // [-1e3, 1e3]: of the gripper"),
-        ("ForceCommand", "Vec3 bias_n = 99;  // absent: none"),
+        ("ForceCommand", "Vec3 bias_n = 99;  // absent if there is none"),
         ("SetShare", "uint32 ramp_ms = 99;  // [0, 5000]"),
         ("LinkReport", "repeated string hints = 99;  // [0, 4] entries of [0, 24] bytes"),
     ):
@@ -105,7 +105,7 @@ def test_a_new_field_needs_no_other_file(tmp_path):
     made = files.made(model.load(proto))
     values, codec = (made[f"clients/python/tendon/{name}"] for name in ("generated.py", "codec/generated.py"))
     assert "    grip_energy: float = 0.0  # J, of the gripper\n" in values
-    assert "    bias: Vec3 | None = None  # N, None: none\n" in values
+    assert "    bias: Vec3 | None = None  # N, None if there is none\n" in values
     assert "    ramp_ms: int = 0\n" in values
     assert "    hints: Sequence[str] = ()\n" in values
     assert "    if not -1e3 <= grip_energy_j <= 1e3:\n" in codec
@@ -113,7 +113,7 @@ def test_a_new_field_needs_no_other_file(tmp_path):
     assert '    hints = read_texts("hints", m.hints, 0, 4, 24)\n' in codec
     table = made["protocol/WIRE.md"]
     assert "| 99 | `grip_energy_j` | double | of the gripper | ± 10³ J |\n" in table
-    assert "| 99 | `bias_n` | `Vec3` | absent: none | ± 10¹² N each |\n" in table
+    assert "| 99 | `bias_n` | `Vec3` | absent if there is none | ± 10¹² N each |\n" in table
     assert "| 99 | `ramp_ms` | uint32 | | 0 … 5000 ms |\n" in table
     assert "| 99 | `hints` | repeated string | | ≤ 4 entries, each ≤ 24 bytes |\n" in table
     values, codec = (made[f"clients/typescript/src/gen/{name}.ts"] for name in ("messages", "codec"))
@@ -124,6 +124,12 @@ def test_a_new_field_needs_no_other_file(tmp_path):
     assert "    hints: clipAll(value.hints ?? [], 4, 24),\n" in codec
     if shutil.which("clang-format") is not None:
         frames, requests = (made[f"protocol/wire/generated/{name}_fields.h"] for name in ("frame", "request"))
+        values = made["protocol/wire/generated/messages.h"]
+        assert "  double grip_energy = 0;  ///< J, ± 10³: of the gripper\n" in values
+        assert "  std::optional<Vec3> bias{};  ///< N, empty if there is none\n" in values
+        assert "  Duration ramp{};" in values
+        assert "  std::vector<std::string> hints{};" in values
+        assert "state.grip_energy == 0;\n" in values
         assert '  way.number(field<99>, "grip_energy_j", state.grip_energy, Within{-1e3, 1e3});\n' in frames
         assert '  way.maybe(field<99>, "bias_n", command.bias);\n' in frames
         assert '  way.texts(field<99>, "hints", report.hints, Entries{0, 4}, 24);\n' in frames

@@ -10,7 +10,7 @@ export { ChannelRule, Code, CouplingMethod, Hand, Mode, PortPhase, PortRole, Rol
 /** The kind of an output. */
 export enum OutputKind {
   LAMP = 1,
-  /** A separate vibrator, not the motors of the axes */
+  /** A separate vibrator that is not one of the motors of the axes */
   VIBRATION = 2,
 }
 
@@ -19,14 +19,15 @@ export enum OutputKind {
  * echo and T4 = the time at which that datagram arrives, the round trip is (T4 − T1) − (T3 − T2).
  */
 export interface Echo {
-  /** T1, txTimeNs of that datagram, on the peer's clock */
+  /** T1: the txTimeNs of that datagram, on the clock of the peer */
   readonly sent: Nanoseconds;
-  /** T2, when that datagram arrived, on the clock of the sender of the echo; T2 ≤ T3 */
+  /** T2: the time at which that datagram arrived, on the clock of the sender of the echo; T2 ≤ T3 */
   readonly received: Nanoseconds;
   /** Packet number of that datagram */
   readonly packetNumber: bigint;
   /**
-   * Bit i: packet (packetNumber − 1 − i) has arrived too. A malformed packet counts as arrived in suites 1 and 2 only
+   * Bit i is set if the packet packetNumber − 1 − i has also arrived. Malformed packets only count as arrived in suites
+   * 1 and 2
    */
   readonly receivedMask: number;
 }
@@ -34,27 +35,27 @@ export interface Echo {
 /** How the handle is turned. */
 export interface Turning {
   /**
-   * Rotation from the handle frame to the device base frame. In the handle frame, when the handle is in its middle
-   * position, the stylus or finger points along −z, y is up, and x is to the right
+   * The rotation from the handle frame to the device base frame. If the handle is in its middle position, the stylus or
+   * finger points along the −z axis of the handle frame, y is up, and x is to the right.
    */
   readonly orientation: Quat;
-  /** rad/s, angular velocity in base frame axes; ignored without an orientation */
+  /** rad/s. The angular velocity in the axes of the base frame. It is ignored if there is no orientation */
   readonly angularVelocity: Vec3;
 }
 
 /** How far the gripper of the handle is open. */
 export interface Grip {
-  /** rad, opening of the gripper, 0 when it is closed */
+  /** rad. The opening of the gripper, which is 0 if it is closed. */
   readonly opening: number;
-  /** rad/s, velocity of the opening; ignored without grip.opening */
+  /** rad/s. The velocity of the opening. It is ignored if there is no grip.opening */
   readonly velocity: number;
 }
 
 /** The joints that carry the handle, in the order of HandleDescription.joints. */
 export interface Joints {
-  /** rad, angles of the joints that carry the handle, in the order of HandleDescription.joints. */
+  /** rad. The angles of the joints that carry the handle, in the order of HandleDescription.joints. */
   readonly angles: readonly number[];
-  /** rad/s, velocities of the same joints; a missing entry is 0, and an entry without an angle is ignored */
+  /** rad/s. The velocities of these joints. Missing entries are 0, and entries without an angle are ignored */
   readonly velocities: readonly number[];
 }
 
@@ -62,98 +63,104 @@ export interface Joints {
 export interface DeviceState {
   /** Number of the haptic step */
   readonly tick: bigint;
-  /** When the position was sampled, on the server's clock */
+  /** The time at which the position was sampled, on the clock of the server */
   readonly sampledNs: Nanoseconds;
   /** m */
   readonly position: Vec3;
   /** m/s */
   readonly velocity: Vec3;
-  /** N, actual force on the hand, from this step on */
+  /** N, the actual force on the hand from this step on */
   readonly forceApplied: Vec3;
-  /** J, energy that the device may still give out (the energy ledger) */
+  /** J, the energy that the device may still output, according to the energy ledger */
   readonly energy: number;
-  /** N, the limiter's bound on the norm of the force; +infinity if there is none */
+  /** N. The limiter's bound on the norm of the force, or +infinity if there is none */
   readonly permittedForce: number;
-  /** Why the actual force differs from the requested one (bits of core/base/reason.h) */
+  /** The reasons why the actual force differs from the requested one (bits of core/base/reason.h) */
   readonly reasons: number;
-  /** Sequence of the ForceCommand that is rendered; 0 if there is none */
+  /** The sequence of the ForceCommand that is rendered, or 0 */
   readonly forceSequence: bigint;
-  /** Time since that ForceCommand arrived */
+  /** The time since this ForceCommand has arrived */
   readonly forceAgeNs: Nanoseconds;
   readonly mode: Mode;
   readonly device: number;
   /**
-   * Channel of the force that forceSequence, forceAgeNs and mode describe: the freshest one, or the one with the lowest
-   * channel if several are equally fresh
+   * The channel of the force that is described by forceSequence, forceAgeNs and mode. This is the freshest one. If
+   * several are equally fresh, it is the one with the lowest number
    */
   readonly channel: number;
   // With the feature "diagnostics" only:
   /**
-   * N, force on the hand that the engines request at this step (held, faded, or extrapolated by their models), before
-   * any limit; absent: not reported
+   * N. The force on the hand that is requested by the engines at this step, before it is limited. It may be held,
+   * faded, or extrapolated using their models. Absent if it is not reported
    */
   readonly forceWanted?: Vec3 | undefined;
   // With the feature "diagnostics" only:
   /**
-   * N/m, −∂forceWanted/∂position of the engines' models at this step; entries as in LocalModel.stiffness. Absent: no
-   * model
+   * N/m, −∂forceWanted/∂position according to the models of the engines at this step, with the entries of
+   * LocalModel.stiffness. Absent if there is no model
    */
   readonly stiffnessWanted?: Stiffness | undefined;
-  /** Bit i: button i is held. A press between two states is reported in the later one */
+  /** Bit i is set if button i is pressed, or if it was pressed since the previous state */
   readonly buttons: number;
-  /** Absent: not measured */
+  /** Absent if it is not measured */
   readonly turning?: Turning | undefined;
   /**
-   * N·m, actual torque on the hand about position, in base frame axes, from this step on; absent: no motors that turn
+   * N·m. The actual torque on the hand about position from this step on, in the axes of the base frame. Absent if the
+   * device cannot exert torques
    */
   readonly torqueApplied?: Vec3 | undefined;
-  /** Absent: no gripper */
+  /** Absent if there is no gripper */
   readonly grip?: Grip | undefined;
-  /** N, actual force on the fingers, > 0 opens them, from this step on; absent: the gripper has no motor */
+  /**
+   * N. The actual force on the fingers from this step on. Positive values open them. Absent if the gripper has no motor
+   */
   readonly gripApplied?: number | undefined;
-  /** N, of the hand ON THE HANDLE, measured by a force sensor; absent: no force sensor */
+  /** N. The force of the hand ON THE HANDLE, as measured by a force sensor. Absent if there is no force sensor */
   readonly handForce?: Vec3 | undefined;
-  /** Absent: the device reports none */
+  /** Absent if the device does not report joints */
   readonly joints?: Joints | undefined;
 }
 
 /** On the hand, base frame axes, about the handle's position. */
 export interface Torque {
-  /** N·m, torque on the hand about the handle's position, in base frame axes */
+  /** N·m. The torque on the hand about the position of the handle, in the axes of the base frame. */
   readonly torque: Vec3;
-  /** How the torque changes as the handle turns. It does not need a `model`, and an absent torque.torque is 0 in it */
+  /**
+   * The change of the torque when the handle turns. It does not require a `model`, and torque.torque is 0 if it is
+   * missing
+   */
   readonly model?: RotationModel | undefined;
 }
 
 /**
- * The force that a physics engine requests, as the answer to one state. Client → server, unreliable; for each device
+ * The force that is requested by a physics engine in response to a state. Client → server, unreliable; for each device
  * and channel the highest sequence wins.
  */
 export interface ForceCommand {
   /** 1, 2, 3 … per session, device and channel */
   readonly sequence: bigint;
-  /** DeviceState.tick of the state that the force was computed from */
+  /** The DeviceState.tick of the state that was used for computing the force */
   readonly basedOnTick: bigint;
-  /** N, force on the hand: a wall that resists motion along +x sends −x */
+  /** N. The force on the hand. A wall that resists motion along +x sends −x */
   readonly force: Vec3;
-  /** How the force changes as the hand moves; absent: the force is constant */
+  /** The change of the force when the hand moves. Absent if the force is constant */
   readonly model?: LocalModel | undefined;
-  /** Time from its arrival during which the force is fresh */
+  /** The time after its arrival during which the force is fresh */
   readonly validForUs: number;
   readonly device: number;
   readonly channel: number;
-  /** The body has been cut or torn since the previous answer: neither this model nor the previous one is used */
+  /** If true, the body was cut or torn since the previous answer, so neither this model nor the previous one is used */
   readonly topologyChanged?: boolean | undefined;
-  /** N, the engine's estimate of the error of force; absent: not known */
+  /** N. The error of force, as estimated by the engine. Absent if it is unknown */
   readonly error?: number | undefined;
-  /** Absent: none is requested */
+  /** Absent if no torque is requested */
   readonly torque?: Torque | undefined;
-  /** N, force on the fingers, > 0 opens them; absent: none is requested */
+  /** N. The force on the fingers. Positive values open them. Absent if no force is requested */
   readonly gripForce?: number | undefined;
   // With the feature "ways" only:
   /**
-   * Index, from 1, in Hello.ways: the way in which the engine computed this force; 0 if it is not stated. A server
-   * treats an index beyond the last entry as 0
+   * The way in which the engine has computed this force, as an index in Hello.ways that starts at 1, or 0 if it is
+   * unknown. Servers treat an index that is larger than the number of ways as 0
    */
   readonly way?: number | undefined;
 }
@@ -164,9 +171,9 @@ export interface ForceCommand {
  * τ(q) = torque − 2 (w K v + v × K v)        which is torque − K θ for a small rotation vector θ
  */
 export interface RotationModel {
-  /** Orientation that torque was computed for; absent is refused */
+  /** The orientation for which torque was computed; absent is refused */
   readonly at: Quat;
-  /** N·m/rad, −∂τ/∂θ in base frame axes; a spring is positive; entries as in LocalModel.stiffness */
+  /** N·m/rad, −∂τ/∂θ in the axes of the base frame, with the entries of LocalModel.stiffness. Springs are positive */
   readonly stiffness: Stiffness;
 }
 
@@ -177,46 +184,48 @@ export interface RotationModel {
  * equation.
  */
 export interface LocalModel {
-  /** M, position that force was computed for */
+  /** m, the position for which force was computed */
   readonly at: Vec3;
   /**
-   * N/m, −∂F/∂x; a spring is positive. 1 entry k is k·I, 3 are the diagonal, 9 are the matrix row by row. An engine
-   * that does not know the stiffness sends a single 0
+   * N/m, −∂F/∂x. Springs are positive. A single entry k is k·I, three entries are the diagonal, and nine entries are
+   * the matrix row by row. Engines that do not know the stiffness send a single 0
    */
   readonly stiffness: Stiffness;
-  /** M, radius around at in which the model is valid; absent: not known */
+  /** m. The distance from at up to which the model is valid. Absent if it is unknown */
   readonly validRadius?: number | undefined;
-  /** Surface that the tool touches or is about to touch */
+  /** The surface that is touched by the tool or is about to be touched */
   readonly contact?: Contact | undefined;
 }
 
-/** A surface that the tool touches or is about to touch. It pushes and does not pull, unless it has a table. */
+/**
+ * A surface that is touched by the tool or is about to be touched. It can push but not pull, unless there is a table.
+ */
 export interface Contact {
-  /** Direction out of the body, towards the hand: a force along +normal pushes the hand away */
+  /** The direction from the body to the hand, which is pushed away by a force along +normal */
   readonly normal: Vec3;
-  /** M, distance from the surface to the tool along the normal, negative if the tool is pressed in */
+  /** m. The distance from the surface to the tool along the normal. It is negative if the tool is inside of the body */
   readonly gap: number;
-  /** Forces along the normal at other depths */
+  /** The forces along the normal if the tool is at other depths */
   readonly table?: ForceTable | undefined;
 }
 
 /** Forces along the normal. Entry i is for the tool at at − (first + i · step) · normal. */
 export interface ForceTable {
-  /** M, depth of entry 0, negative if it is farther out than at */
+  /** m. The depth of entry 0. It is negative if the tool is farther out than at */
   readonly first: number;
   /** m */
   readonly step: number;
-  /** N, forces along +normal */
+  /** N, the forces along +normal */
   readonly force: readonly number[];
 }
 
 /**
- * Sets how many states of a device the client is sent per second. Before the first such request it is sent every state,
- * loopHz per second. After it, the client is sent every k-th state, where k = loopHz / hz, rounded, at least 1: with
- * loopHz 1000, 300 Hz become 333 and 2000 Hz become 1000.
+ * Sets the number of states of a device that are sent to the client per second. Before the first request of this type,
+ * all loopHz states per second are sent. After it, every k-th state is sent, where k = loopHz / hz is rounded and at
+ * least 1. For example, if loopHz is 1000, 300 Hz becomes 333 Hz and 2000 Hz becomes 1000 Hz.
  */
 export interface SetStateRate {
-  /** At least 1; 0 is answered with Code.INVALID */
+  /** If it is 0, the answer is Code.INVALID */
   readonly hz: number;
   readonly device: number;
 }
@@ -227,115 +236,121 @@ export interface SetStateRate {
  * maxSilenceUs newer. Between two states the client extrapolates: x + v · (t − sampledNs).
  */
 export interface StateDeadband {
-  /** Fraction of the speed (Weber fraction); answered Code.INVALID beyond 0 … 0.5 */
+  /** The fraction of the speed (Weber fraction). If it is not in 0 … 0.5, the answer is Code.INVALID */
   readonly share: number;
-  /** m/s, smallest difference of the velocity; answered Code.INVALID beyond 0 … 0.1 */
+  /** m/s. The smallest difference of the velocity. If it is not in 0 … 0.1, the answer is Code.INVALID */
   readonly floor: number;
-  /** Longest time without a state; 0: every state is sent again. Answered Code.INVALID beyond 0 and 1000 … 20 000 */
+  /**
+   * The maximum time without a state. If it is 0, every state is sent again. If it is not 0 or in 1000 … 20 000, the
+   * answer is Code.INVALID
+   */
   readonly maxSilenceUs: number;
 }
 
 /**
- * Clears a latched fault and revokes a Disarm; only from a controller of the device. If the device has a safety layer,
- * this is the operator's request to arm.
+ * Clears a latched fault and revokes a Disarm. Can only be used by controllers of the device. If the device has a
+ * safety layer, this is a request of the operator to arm it.
  */
 export interface Rearm {
   readonly device: number;
 }
 
 /**
- * Sets the force to zero from the next haptic step on, without a ramp, until a Rearm; only from a controller of the
- * device, whether or not it holds the channel. A new force, a new session or the dead man's button alone does not end
- * it. The device's Safety changes from armed to homed, and a pending request to arm is withdrawn. Disarm is not a fault
- * and clears no fault. Repeating it has no effect. Code.OK: the device's loop receives the order before its next step.
+ * Sets the force to zero without a ramp, from the next haptic step until a Rearm. Can be used by any controller of the
+ * device, even if it does not hold the channel. This state does not end if there is a new force or a new session, or if
+ * only the dead man's button is pressed. The Safety of the device changes from armed to homed, and pending requests to
+ * arm it are withdrawn. A Disarm is not a fault and does not clear faults. If it is repeated, it has no effect. If the
+ * answer is Code.OK, the loop of the device will receive the order before its next step.
  */
 export interface Disarm {
   readonly device: number;
 }
 
 /**
- * Offers the sender's device as the other end of a coupling with this device, and describes that end; only from the
- * client that has claimed the channel as a controller, with the feature "teleoperation". Code.OK: the two ends fit;
- * both peers then send PortState frames, and the server sends no states. Code.INVALID: they do not fit, and the detail
- * names the first difference. Code.UNSUPPORTED: that device cannot be coupled. Code.BUSY: that channel is coupled with
- * another client; a follower has one channel for each of its leaders.
+ * Offers the sender's device as the other end of a coupling with this device, and describes that end. Can only be used
+ * by a client that has claimed the channel as a controller, and requires the feature "teleoperation". If the two ends
+ * match, the answer is Code.OK. After that, both peers send PortState frames, and the server does not send states.
+ * Code.INVALID means that the ends do not match, and the detail contains the first difference. Code.UNSUPPORTED means
+ * that this device cannot be coupled. Code.BUSY means that the channel is coupled with another client. A follower has
+ * one channel for each of its leaders.
  */
 export interface Couple {
-  /** Device of the server */
+  /** The device of the server */
   readonly device: number;
-  /** Channel of the server */
+  /** The channel of the server */
   readonly channel: number;
-  /** Role of the sender; the server's device has the other role */
+  /** The role of the sender. The device of the server has the other role */
   readonly role: PortRole;
   readonly method: CouplingMethod;
   /** The follower's motion divided by the leader's */
   readonly positionScale: number;
   /** The leader's force divided by the follower's */
   readonly forceScale: number;
-  /** Turns the leader's base frame into the follower's; absent is refused */
+  /** The rotation from the base frame of the leader to that of the follower; absent is refused */
   readonly rotation: Quat;
-  /** Bits 1, 2, 4: x, y, z of the leader's frame are coupled */
+  /** Bits 1, 2 and 4 are set if x, y and z of the leader's frame are coupled */
   readonly axes: number;
-  /** N/m, stiffness between the handles, as felt by the leader */
+  /** N/m, the stiffness between the handles, as felt by the leader */
   readonly stiffness: number;
-  /** N·s/m, damping between the handles, as felt by the leader */
+  /** N·s/m, the damping between the handles, as felt by the leader */
   readonly mutualDamping: number;
-  /** N·s/m, damping of each handle, as felt by the leader */
+  /** N·s/m, the damping of each handle, as felt by the leader */
   readonly damping: number;
-  /** The stiffness decreases as the round trip increases */
+  /** If true, the stiffness decreases when the round trip increases */
   readonly adaptToDelay: boolean;
-  /** The ends exchange energy (core/teleoperation/energy_tank.h) */
+  /** If true, the ends exchange energy (core/teleoperation/energy_tank.h) */
   readonly purse: boolean;
-  /** Time between two PortState frames of the sender */
+  /** The period in which the sender sends PortState frames */
   readonly periodUs: number;
-  /** Positions map to positions: the offsets are zero, and the ends align before they engage */
+  /** If true, positions map to positions. The offsets are zero, and the ends are aligned before they are engaged */
   readonly absolute?: boolean | undefined;
   // As felt by the leader. With a stiffness of 0 the part is not coupled:
-  /** N·m/rad, stiffness between the orientations */
+  /** N·m/rad, the stiffness between the orientations */
   readonly turnStiffness?: number | undefined;
-  /** N·m·s/rad, damping between the orientations */
+  /** N·m·s/rad, the damping between the orientations */
   readonly turnDamping?: number | undefined;
-  /** N/m, stiffness between the grippers, at the leader's fingers */
+  /** N/m, the stiffness between the grippers at the fingers of the leader */
   readonly gripStiffness?: number | undefined;
-  /** N·s/m, damping between the grippers */
+  /** N·s/m, the damping between the grippers */
   readonly gripDamping?: number | undefined;
   // For one method only:
-  /** 1/s. CouplingMethod.PASSIVITY: rate at which the follower corrects its drift */
+  /** 1/s. The rate at which the follower corrects its drift, for CouplingMethod.PASSIVITY */
   readonly driftRate?: number | undefined;
-  /** CouplingMethod.RATE; absent with the other methods */
+  /** The parameters of CouplingMethod.RATE, which are absent for other methods */
   readonly rate?: RateControl | undefined;
 }
 
 /**
- * How the displacement of the leader's handle, which a spring pulls back to its center, commands the speed of the
- * follower. All values are in the leader's scale.
+ * Describes how the displacement of the leader's handle sets the speed of the follower. A spring pulls the handle to
+ * its center. All values are in the scale of the leader.
  */
 export interface RateControl {
-  /** M, distance of the leader from its center within which the follower stands still */
+  /** m. If the leader is closer to its center than this distance, the follower does not move */
   readonly deadZone: number;
-  /** 1/s, speed of the follower per meter beyond the dead zone */
+  /** 1/s, the speed of the follower per meter of displacement beyond the dead zone */
   readonly gain: number;
-  /** m/s, maximum speed of the follower */
+  /** m/s, the maximum speed of the follower */
   readonly maxSpeed: number;
 }
 
 /**
- * Couples the handles, on the operator's command. Only the leader's server accepts it, from a controller of the device.
- * Code.OK: the device's loop has the order. Code.UNSUPPORTED: that device has no coupling, or is the follower.
+ * Engages the coupling on the command of the operator. Can only be used by controllers of the leader's device, at its
+ * server. If the answer is Code.OK, the loop of the device has received the order. Code.UNSUPPORTED means that the
+ * device is not coupled, or that it is the follower.
  */
 export interface Engage {
   readonly device: number;
 }
 
-/** Ends the engagement. Either end's server accepts it, only from a controller of the device. */
+/** Ends the engagement. Can be used at the server of either end, but only by controllers of its device. */
 export interface Disengage {
   readonly device: number;
 }
 
 /**
- * Sets the scales of the coupling. Only the leader's server accepts it, from a controller of the device. Code.OK: the
- * device's loop has the order. Code.BUSY: the leader is engaged and does not hold its clutch. Code.UNSUPPORTED: that
- * device has no coupling, or is the follower.
+ * Sets the scales of the coupling. Can only be used by controllers of the leader's device, at its server. If the answer
+ * is Code.OK, the loop of the device has received the order. Code.BUSY means that the leader is engaged and its clutch
+ * is not held. Code.UNSUPPORTED means that the device is not coupled, or that it is the follower.
  */
 export interface SetScale {
   readonly device: number;
@@ -346,9 +361,10 @@ export interface SetScale {
 }
 
 /**
- * Sets the weight of one channel's leader among the leaders of a follower. Only the follower's server accepts it, from
- * a controller of the device. The weight reaches the value within 0.5 s; the other leaders share the rest in the same
- * proportion as before. Code.UNSUPPORTED: that device has no coupling, has one leader only, or is a leader.
+ * Sets the weight of the leader of one channel if a follower has several leaders. Can only be used by controllers of
+ * the follower's device, at its server. The weight reaches the value within 0.5 s, and the ratios of the other weights
+ * do not change. Code.UNSUPPORTED means that the device is not coupled, that it only has one leader, or that it is a
+ * leader.
  */
 export interface SetShare {
   readonly device: number;
@@ -358,44 +374,44 @@ export interface SetShare {
 
 /** The colour of a lamp. */
 export interface LampColour {
-  /** Color of a lamp, 0xRRGGBB; 0 is off: the lamp then shows the state of the device */
+  /** The color of a lamp as 0xRRGGBB. If it is 0, the lamp shows the state of the device */
   readonly rgb: number;
 }
 
 /**
- * Sets a lamp of the device or starts a vibration pulse; only from a controller of the device that holds one of its
- * channels, with the feature "outputs". An output is switched off when the client that set it gives up or loses a
- * channel of the device, and when the device is disarmed. Code.INVALID: the device has no such output, or it is of the
- * other kind, or neither `rgb` nor `vibration` is there.
+ * Sets a lamp of the device or starts a vibration pulse. Can only be used by a controller that holds one of the
+ * channels of the device, and requires the feature "outputs". An output is turned off if the client that has set it
+ * gives up or loses a channel of the device, or if the device is disarmed. Code.INVALID means that the device does not
+ * have this output, that the output is of the other kind, or that both `rgb` and `vibration` are missing.
  */
 export interface SetOutput {
   readonly device: number;
-  /** Number in HandleDescription.outputs; answered Code.INVALID beyond the device's last */
+  /** The index in HandleDescription.outputs. If the device does not have this output, the answer is Code.INVALID */
   readonly output: number;
   readonly setting: LampColour | Vibration;
 }
 
-/** A vibration pulse. It stops after its duration, or when a new pulse replaces it. */
+/** A vibration pulse. It stops after its duration, or if it is replaced by a new pulse. */
 export interface Vibration {
-  /** Fraction of the output's maximum; 0 is off */
+  /** The fraction of the maximum of the output. If it is 0, the output is turned off */
   readonly amplitude: number;
-  /** Hz, 0 or at least 20; 0 is the output's own frequency */
+  /** Hz, either 0 or at least 20. If it is 0, the frequency is chosen by the output */
   readonly frequency: number;
   readonly durationMs: number;
 }
 
-/** Requests the DeviceDescription of a device, whether the client has claimed the device or not. */
+/** Requests the DeviceDescription of a device, which does not need to be claimed. */
 export interface Describe {
-  /** Answered Code.INVALID beyond the server's last device */
+  /** If the server does not have this device, the answer is Code.INVALID */
   readonly device: number;
-  /** With the feature "handle" only: requests the HandleDescription instead */
+  /** If true, the HandleDescription is requested instead. This requires the feature "handle" */
   readonly handle?: boolean | undefined;
 }
 
 /**
- * Asks that the channel take the client's forces; only from a client that has claimed the channel as a controller.
- * Code.OK: the client holds the lease. Code.BUSY: another client does, and waitMs is the time until that lease ends
- * unless it is renewed.
+ * Requests the lease of a channel. Can only be used by a client that has claimed the channel as a controller. If the
+ * answer is Code.OK, the client holds the lease and its forces are used. If another client holds the lease, the answer
+ * is Code.BUSY, and waitMs is the time until the lease ends if it is not renewed.
  */
 export interface TakeLease {
   readonly device: number;
@@ -408,82 +424,88 @@ export interface GiveLease {
   readonly channel: number;
 }
 
-/** Tells a client with the feature "channels" that the channel now takes the forces of another client. */
+/** Notifies a client with the feature "channels" that the lease of the channel was taken by another client. */
 export interface LeaseLost {
   readonly device: number;
   readonly channel: number;
-  /** Name of the new lease holder */
+  /** The name of the new holder */
   readonly to: string;
 }
 
 /** The answer to a Control. */
 export interface ControlAck {
-  /** Id of the answered Control */
+  /** The id of the Control that is answered */
   readonly id: number;
   readonly code: Code;
   /** Explanation for people */
   readonly detail: string;
-  /** With Code.BUSY of TakeLease: time until the lease ends, unless its holder renews it; 0 if it is not known */
+  /**
+   * If the answer to TakeLease is Code.BUSY, this is the time until the lease ends if it is not renewed, or 0 if it is
+   * unknown
+   */
   readonly waitMs?: number | undefined;
-  /** With Code.OK of Describe */
+  /** The answer to a Describe with Code.OK */
   readonly device?: DeviceDescription | undefined;
-  /** With Code.OK of Describe, if it requested the handle */
+  /** The answer to a Describe with Code.OK if `handle` was set */
   readonly handle?: HandleDescription | undefined;
 }
 
 /** The properties of a device. */
 export interface DeviceDescription {
   readonly device: number;
-  /** The server's name for the device, which a claim uses */
+  /** The name of the device, which can be used in a claim */
   readonly name: string;
-  /** The kind of device, as Welcome.deviceName */
+  /** The kind of device, as in Welcome.deviceName */
   readonly model: string;
-  /** Number of measured axes */
+  /** The number of axes that are measured */
   readonly positionDof: number;
-  /** Number of axes with a motor */
+  /** The number of axes that have a motor */
   readonly forceDof: number;
-  /** Absent: not known */
+  /** Absent if the workspace is unknown */
   readonly workspace: { readonly min: Vec3; readonly max: Vec3 } | undefined;
-  /** N, norm of the peak force; 0 if it is not known */
+  /** N, the maximum norm of the force, or 0 if it is unknown */
   readonly maxForce: number;
-  /** N, norm of the force for any length of time; 0 if it is not known */
+  /** N. The maximum norm of the force that has no time limit, or 0 if it is unknown */
   readonly continuousForce: number;
-  /** N/m, largest stiffness that the device renders stably; 0 if it is not known */
+  /** N/m, the maximum stiffness that is rendered stably, or 0 if it is unknown */
   readonly maxStiffness: number;
-  /** M, one encoder count at the handle; 0 if the position is exact */
+  /** m. The size of an encoder count at the handle, or 0 if the position is exact */
   readonly positionResolution: number;
   /** Haptic steps per second */
   readonly loopHz: number;
-  /** Channels of the device, by number */
+  /** The channels of the device, in the order of their numbers */
   readonly channels: readonly ChannelDescription[];
 }
 
-/** The properties of a device's handle, with the feature "handle" only. */
+/** The properties of the handle of a device. Requires the feature "handle". */
 export interface HandleDescription {
   readonly device: number;
   /**
-   * Rotation from the device base frame to the operator's frame: x to the right, y up, z towards the user; absent: not
-   * known
+   * The rotation from the base frame of the device to the frame of the operator, where x is to the right, y is up, and
+   * z is towards the user. Absent if it is unknown
    */
   readonly operatorFromDevice?: Quat | undefined;
-  /** Names by bit of DeviceState.buttons; a name may be empty */
+  /** The name for each bit of DeviceState.buttons. Names can be empty */
   readonly buttons: readonly string[];
-  /** True if every state has an orientation, false if none has */
+  /** If true, all states contain an orientation. Otherwise, none of them do */
   readonly orientationMeasured: boolean;
-  /** N·m, norm of the torque that the device can exert; 0 if it has no such motors */
+  /** N·m, the maximum norm of the torque, or 0 if the device cannot exert torques */
   readonly maxTorque: number;
-  /** rad, opening of the open gripper; absent: no gripper */
+  /** rad. The opening of the gripper if it is open. Absent if there is no gripper */
   readonly gripperOpen?: number | undefined;
-  /** N, force on the fingers; 0 if the gripper has no motor */
+  /** N, the maximum force on the fingers, or 0 if the gripper has no motor */
   readonly maxGripperForce: number;
-  /** Name that the devices of one body share (two arms, five fingers); empty if the device is by itself */
+  /**
+   * The name of a group of devices that belong together, such as two arms or five fingers. It is empty if the device is
+   * not part of a group
+   */
   readonly group: string;
   readonly hand: Hand;
   // With the feature "joints" only:
-  /** Names of the joints, in the order of DeviceState.joints.angles */
+  /** The names of the joints, in the order of DeviceState.joints.angles */
   readonly joints?: readonly string[] | undefined;
   // With the feature "outputs" only:
-  /** Outputs that SetOutput can set, by number */
+  /** The outputs that can be set using SetOutput, in the order of their numbers */
   readonly outputs?: readonly OutputDescription[] | undefined;
 }
 
@@ -493,14 +515,17 @@ export interface OutputDescription {
   readonly kind: OutputKind;
 }
 
-/** A channel of a device and its lease. */
+/** The properties of a channel. */
 export interface ChannelDescription {
-  /** The name that a claim uses */
+  /** The name that is used in a claim */
   readonly name: string;
   readonly rule: ChannelRule;
-  /** Time without a force after which another client may take the lease; 0 if the lease does not expire */
+  /**
+   * If the holder does not send a force for this time, another client can take the lease. It is 0 if the lease does not
+   * expire
+   */
   readonly leaseMs: number;
-  /** First 24 bytes of the lease holder's name; empty if there is none */
+  /** The first 24 bytes of the name of the holder. It is empty if there is no holder */
   readonly holder: string;
 }
 
@@ -513,9 +538,9 @@ export interface Bye {
 }
 
 /**
- * Statistics of a client's forces and datagrams: why forces were late, and how the network performed. One-way delays
- * depend on the estimated clock offset: they are accurate to ± clockErrorNs and can be negative. Server → client,
- * unreliable; the highest number wins.
+ * Statistics of the forces and datagrams of a client, which show why forces were late and how the network performed.
+ * One-way delays depend on the estimated offset of the clocks. They have an error of up to ± clockErrorNs and can be
+ * negative. Server → client, unreliable; the highest number wins.
  */
 export interface LinkReport {
   /** 1, 2, 3 … per session */
@@ -525,30 +550,30 @@ export interface LinkReport {
   /** Length of the interval */
   readonly spanNs: Nanoseconds;
   // In the interval:
-  /** Forces that arrived */
+  /** The number of forces that have arrived */
   readonly forces: bigint;
-  /** Forces that were late because the server sent a state late */
+  /** The number of forces that were late because a state was late */
   readonly lateServer: bigint;
-  /** Forces that were late because of the network, in either direction */
+  /** The number of forces that were late because of the network, in either direction */
   readonly lateNetwork: bigint;
-  /** Forces that were late because the engine took longer than usual */
+  /** The number of forces that were late because the engine was slower than usual */
   readonly lateEngine: bigint;
-  /** Longest time that the device was without a valid force */
+  /** The maximum time for which the device did not have a valid force */
   readonly worstLateNs: Nanoseconds;
-  /** Longest time without a datagram from the client */
+  /** The maximum time without a datagram from the client */
   readonly longestGapNs: Nanoseconds;
-  /** Absent: not measured */
+  /** Absent if it was not measured */
   readonly roundTrip: Delays | undefined;
-  /** One way; absent: not measured */
+  /** One way; absent if it was not measured */
   readonly toServer: Delays | undefined;
-  /** One way; absent: not measured */
+  /** One way; absent if it was not measured */
   readonly toClient: Delays | undefined;
   // Clocks:
-  /** The client's clock minus the server's */
+  /** The clock of the client minus the clock of the server */
   readonly clockOffsetNs: Nanoseconds;
-  /** Rate at which the offset grows */
+  /** The rate at which the offset increases */
   readonly clockDriftPpm: number;
-  /** Upper bound of |true offset − clockOffsetNs| */
+  /** An upper bound of |true offset − clockOffsetNs| */
   readonly clockErrorNs: Nanoseconds;
   // Datagrams of the client since the session opened:
   readonly received: bigint;
@@ -556,113 +581,113 @@ export interface LinkReport {
   readonly reordered: bigint;
   readonly duplicated: bigint;
   // In the interval:
-  /** Explanation of late and refused forces, for people; empty if there are none */
+  /** An explanation of late and refused forces that can be shown to the user. It is empty if there are none */
   readonly words: string;
-  /** Forces that are late for an unknown reason, because nothing is received from the client */
+  /** The number of forces that are late for an unknown reason, because the client is silent */
   readonly lateUnknown: bigint;
   // Forces of the client, on all its channels, that could not be used in the interval:
   /** A number is NaN or infinite */
   readonly refusedNotFinite: bigint;
   /** A number is beyond its bound */
   readonly refusedOutOfBounds: bigint;
-  /** No step had the number basedOnTick, or it was more than 4096 ticks ago */
+  /** basedOnTick was unknown or more than 4096 ticks ago */
   readonly refusedUnknownTick: bigint;
-  /** Sequence has not grown, although the datagram is the newest */
+  /** The sequence was not increased even though the datagram is the newest */
   readonly refusedOldSequence: bigint;
 }
 
-/** Two quantiles of a delay. A one-way delay can be negative, because it compares two clocks. */
+/** Two quantiles of a delay. The delay can be negative if two clocks are compared. */
 export interface Delays {
   readonly medianNs: Nanoseconds;
   readonly p99Ns: Nanoseconds;
 }
 
 /**
- * The state of one end of a coupling, sent to the other end. Vectors are in the base frame and the scale of the
- * SENDER's device. core/teleoperation/coupling.h describes their use. Either way, unreliable, with the feature
+ * The state of one end of a coupling, which is sent to the other end. Vectors use the base frame and the scale of the
+ * SENDER's device. For their use, see core/teleoperation/coupling.h. Either way, unreliable, with the feature
  * "teleoperation" only; for each device, channel and end the highest sequence of the highest epoch wins. An observer of
  * the device is sent both ends of its coupling.
  */
 export interface PortState {
-  /** Device of the session's server, in both directions */
+  /** The device of the server of this session, in both directions */
   readonly device: number;
-  /** Channel of the session's server, in both directions */
+  /** The channel of the server of this session, in both directions */
   readonly channel: number;
-  /** Epoch of the sender, which increases when the sender restarts */
+  /** The epoch of the sender, which is increased if the sender is restarted */
   readonly epoch: bigint;
-  /** 1, 2, 3 … within an epoch: the sender's haptic steps */
+  /** The number of the haptic step of the sender in this epoch: 1, 2, 3 … */
   readonly sequence: bigint;
-  /** Epoch of the receiver that `answers`, given and taken belong to; 0: none yet */
+  /** The epoch of the receiver for `answers`, given and taken, or 0 */
   readonly answersEpoch: bigint;
-  /** Sequence of the receiver's newest PortState in use; 0: none yet */
+  /** The sequence of the receiver's newest PortState that is used, or 0 */
   readonly answers: bigint;
-  /** Time on the sender's clock; only differences are used */
+  /** The time on the clock of the sender, which is only used for computing differences */
   readonly timeNs: Nanoseconds;
-  /** Round trip measured by the sender; 0 before the first measurement */
+  /** The round trip that was measured by the sender, or 0 if it was not measured yet */
   readonly roundTripNs: Nanoseconds;
   readonly phase: PortPhase;
-  /** Number of the leader's engagement that the phase belongs to: 1, 2, 3 …; 0: none yet */
+  /** The number of the engagement of the leader that the phase belongs to: 1, 2, 3 …, or 0 */
   readonly engagement: bigint;
-  /** Bit i: button i is held */
+  /** Bit i is set if button i is pressed */
   readonly buttons: number;
-  /** M, displacement of the handle from the sender's offset */
+  /** m, the displacement of the handle from the offset of the sender */
   readonly position: Vec3;
-  /** m/s, velocity of that displacement; zero while the displacement is frozen */
+  /** m/s, the velocity of this displacement, which is zero if the displacement is frozen */
   readonly velocity: Vec3;
-  /** N, actual force on the hand at the sender's handle */
+  /** N, the actual force on the hand at the handle of the sender */
   readonly force: Vec3;
-  /** N, force of the environment on the sender's tool; absent: not measured */
+  /** N. The force of the environment on the tool of the sender. Absent if it is not measured */
   readonly contactForce?: Vec3 | undefined;
-  /** J, energy that the sender may still give out, after its payments */
+  /** J, the energy that the sender may still output, minus its payments */
   readonly account: number;
-  /** J, energy that the sender needs for its desired force; 0: it has no tank */
+  /** J. The energy that the sender needs for its desired force, or 0 if it does not have a tank */
   readonly need: number;
-  /** J, total paid to the receiver; it never decreases while both epochs last */
+  /** J. The total energy that was paid to the receiver. It does not decrease until one of the epochs changes */
   readonly given: number;
-  /** J, the receiver's given, as last received, in joules of the receiver */
+  /** J, the given of the receiver that was received last, in joules of the receiver */
   readonly taken: number;
   /**
-   * CouplingMethod.WAVES: √W·s, ∫ wave dt since the epoch began: a total, so a lost frame has no lasting effect; half
-   * the square of a wave is a power. Absent: nothing sent yet
+   * For CouplingMethod.WAVES, √W·s: the integral of the wave since the start of the epoch. Since this is a total, lost
+   * frames have no lasting effect. Half the square of a wave is a power. Absent if nothing was sent yet
    */
   readonly waveIntegral?: Vec3 | undefined;
   /** J, ∫ ‖wave‖²/2 dt; it never decreases within an epoch */
   readonly waveEnergy?: number | undefined;
-  /** CouplingMethod.SURFACE, from the follower; absent: no surface was touched yet */
+  /** For CouplingMethod.SURFACE, from the follower. Absent if it has not touched a surface yet */
   readonly surface?: PortSurface | undefined;
-  /** Absent: the orientations are not coupled */
+  /** Absent if the orientations are not coupled */
   readonly turn?: PortTurn | undefined;
-  /** Absent: the grippers are not coupled */
+  /** Absent if the grippers are not coupled */
   readonly grip?: PortGrip | undefined;
-  /** J. CouplingMethod.PASSIVITY: energy that the sender's port took in during this epoch */
+  /** J. For CouplingMethod.PASSIVITY, the energy that was received by the port of the sender in this epoch */
   readonly energyIn?: number | undefined;
-  /** Weight of the receiver among the leaders of a follower; absent: the receiver is the only leader */
+  /** The weight of the receiver if the follower has several leaders. Absent if the receiver is the only leader */
   readonly share?: number | undefined;
   // From a leader, in use from this frame on; 0: as in Couple. An observer is always sent the values:
   readonly positionScale?: number | undefined;
   readonly forceScale?: number | undefined;
   // To an observer:
-  /** True if this is the other end of the device's coupling, as the server received it */
+  /** If true, this is the other end of the coupling of the device, as received by the server */
   readonly ofPeer?: boolean | undefined;
 }
 
-/** The rotation of a handle since its offset was taken. */
+/** The rotation of a handle since its offset was set. */
 export interface PortTurn {
-  /** Rotation in the axes of the sender's base frame */
+  /** The rotation in the axes of the sender's base frame */
   readonly turn: Quat;
-  /** rad/s, angular velocity; zero while the rotation is frozen */
+  /** rad/s, the angular velocity, which is zero if the rotation is frozen */
   readonly angularVelocity: Vec3;
-  /** N·m, actual torque on the hand at the sender's handle */
+  /** N·m, the actual torque on the hand at the handle of the sender */
   readonly torque: Vec3;
 }
 
-/** State of a gripper, measured at its fingers. The gripper has its own energy account. */
+/** The state of a gripper, measured at its fingers. The gripper has a separate energy account. */
 export interface PortGrip {
   /** m */
   readonly opening: number;
   /** m/s */
   readonly velocity: number;
-  /** N, actual force on the fingers, > 0 opens them */
+  /** N. The actual force on the fingers. Positive values open them */
   readonly force: number;
   /** J, as in PortState */
   readonly account: number;
@@ -674,19 +699,19 @@ export interface PortGrip {
   readonly taken: number;
 }
 
-/** A flat elastic surface that the sender's tool touches, or was the last to touch. It pushes and does not pull. */
+/** A flat elastic surface that is or was touched by the tool of the sender. It can push but not pull. */
 export interface PortSurface {
-  /** Direction out of the surface */
+  /** The direction out of the surface */
   readonly normal: Vec3;
-  /** M, the surface is where normal · position = offset */
+  /** m, the surface is where normal · position = offset */
   readonly offset: number;
-  /** N/m, stiffness; 0 if the surface is gone */
+  /** N/m, the stiffness, or 0 if there is no surface */
   readonly stiffness: number;
 }
 
 /**
- * Performance of a device's loop. All counts are for the reported interval. Server → client, unreliable, to an observer
- * with the feature "diagnostics" only; for each device the highest number wins.
+ * Statistics of the loop of a device. All counts are for the reported interval. Server → client, unreliable, to an
+ * observer with the feature "diagnostics" only; for each device the highest number wins.
  */
 export interface DeviceReport {
   /** 1, 2, 3 … per device */
@@ -698,112 +723,121 @@ export interface DeviceReport {
   readonly device: number;
   /** Haptic steps */
   readonly steps: bigint;
-  /** Periods without a step, because the previous step was late */
+  /** The number of periods that were skipped because the previous step was late */
   readonly missed: bigint;
-  /** Steps that began too long after the previous one (reason overrun) */
+  /** The number of steps that started too late (reason overrun) */
   readonly overruns: bigint;
-  /** Steps in which the device reported no position */
+  /** The number of steps without a position */
   readonly unseen: bigint;
   /**
-   * How late the loop woke: entry 0 counts the steps that were at most 1 µs late, entry i those more than 2^(i−1) µs
-   * and at most 2^i µs late, entry 23 all those more than 2^22 µs late. Trailing zeros are omitted. The sum is less
-   * than `steps` only if the server failed to count some
+   * The number of steps by their delay. Entry 0 counts the steps that were at most 1 µs late, entry i the steps that
+   * were more than 2^(i−1) µs and at most 2^i µs late, and entry 23 all steps that were more than 2^22 µs late. Zeros
+   * at the end are omitted. If the server was not able to count all steps, the sum is smaller than `steps`
    */
   readonly lateness: readonly bigint[];
   readonly safety: Safety;
-  /** Why the device exerts no force until it is armed or rearmed, for people; empty if there is no fault */
+  /**
+   * The reason why the device does not exert forces until it is armed or rearmed, as text for the user. It is empty if
+   * there is no fault
+   */
   readonly fault: string;
-  /** Service that the server reduces at present, for people; empty if there is none */
+  /** The service that is currently reduced by the server, as text for the user. It is empty if there is none */
   readonly degraded: string;
 }
 
 /**
- * Performance of the engine that holds the lease of a channel. Server → client, unreliable, to an observer with the
+ * Statistics of the engine that holds the lease of a channel. Server → client, unreliable, to an observer with the
  * feature "diagnostics" only; for each device and channel the highest number of its link wins.
  */
 export interface PeerReport {
   readonly device: number;
   readonly channel: number;
-  /** Name of the engine, as in its Hello */
+  /** The name of the engine in its Hello */
   readonly name: string;
-  /** The engine is sent one in this many of its requested states, because its link is full */
+  /** One of this many requested states is sent to the engine, because its link is congested */
   readonly stateOneIn: number;
-  /** The server ignores its forces, because its link loses too many datagrams */
+  /** If true, the forces of the engine are ignored because its link has lost too many datagrams */
   readonly forcesRefused: boolean;
-  /** Report on the engine's link; number and the counts of forces are per channel; absent is refused */
+  /** The report about the link of the engine. The number and the counts of forces are per channel; absent is refused */
   readonly link: LinkReport;
   // Of the force in the interval with the largest ForceCommand.error; if none states an error, of the newest:
-  /** N, estimated error of that force; absent: no force states an error */
+  /** N. The estimated error of this force. Absent if errors are not estimated */
   readonly error?: number | undefined;
-  /** Entry of Hello.ways for that force; empty if it is not stated */
+  /** The entry of Hello.ways for this force. It is empty if it is unknown */
   readonly way?: string | undefined;
 }
 
 /** The first message of a client. */
 export interface Hello {
-  /** Lowest version that the client speaks; the highest common version is used */
+  /** The lowest version that is supported by the client. The highest common version is used */
   readonly versionMin: number;
-  /** Highest version that the client speaks */
+  /** The highest version that is supported by the client */
   readonly versionMax: number;
-  /** With claims, the highest role among them */
+  /** If there are claims, this is the highest role of them */
   readonly role: Role;
   /** Name for logs */
   readonly name: string;
-  /** Offered features; a feature is used if both peers name it */
+  /** The features that are offered. A feature is used if both peers name it */
   readonly features: readonly string[];
   /**
-   * Claimed devices and channels, each once. Without claims, the client is granted device 0 and its channel 0 with
-   * `role`
+   * The devices and channels that are claimed, without duplicates. If this is empty, the client is granted device 0 and
+   * its channel 0 with `role`
    */
   readonly claims?: readonly Claim[] | undefined;
   // With the feature "ways" only:
-  /** Names of the ways in which this engine computes forces, the fastest first; ForceCommand.way is an index in it */
+  /**
+   * The names of the ways in which this engine can compute forces, starting with the fastest. They are used by
+   * ForceCommand.way
+   */
   readonly ways?: readonly string[] | undefined;
 }
 
-/** A device or a channel that the client wants. */
+/** Claims a device or a channel. */
 export interface Claim {
-  /** Name of the device; empty: device 0 */
+  /** The name of the device, or empty for device 0 */
   readonly device: string;
-  /** Name of the channel, from a controller; empty: channel 0 */
+  /** The name of the channel if the role is controller, or empty for channel 0 */
   readonly channel: string;
   readonly role: Role;
 }
 
 /** The server accepts the client. */
 export interface Welcome {
-  /** Version of the session, within the client's range */
+  /** The version of this session, which is in the range of the client */
   readonly version: number;
-  /** Features that both peers named */
+  /** The features that were named by both peers */
   readonly features: readonly string[];
   /** Granted role */
   readonly role: Role;
   /** The kind of device */
   readonly deviceName: string;
-  /** N, norm of the force that the device can exert */
+  /** N, the maximum norm of the force */
   readonly maxForce: number;
-  /** M, one encoder count at the handle; 0 if the position is exact */
+  /** m. The size of an encoder count at the handle, or 0 if the position is exact */
   readonly positionResolution: number;
   /** Haptic steps per second */
   readonly loopHz: number;
-  /** Silence after which the server forgets this client */
+  /** The server forgets the client if it is silent for this time */
   readonly timeoutMs: number;
-  /** Name and version of the server */
+  /** The name and the version of the server */
   readonly server: string;
   /**
-   * One for each claim, in the claims' order; deviceName … loopHz are those of the first grant's device. A server that
-   * does not know claims sends none, and treats the Hello as one without claims
+   * One for each claim, in the same order. The fields deviceName … loopHz describe the device of the first one. Servers
+   * that do not support claims do not send any, and ignore the claims of the Hello
    */
   readonly grants?: readonly Grant[] | undefined;
 }
 
-/** The numbers of a device and a channel that were claimed by name. */
+/** The numbers of a device and a channel that were claimed using their names. */
 export interface Grant {
-  /** Number of the device in all later messages */
+  /** The number of the device in all later messages */
   readonly device: number;
-  /** Number of the channel in all later messages */
+  /** The number of the channel in all later messages */
   readonly channel: number;
-  /** Granted role; Role.OBSERVER for a controller's claim if another client holds the lease (TakeLease) */
+  /**
+   * The role that was granted. It is Role.OBSERVER if a controller was claimed, but another client holds the lease
+   * (TakeLease)
+   */
   readonly role: Role;
 }
 
@@ -813,9 +847,9 @@ export interface Refused {
   readonly code: Code;
   /** A sentence for people */
   readonly detail: string;
-  /** Lowest version that the server speaks */
+  /** The lowest version that is supported by the server */
   readonly versionMin: number;
-  /** Highest version that the server speaks */
+  /** The highest version that is supported by the server */
   readonly versionMax: number;
 }
 

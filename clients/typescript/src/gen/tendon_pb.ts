@@ -28,15 +28,17 @@ export type Datagram = Message<"tendon.v1.Datagram"> & {
   txTimeNs: bigint;
 
   /**
-   * about the newest accepted datagram of the peer, which is the one with the highest packet number; absent before the
-   * first
+   * Acknowledges the newest accepted datagram of the peer, which is the one with the highest packet number. It is
+   * absent before the first one
    *
    * @generated from field: tendon.v1.Echo echo = 2;
    */
   echo?: Echo | undefined;
 
   /**
-   * [0, 64] entries: a keep-alive has none; with more than 64, the datagram is malformed
+   * This list is empty in a keep-alive. A datagram with more than 64 frames is malformed
+   *
+   * [0, 64] entries
    *
    * @generated from field: repeated tendon.v1.Frame frames = 3;
    */
@@ -58,14 +60,14 @@ export const DatagramSchema: GenMessage<Datagram> = /*@__PURE__*/
  */
 export type Echo = Message<"tendon.v1.Echo"> & {
   /**
-   * [-2^60, 2^60]: T1, tx_time_ns of that datagram, on the peer's clock
+   * [-2^60, 2^60]: T1: the tx_time_ns of that datagram, on the clock of the peer
    *
    * @generated from field: sfixed64 peer_tx_time_ns = 1;
    */
   peerTxTimeNs: bigint;
 
   /**
-   * T2, when that datagram arrived, on the clock of the sender of the echo; T2 ≤ T3
+   * T2: the time at which that datagram arrived, on the clock of the sender of the echo; T2 ≤ T3
    *
    * [-2^60, 2^60]
    *
@@ -81,8 +83,8 @@ export type Echo = Message<"tendon.v1.Echo"> & {
   peerPacketNumber: bigint;
 
   /**
-   * bit i: packet (peer_packet_number − 1 − i) has arrived too. A malformed packet counts as arrived in suites 1 and 2
-   * only
+   * Bit i is set if the packet peer_packet_number − 1 − i has also arrived. Malformed packets only count as arrived in
+   * suites 1 and 2
    *
    * @generated from field: fixed32 received_mask = 4;
    */
@@ -200,7 +202,7 @@ export const FrameSchema: GenMessage<Frame> = /*@__PURE__*/
   messageDesc(file_tendon, 2);
 
 /**
- * A vector. Its unit is in the name of the field that has this type.
+ * A vector. The name of a field of this type contains the unit.
  *
  * @generated from message tendon.v1.Vec3
  */
@@ -235,8 +237,8 @@ export const Vec3Schema: GenMessage<Vec3> = /*@__PURE__*/
   messageDesc(file_tendon, 3);
 
 /**
- * A rotation as a unit quaternion, Hamilton's: w + x i + y j + z k. q and −q are the same rotation. It is refused
- * unless its norm is 1 ± 0.001.
+ * A rotation as a unit quaternion in Hamilton's convention: w + x i + y j + z k. q and −q are the same rotation. A
+ * quaternion is refused if its norm is not 1 ± 0.001.
  *
  * @generated from message tendon.v1.Quat
  */
@@ -291,7 +293,7 @@ export type DeviceState = Message<"tendon.v1.DeviceState"> & {
   tick: bigint;
 
   /**
-   * [-2^60, 2^60]: when the position was sampled, on the server's clock
+   * [-2^60, 2^60]: the time at which the position was sampled, on the clock of the server
    *
    * @generated from field: sfixed64 sampled_ns = 2;
    */
@@ -308,21 +310,21 @@ export type DeviceState = Message<"tendon.v1.DeviceState"> & {
   velocityMps?: Vec3 | undefined;
 
   /**
-   * actual force on the hand, from this step on
+   * the actual force on the hand from this step on
    *
    * @generated from field: tendon.v1.Vec3 force_applied_n = 5;
    */
   forceAppliedN?: Vec3 | undefined;
 
   /**
-   * [-1e12, 1e12]: energy that the device may still give out (the energy ledger)
+   * [-1e12, 1e12]: the energy that the device may still output, according to the energy ledger
    *
    * @generated from field: double energy_j = 6;
    */
   energyJ: number;
 
   /**
-   * the limiter's bound on the norm of the force; +infinity if there is none
+   * The limiter's bound on the norm of the force, or +infinity if there is none
    *
    * [0, 1e12] or +infinity
    *
@@ -331,21 +333,21 @@ export type DeviceState = Message<"tendon.v1.DeviceState"> & {
   permittedForceN: number;
 
   /**
-   * why the actual force differs from the requested one (bits of core/base/reason.h)
+   * the reasons why the actual force differs from the requested one (bits of core/base/reason.h)
    *
    * @generated from field: fixed32 reasons = 8;
    */
   reasons: number;
 
   /**
-   * sequence of the ForceCommand that is rendered; 0 if there is none
+   * the sequence of the ForceCommand that is rendered, or 0
    *
    * @generated from field: uint64 force_sequence = 9;
    */
   forceSequence: bigint;
 
   /**
-   * [0, 2^60]: time since that ForceCommand arrived
+   * [0, 2^60]: the time since this ForceCommand has arrived
    *
    * @generated from field: uint64 force_age_ns = 10;
    */
@@ -364,8 +366,8 @@ export type DeviceState = Message<"tendon.v1.DeviceState"> & {
   device: number;
 
   /**
-   * channel of the force that force_sequence, force_age_ns and mode describe: the freshest one, or the one with the
-   * lowest channel if several are equally fresh
+   * The channel of the force that is described by force_sequence, force_age_ns and mode. This is the freshest one. If
+   * several are equally fresh, it is the one with the lowest number
    *
    * [0, 7]
    *
@@ -375,8 +377,8 @@ export type DeviceState = Message<"tendon.v1.DeviceState"> & {
 
   /**
    * With the feature "diagnostics" only:
-   * force on the hand that the engines request at this step (held, faded, or extrapolated by their models), before any
-   * limit; absent: not reported
+   * The force on the hand that is requested by the engines at this step, before it is limited. It may be held, faded,
+   * or extrapolated using their models. Absent if it is not reported
    *
    * @generated from field: tendon.v1.Vec3 force_wanted_n = 14;
    */
@@ -384,50 +386,55 @@ export type DeviceState = Message<"tendon.v1.DeviceState"> & {
 
   /**
    * With the feature "handle" only:
-   * rotation from the handle frame to the device base frame. In the handle frame, when the handle is in its middle
-   * position, the stylus or finger points along −z, y is up, and x is to the right; absent: not measured
+   * The rotation from the handle frame to the device base frame. If the handle is in its middle position, the stylus or
+   * finger points along the −z axis of the handle frame, y is up, and x is to the right. Absent if it is not measured
    *
    * @generated from field: tendon.v1.Quat orientation = 15;
    */
   orientation?: Quat | undefined;
 
   /**
-   * angular velocity in base frame axes; ignored without an orientation
+   * The angular velocity in the axes of the base frame. It is ignored if there is no orientation
    *
    * @generated from field: tendon.v1.Vec3 angular_velocity_radps = 16;
    */
   angularVelocityRadps?: Vec3 | undefined;
 
   /**
-   * bit i: button i is held. A press between two states is reported in the later one
+   * bit i is set if button i is pressed, or if it was pressed since the previous state
    *
    * @generated from field: fixed32 buttons = 17;
    */
   buttons: number;
 
   /**
-   * actual torque on the hand about position_m, in base frame axes, from this step on; absent: no motors that turn
+   * The actual torque on the hand about position_m from this step on, in the axes of the base frame. Absent if the
+   * device cannot exert torques
    *
    * @generated from field: tendon.v1.Vec3 torque_applied_nm = 18;
    */
   torqueAppliedNm?: Vec3 | undefined;
 
   /**
-   * [-1e12, 1e12]: opening of the gripper, 0 when it is closed; absent: no gripper
+   * The opening of the gripper, which is 0 if it is closed. Absent if there is no gripper
+   *
+   * [-1e12, 1e12]
    *
    * @generated from field: optional double gripper_rad = 19;
    */
   gripperRad?: number | undefined;
 
   /**
-   * [-1e12, 1e12]: velocity of the opening; ignored without gripper_rad
+   * The velocity of the opening. It is ignored if there is no gripper_rad
+   *
+   * [-1e12, 1e12]
    *
    * @generated from field: optional double gripper_velocity_radps = 20;
    */
   gripperVelocityRadps?: number | undefined;
 
   /**
-   * actual force on the fingers, > 0 opens them, from this step on; absent: the gripper has no motor
+   * The actual force on the fingers from this step on. Positive values open them. Absent if the gripper has no motor
    *
    * [-1e12, 1e12]
    *
@@ -436,7 +443,7 @@ export type DeviceState = Message<"tendon.v1.DeviceState"> & {
   gripperForceAppliedN?: number | undefined;
 
   /**
-   * of the hand ON THE HANDLE, measured by a force sensor; absent: no force sensor
+   * The force of the hand ON THE HANDLE, as measured by a force sensor. Absent if there is no force sensor
    *
    * @generated from field: tendon.v1.Vec3 hand_force_n = 22;
    */
@@ -444,7 +451,8 @@ export type DeviceState = Message<"tendon.v1.DeviceState"> & {
 
   /**
    * With the feature "joints" only:
-   * angles of the joints that carry the handle, in the order of HandleDescription.joints. None: the device reports none
+   * The angles of the joints that carry the handle, in the order of HandleDescription.joints. Absent if the device does
+   * not report joints
    *
    * [-1e12, 1e12], [0, 8] entries
    *
@@ -453,7 +461,7 @@ export type DeviceState = Message<"tendon.v1.DeviceState"> & {
   jointRad: number[];
 
   /**
-   * velocities of the same joints; a missing entry is 0, and an entry without an angle is ignored
+   * The velocities of these joints. Missing entries are 0, and entries without an angle are ignored
    *
    * [-1e12, 1e12], [0, 8] entries
    *
@@ -463,8 +471,8 @@ export type DeviceState = Message<"tendon.v1.DeviceState"> & {
 
   /**
    * With the feature "diagnostics" only:
-   * −∂force_wanted_n/∂position_m of the engines' models at this step; entries as in LocalModel.stiffness_npm. None: no
-   * model
+   * −∂force_wanted_n/∂position_m according to the models of the engines at this step, with the entries of
+   * LocalModel.stiffness_npm. Absent if there is no model
    *
    * [-1e12, 1e12], {0, 1, 3, 9} entries
    *
@@ -481,31 +489,31 @@ export const DeviceStateSchema: GenMessage<DeviceState> = /*@__PURE__*/
   messageDesc(file_tendon, 5);
 
 /**
- * States of several devices at one haptic step, in columns. They take half the bytes of as many DeviceState messages,
- * because everything except the positions has single precision. Entry k of a column belongs to the k-th device in
- * `devices`, in the order of their numbers; a vector takes three entries (x, y, z). The last five columns may be empty:
- * then all their values are 0. A frame with a column of any other length, without a device, or with one value out of
- * bounds is dropped whole.
+ * The states of several devices at the same haptic step, as columns. This takes half the size of the same number of
+ * DeviceState messages, because all values except for the positions are sent in single precision. Entry k of a column
+ * belongs to the k-th device in `devices`, in the order of their numbers. Vectors have three entries (x, y, z). If one
+ * of the last five columns is empty, all of its values are 0. The frame is dropped if any other column has the wrong
+ * length, if there are no devices, or if a value is out of bounds.
  *
  * @generated from message tendon.v1.DeviceStates
  */
 export type DeviceStates = Message<"tendon.v1.DeviceStates"> & {
   /**
-   * as in DeviceState, for all devices
+   * the same as in DeviceState, for all devices
    *
    * @generated from field: uint64 tick = 1;
    */
   tick: bigint;
 
   /**
-   * [-2^60, 2^60]: as in DeviceState, for all devices
+   * [-2^60, 2^60]: the same as in DeviceState, for all devices
    *
    * @generated from field: sfixed64 sampled_ns = 2;
    */
   sampledNs: bigint;
 
   /**
-   * bit i: device i is included; 1 … 65 535
+   * bit i is set if device i is included; 1 … 65 535
    *
    * @generated from field: uint32 devices = 3;
    */
@@ -597,7 +605,7 @@ export const DeviceStatesSchema: GenMessage<DeviceStates> = /*@__PURE__*/
   messageDesc(file_tendon, 6);
 
 /**
- * The force that a physics engine requests, as the answer to one state.
+ * The force that is requested by a physics engine in response to a state.
  *
  * @generated from message tendon.v1.ForceCommand
  */
@@ -610,28 +618,28 @@ export type ForceCommand = Message<"tendon.v1.ForceCommand"> & {
   sequence: bigint;
 
   /**
-   * DeviceState.tick of the state that the force was computed from
+   * the DeviceState.tick of the state that was used for computing the force
    *
    * @generated from field: uint64 based_on_tick = 2;
    */
   basedOnTick: bigint;
 
   /**
-   * force on the hand: a wall that resists motion along +x sends −x
+   * The force on the hand. A wall that resists motion along +x sends −x
    *
    * @generated from field: tendon.v1.Vec3 force_n = 3;
    */
   forceN?: Vec3 | undefined;
 
   /**
-   * how the force changes as the hand moves; absent: the force is constant
+   * The change of the force when the hand moves. Absent if the force is constant
    *
    * @generated from field: tendon.v1.LocalModel model = 4;
    */
   model?: LocalModel | undefined;
 
   /**
-   * [1, 10000000]: time from its arrival during which the force is fresh
+   * [1, 10000000]: the time after its arrival during which the force is fresh
    *
    * @generated from field: uint32 valid_for_us = 5;
    */
@@ -652,14 +660,16 @@ export type ForceCommand = Message<"tendon.v1.ForceCommand"> & {
   channel: number;
 
   /**
-   * the body has been cut or torn since the previous answer: neither this model nor the previous one is used
+   * If true, the body was cut or torn since the previous answer, so neither this model nor the previous one is used
    *
    * @generated from field: bool topology_changed = 8;
    */
   topologyChanged: boolean;
 
   /**
-   * [0, 1e12]: the engine's estimate of the error of force_n; absent: not known
+   * The error of force_n, as estimated by the engine. Absent if it is unknown
+   *
+   * [0, 1e12]
    *
    * @generated from field: optional double error_n = 9;
    */
@@ -667,15 +677,15 @@ export type ForceCommand = Message<"tendon.v1.ForceCommand"> & {
 
   /**
    * With the feature "handle" only:
-   *
-   * torque on the hand about the handle's position, in base frame axes; absent: none is requested
+   * The torque on the hand about the position of the handle, in the axes of the base frame. Absent if no torque is
+   * requested
    *
    * @generated from field: tendon.v1.Vec3 torque_nm = 10;
    */
   torqueNm?: Vec3 | undefined;
 
   /**
-   * force on the fingers, > 0 opens them; absent: none is requested
+   * The force on the fingers. Positive values open them. Absent if no force is requested
    *
    * [-1e12, 1e12]
    *
@@ -684,7 +694,7 @@ export type ForceCommand = Message<"tendon.v1.ForceCommand"> & {
   gripperForceN?: number | undefined;
 
   /**
-   * how the torque changes as the handle turns. It does not need a `model`, and an absent torque_nm is 0 in it
+   * The change of the torque when the handle turns. It does not require a `model`, and torque_nm is 0 if it is missing
    *
    * @generated from field: tendon.v1.RotationModel rotation_model = 14;
    */
@@ -692,8 +702,8 @@ export type ForceCommand = Message<"tendon.v1.ForceCommand"> & {
 
   /**
    * With the feature "ways" only:
-   * index, from 1, in Hello.ways: the way in which the engine computed this force; 0 if it is not stated. A server
-   * treats an index beyond the last entry as 0
+   * The way in which the engine has computed this force, as an index in Hello.ways that starts at 1, or 0 if it is
+   * unknown. Servers treat an index that is larger than the number of ways as 0
    *
    * [0, 8]
    *
@@ -718,14 +728,14 @@ export const ForceCommandSchema: GenMessage<ForceCommand> = /*@__PURE__*/
  */
 export type RotationModel = Message<"tendon.v1.RotationModel"> & {
   /**
-   * orientation that torque_nm was computed for; absent is refused
+   * the orientation for which torque_nm was computed; absent is refused
    *
    * @generated from field: tendon.v1.Quat at_orientation = 1;
    */
   atOrientation?: Quat | undefined;
 
   /**
-   * −∂τ/∂θ in base frame axes; a spring is positive; entries as in LocalModel.stiffness_npm
+   * −∂τ/∂θ in the axes of the base frame, with the entries of LocalModel.stiffness_npm. Springs are positive
    *
    * [-1e12, 1e12], {1, 3, 9} entries
    *
@@ -751,15 +761,15 @@ export const RotationModelSchema: GenMessage<RotationModel> = /*@__PURE__*/
  */
 export type LocalModel = Message<"tendon.v1.LocalModel"> & {
   /**
-   * position that force_n was computed for
+   * the position for which force_n was computed
    *
    * @generated from field: tendon.v1.Vec3 at_m = 1;
    */
   atM?: Vec3 | undefined;
 
   /**
-   * −∂F/∂x; a spring is positive. 1 entry k is k·I, 3 are the diagonal, 9 are the matrix row by row. An engine that
-   * does not know the stiffness sends a single 0
+   * −∂F/∂x. Springs are positive. A single entry k is k·I, three entries are the diagonal, and nine entries are the
+   * matrix row by row. Engines that do not know the stiffness send a single 0
    *
    * [-1e12, 1e12], {1, 3, 9} entries
    *
@@ -768,7 +778,7 @@ export type LocalModel = Message<"tendon.v1.LocalModel"> & {
   stiffnessNpm: number[];
 
   /**
-   * radius around at_m in which the model is valid; absent: not known
+   * The distance from at_m up to which the model is valid. Absent if it is unknown
    *
    * [0, 1e12] or +infinity
    *
@@ -777,7 +787,7 @@ export type LocalModel = Message<"tendon.v1.LocalModel"> & {
   validRadiusM?: number | undefined;
 
   /**
-   * surface that the tool touches or is about to touch
+   * the surface that is touched by the tool or is about to be touched
    *
    * @generated from field: tendon.v1.Contact contact = 4;
    */
@@ -792,20 +802,20 @@ export const LocalModelSchema: GenMessage<LocalModel> = /*@__PURE__*/
   messageDesc(file_tendon, 9);
 
 /**
- * A surface that the tool touches or is about to touch. It pushes and does not pull, unless it has a table.
+ * A surface that is touched by the tool or is about to be touched. It can push but not pull, unless there is a table.
  *
  * @generated from message tendon.v1.Contact
  */
 export type Contact = Message<"tendon.v1.Contact"> & {
   /**
-   * direction out of the body, towards the hand: a force along +normal pushes the hand away
+   * the direction from the body to the hand, which is pushed away by a force along +normal
    *
    * @generated from field: tendon.v1.Vec3 normal = 1;
    */
   normal?: Vec3 | undefined;
 
   /**
-   * distance from the surface to the tool along the normal, negative if the tool is pressed in
+   * The distance from the surface to the tool along the normal. It is negative if the tool is inside of the body
    *
    * [-1e12, 1e12]
    *
@@ -814,7 +824,7 @@ export type Contact = Message<"tendon.v1.Contact"> & {
   gapM: number;
 
   /**
-   * forces along the normal at other depths
+   * the forces along the normal if the tool is at other depths
    *
    * @generated from field: tendon.v1.ForceTable table = 3;
    */
@@ -835,7 +845,9 @@ export const ContactSchema: GenMessage<Contact> = /*@__PURE__*/
  */
 export type ForceTable = Message<"tendon.v1.ForceTable"> & {
   /**
-   * [-1e12, 1e12]: depth of entry 0, negative if it is farther out than at_m
+   * The depth of entry 0. It is negative if the tool is farther out than at_m
+   *
+   * [-1e12, 1e12]
    *
    * @generated from field: double first_depth_m = 1;
    */
@@ -849,7 +861,7 @@ export type ForceTable = Message<"tendon.v1.ForceTable"> & {
   stepM: number;
 
   /**
-   * [-1e12, 1e12], [2, 16] entries: forces along +normal
+   * [-1e12, 1e12], [2, 16] entries: the forces along +normal
    *
    * @generated from field: repeated double force_n = 3 [packed = true];
    */
@@ -871,7 +883,9 @@ export const ForceTableSchema: GenMessage<ForceTable> = /*@__PURE__*/
  */
 export type Control = Message<"tendon.v1.Control"> & {
   /**
-   * [1, …]: 1, 2, 3 … per session and direction; at most 16 unanswered
+   * 1, 2, 3 … per session and direction. At most 16 requests can be unanswered
+   *
+   * [1, …]
    *
    * @generated from field: uint32 id = 1;
    */
@@ -977,15 +991,15 @@ export const ControlSchema: GenMessage<Control> = /*@__PURE__*/
   messageDesc(file_tendon, 12);
 
 /**
- * Sets how many states of a device the client is sent per second. Before the first such request it is sent every state,
- * loop_hz per second. After it, the client is sent every k-th state, where k = loop_hz / hz, rounded, at least 1: with
- * loop_hz 1000, 300 Hz become 333 and 2000 Hz become 1000.
+ * Sets the number of states of a device that are sent to the client per second. Before the first request of this type,
+ * all loop_hz states per second are sent. After it, every k-th state is sent, where k = loop_hz / hz is rounded and at
+ * least 1. For example, if loop_hz is 1000, 300 Hz becomes 333 Hz and 2000 Hz becomes 1000 Hz.
  *
  * @generated from message tendon.v1.SetStateRate
  */
 export type SetStateRate = Message<"tendon.v1.SetStateRate"> & {
   /**
-   * at least 1; 0 is answered with CODE_INVALID
+   * if it is 0, the answer is CODE_INVALID
    *
    * @generated from field: uint32 hz = 1;
    */
@@ -1015,21 +1029,26 @@ export const SetStateRateSchema: GenMessage<SetStateRate> = /*@__PURE__*/
  */
 export type SetStateDeadband = Message<"tendon.v1.SetStateDeadband"> & {
   /**
-   * [-1e12, 1e12]: fraction of the speed (Weber fraction); answered CODE_INVALID beyond 0 … 0.5
+   * The fraction of the speed (Weber fraction). If it is not in 0 … 0.5, the answer is CODE_INVALID
+   *
+   * [-1e12, 1e12]
    *
    * @generated from field: double share = 1;
    */
   share: number;
 
   /**
-   * [-1e12, 1e12]: smallest difference of the velocity; answered CODE_INVALID beyond 0 … 0.1
+   * The smallest difference of the velocity. If it is not in 0 … 0.1, the answer is CODE_INVALID
+   *
+   * [-1e12, 1e12]
    *
    * @generated from field: double floor_mps = 2;
    */
   floorMps: number;
 
   /**
-   * longest time without a state; 0: every state is sent again. Answered CODE_INVALID beyond 0 and 1000 … 20 000
+   * The maximum time without a state. If it is 0, every state is sent again. If it is not 0 or in 1000 … 20 000, the
+   * answer is CODE_INVALID
    *
    * @generated from field: uint32 max_silence_us = 3;
    */
@@ -1044,8 +1063,8 @@ export const SetStateDeadbandSchema: GenMessage<SetStateDeadband> = /*@__PURE__*
   messageDesc(file_tendon, 14);
 
 /**
- * Clears a latched fault and revokes a Disarm; only from a controller of the device. If the device has a safety layer,
- * this is the operator's request to arm.
+ * Clears a latched fault and revokes a Disarm. Can only be used by controllers of the device. If the device has a
+ * safety layer, this is a request of the operator to arm it.
  *
  * @generated from message tendon.v1.Rearm
  */
@@ -1066,10 +1085,11 @@ export const RearmSchema: GenMessage<Rearm> = /*@__PURE__*/
   messageDesc(file_tendon, 15);
 
 /**
- * Sets the force to zero from the next haptic step on, without a ramp, until a Rearm; only from a controller of the
- * device, whether or not it holds the channel. A new force, a new session or the dead man's button alone does not end
- * it. The device's Safety changes from armed to homed, and a pending request to arm is withdrawn. Disarm is not a fault
- * and clears no fault. Repeating it has no effect. CODE_OK: the device's loop receives the order before its next step.
+ * Sets the force to zero without a ramp, from the next haptic step until a Rearm. Can be used by any controller of the
+ * device, even if it does not hold the channel. This state does not end if there is a new force or a new session, or if
+ * only the dead man's button is pressed. The Safety of the device changes from armed to homed, and pending requests to
+ * arm it are withdrawn. A Disarm is not a fault and does not clear faults. If it is repeated, it has no effect. If the
+ * answer is CODE_OK, the loop of the device will receive the order before its next step.
  *
  * @generated from message tendon.v1.Disarm
  */
@@ -1090,31 +1110,32 @@ export const DisarmSchema: GenMessage<Disarm> = /*@__PURE__*/
   messageDesc(file_tendon, 16);
 
 /**
- * Offers the sender's device as the other end of a coupling with this device, and describes that end; only from the
- * client that has claimed the channel as a controller, with the feature "teleoperation". CODE_OK: the two ends fit;
- * both peers then send PortState frames, and the server sends no states. CODE_INVALID: they do not fit, and the detail
- * names the first difference. CODE_UNSUPPORTED: that device cannot be coupled. CODE_BUSY: that channel is coupled with
- * another client; a follower has one channel for each of its leaders.
+ * Offers the sender's device as the other end of a coupling with this device, and describes that end. Can only be used
+ * by a client that has claimed the channel as a controller, and requires the feature "teleoperation". If the two ends
+ * match, the answer is CODE_OK. After that, both peers send PortState frames, and the server does not send states.
+ * CODE_INVALID means that the ends do not match, and the detail contains the first difference. CODE_UNSUPPORTED means
+ * that this device cannot be coupled. CODE_BUSY means that the channel is coupled with another client. A follower has
+ * one channel for each of its leaders.
  *
  * @generated from message tendon.v1.Couple
  */
 export type Couple = Message<"tendon.v1.Couple"> & {
   /**
-   * [0, 15]: device of the server
+   * [0, 15]: the device of the server
    *
    * @generated from field: uint32 device = 1;
    */
   device: number;
 
   /**
-   * [0, 7]: channel of the server
+   * [0, 7]: the channel of the server
    *
    * @generated from field: uint32 channel = 2;
    */
   channel: number;
 
   /**
-   * role of the sender; the server's device has the other role
+   * The role of the sender. The device of the server has the other role
    *
    * @generated from field: tendon.v1.PortRole role = 3;
    */
@@ -1140,63 +1161,63 @@ export type Couple = Message<"tendon.v1.Couple"> & {
   forceScale: number;
 
   /**
-   * turns the leader's base frame into the follower's; absent is refused
+   * the rotation from the base frame of the leader to that of the follower; absent is refused
    *
    * @generated from field: tendon.v1.Quat rotation = 7;
    */
   rotation?: Quat | undefined;
 
   /**
-   * [1, 7]: bits 1, 2, 4: x, y, z of the leader's frame are coupled
+   * [1, 7]: bits 1, 2 and 4 are set if x, y and z of the leader's frame are coupled
    *
    * @generated from field: uint32 axes = 8;
    */
   axes: number;
 
   /**
-   * [0, 1e12]: stiffness between the handles, as felt by the leader
+   * [0, 1e12]: the stiffness between the handles, as felt by the leader
    *
    * @generated from field: double stiffness_npm = 9;
    */
   stiffnessNpm: number;
 
   /**
-   * [0, 1e12]: damping between the handles, as felt by the leader
+   * [0, 1e12]: the damping between the handles, as felt by the leader
    *
    * @generated from field: double mutual_damping_nspm = 10;
    */
   mutualDampingNspm: number;
 
   /**
-   * [0, 1e12]: damping of each handle, as felt by the leader
+   * [0, 1e12]: the damping of each handle, as felt by the leader
    *
    * @generated from field: double damping_nspm = 11;
    */
   dampingNspm: number;
 
   /**
-   * the stiffness decreases as the round trip increases
+   * if true, the stiffness decreases when the round trip increases
    *
    * @generated from field: bool adapt_to_delay = 12;
    */
   adaptToDelay: boolean;
 
   /**
-   * the ends exchange energy (core/teleoperation/energy_tank.h)
+   * if true, the ends exchange energy (core/teleoperation/energy_tank.h)
    *
    * @generated from field: bool purse = 13;
    */
   purse: boolean;
 
   /**
-   * [1, 10000000]: time between two PortState frames of the sender
+   * [1, 10000000]: the period in which the sender sends PortState frames
    *
    * @generated from field: uint32 period_us = 14;
    */
   periodUs: number;
 
   /**
-   * positions map to positions: the offsets are zero, and the ends align before they engage
+   * If true, positions map to positions. The offsets are zero, and the ends are aligned before they are engaged
    *
    * @generated from field: bool absolute = 15;
    */
@@ -1205,28 +1226,28 @@ export type Couple = Message<"tendon.v1.Couple"> & {
   /**
    * As felt by the leader. With a stiffness of 0 the part is not coupled:
    *
-   * [0, 1e12]: stiffness between the orientations
+   * [0, 1e12]: the stiffness between the orientations
    *
    * @generated from field: double turn_stiffness_nmprad = 16;
    */
   turnStiffnessNmprad: number;
 
   /**
-   * [0, 1e12]: damping between the orientations
+   * [0, 1e12]: the damping between the orientations
    *
    * @generated from field: double turn_damping_nmsprad = 17;
    */
   turnDampingNmsprad: number;
 
   /**
-   * [0, 1e12]: stiffness between the grippers, at the leader's fingers
+   * [0, 1e12]: the stiffness between the grippers at the fingers of the leader
    *
    * @generated from field: double grip_stiffness_npm = 18;
    */
   gripStiffnessNpm: number;
 
   /**
-   * [0, 1e12]: damping between the grippers
+   * [0, 1e12]: the damping between the grippers
    *
    * @generated from field: double grip_damping_nspm = 19;
    */
@@ -1234,15 +1255,16 @@ export type Couple = Message<"tendon.v1.Couple"> & {
 
   /**
    * For one method only:
+   * The rate at which the follower corrects its drift, for COUPLING_METHOD_PASSIVITY
    *
-   * [0, 1e12]: COUPLING_METHOD_PASSIVITY: rate at which the follower corrects its drift
+   * [0, 1e12]
    *
    * @generated from field: double drift_rate_per_s = 20;
    */
   driftRatePerS: number;
 
   /**
-   * COUPLING_METHOD_RATE; absent with the other methods
+   * the parameters of COUPLING_METHOD_RATE, which are absent for other methods
    *
    * @generated from field: tendon.v1.RateControl rate = 21;
    */
@@ -1257,28 +1279,30 @@ export const CoupleSchema: GenMessage<Couple> = /*@__PURE__*/
   messageDesc(file_tendon, 17);
 
 /**
- * How the displacement of the leader's handle, which a spring pulls back to its center, commands the speed of the
- * follower. All values are in the leader's scale.
+ * Describes how the displacement of the leader's handle sets the speed of the follower. A spring pulls the handle to
+ * its center. All values are in the scale of the leader.
  *
  * @generated from message tendon.v1.RateControl
  */
 export type RateControl = Message<"tendon.v1.RateControl"> & {
   /**
-   * [0, 1e12]: distance of the leader from its center within which the follower stands still
+   * If the leader is closer to its center than this distance, the follower does not move
+   *
+   * [0, 1e12]
    *
    * @generated from field: double dead_zone_m = 1;
    */
   deadZoneM: number;
 
   /**
-   * (0, 1e12]: speed of the follower per meter beyond the dead zone
+   * (0, 1e12]: the speed of the follower per meter of displacement beyond the dead zone
    *
    * @generated from field: double gain_per_s = 2;
    */
   gainPerS: number;
 
   /**
-   * (0, 1e12]: maximum speed of the follower
+   * (0, 1e12]: the maximum speed of the follower
    *
    * @generated from field: double max_speed_mps = 3;
    */
@@ -1293,8 +1317,9 @@ export const RateControlSchema: GenMessage<RateControl> = /*@__PURE__*/
   messageDesc(file_tendon, 18);
 
 /**
- * Couples the handles, on the operator's command. Only the leader's server accepts it, from a controller of the device.
- * CODE_OK: the device's loop has the order. CODE_UNSUPPORTED: that device has no coupling, or is the follower.
+ * Engages the coupling on the command of the operator. Can only be used by controllers of the leader's device, at its
+ * server. If the answer is CODE_OK, the loop of the device has received the order. CODE_UNSUPPORTED means that the
+ * device is not coupled, or that it is the follower.
  *
  * @generated from message tendon.v1.Engage
  */
@@ -1315,7 +1340,7 @@ export const EngageSchema: GenMessage<Engage> = /*@__PURE__*/
   messageDesc(file_tendon, 19);
 
 /**
- * Ends the engagement. Either end's server accepts it, only from a controller of the device.
+ * Ends the engagement. Can be used at the server of either end, but only by controllers of its device.
  *
  * @generated from message tendon.v1.Disengage
  */
@@ -1336,9 +1361,9 @@ export const DisengageSchema: GenMessage<Disengage> = /*@__PURE__*/
   messageDesc(file_tendon, 20);
 
 /**
- * Sets the scales of the coupling. Only the leader's server accepts it, from a controller of the device. CODE_OK: the
- * device's loop has the order. CODE_BUSY: the leader is engaged and does not hold its clutch. CODE_UNSUPPORTED: that
- * device has no coupling, or is the follower.
+ * Sets the scales of the coupling. Can only be used by controllers of the leader's device, at its server. If the answer
+ * is CODE_OK, the loop of the device has received the order. CODE_BUSY means that the leader is engaged and its clutch
+ * is not held. CODE_UNSUPPORTED means that the device is not coupled, or that it is the follower.
  *
  * @generated from message tendon.v1.SetScale
  */
@@ -1373,9 +1398,10 @@ export const SetScaleSchema: GenMessage<SetScale> = /*@__PURE__*/
   messageDesc(file_tendon, 21);
 
 /**
- * Sets the weight of one channel's leader among the leaders of a follower. Only the follower's server accepts it, from
- * a controller of the device. The weight reaches the value within 0.5 s; the other leaders share the rest in the same
- * proportion as before. CODE_UNSUPPORTED: that device has no coupling, has one leader only, or is a leader.
+ * Sets the weight of the leader of one channel if a follower has several leaders. Can only be used by controllers of
+ * the follower's device, at its server. The weight reaches the value within 0.5 s, and the ratios of the other weights
+ * do not change. CODE_UNSUPPORTED means that the device is not coupled, that it only has one leader, or that it is a
+ * leader.
  *
  * @generated from message tendon.v1.SetShare
  */
@@ -1410,10 +1436,10 @@ export const SetShareSchema: GenMessage<SetShare> = /*@__PURE__*/
   messageDesc(file_tendon, 22);
 
 /**
- * Sets a lamp of the device or starts a vibration pulse; only from a controller of the device that holds one of its
- * channels, with the feature "outputs". An output is switched off when the client that set it gives up or loses a
- * channel of the device, and when the device is disarmed. CODE_INVALID: the device has no such output, or it is of the
- * other kind, or neither `rgb` nor `vibration` is there.
+ * Sets a lamp of the device or starts a vibration pulse. Can only be used by a controller that holds one of the
+ * channels of the device, and requires the feature "outputs". An output is turned off if the client that has set it
+ * gives up or loses a channel of the device, or if the device is disarmed. CODE_INVALID means that the device does not
+ * have this output, that the output is of the other kind, or that both `rgb` and `vibration` are missing.
  *
  * @generated from message tendon.v1.SetOutput
  */
@@ -1426,7 +1452,9 @@ export type SetOutput = Message<"tendon.v1.SetOutput"> & {
   device: number;
 
   /**
-   * [0, 7]: number in HandleDescription.outputs; answered CODE_INVALID beyond the device's last
+   * The index in HandleDescription.outputs. If the device does not have this output, the answer is CODE_INVALID
+   *
+   * [0, 7]
    *
    * @generated from field: uint32 output = 2;
    */
@@ -1439,7 +1467,9 @@ export type SetOutput = Message<"tendon.v1.SetOutput"> & {
    */
   setting: {
     /**
-     * [0, 16777215]: color of a lamp, 0xRRGGBB; 0 is off: the lamp then shows the state of the device
+     * The color of a lamp as 0xRRGGBB. If it is 0, the lamp shows the state of the device
+     *
+     * [0, 16777215]
      *
      * @generated from field: fixed32 rgb = 3;
      */
@@ -1462,20 +1492,24 @@ export const SetOutputSchema: GenMessage<SetOutput> = /*@__PURE__*/
   messageDesc(file_tendon, 23);
 
 /**
- * A vibration pulse. It stops after its duration, or when a new pulse replaces it.
+ * A vibration pulse. It stops after its duration, or if it is replaced by a new pulse.
  *
  * @generated from message tendon.v1.Vibration
  */
 export type Vibration = Message<"tendon.v1.Vibration"> & {
   /**
-   * [0, 1]: fraction of the output's maximum; 0 is off
+   * The fraction of the maximum of the output. If it is 0, the output is turned off
+   *
+   * [0, 1]
    *
    * @generated from field: double amplitude = 1;
    */
   amplitude: number;
 
   /**
-   * [0, 1000]: Hz, 0 or at least 20; 0 is the output's own frequency
+   * Hz, either 0 or at least 20. If it is 0, the frequency is chosen by the output
+   *
+   * [0, 1000]
    *
    * @generated from field: double frequency_hz = 2;
    */
@@ -1497,20 +1531,20 @@ export const VibrationSchema: GenMessage<Vibration> = /*@__PURE__*/
   messageDesc(file_tendon, 24);
 
 /**
- * Requests the DeviceDescription of a device, whether the client has claimed the device or not.
+ * Requests the DeviceDescription of a device, which does not need to be claimed.
  *
  * @generated from message tendon.v1.Describe
  */
 export type Describe = Message<"tendon.v1.Describe"> & {
   /**
-   * [0, 15]: answered CODE_INVALID beyond the server's last device
+   * [0, 15]: if the server does not have this device, the answer is CODE_INVALID
    *
    * @generated from field: uint32 device = 1;
    */
   device: number;
 
   /**
-   * with the feature "handle" only: requests the HandleDescription instead
+   * If true, the HandleDescription is requested instead. This requires the feature "handle"
    *
    * @generated from field: bool handle = 2;
    */
@@ -1525,9 +1559,9 @@ export const DescribeSchema: GenMessage<Describe> = /*@__PURE__*/
   messageDesc(file_tendon, 25);
 
 /**
- * Asks that the channel take the client's forces; only from a client that has claimed the channel as a controller.
- * CODE_OK: the client holds the lease. CODE_BUSY: another client does, and wait_ms is the time until that lease ends
- * unless it is renewed.
+ * Requests the lease of a channel. Can only be used by a client that has claimed the channel as a controller. If the
+ * answer is CODE_OK, the client holds the lease and its forces are used. If another client holds the lease, the answer
+ * is CODE_BUSY, and wait_ms is the time until the lease ends if it is not renewed.
  *
  * @generated from message tendon.v1.TakeLease
  */
@@ -1583,7 +1617,7 @@ export const GiveLeaseSchema: GenMessage<GiveLease> = /*@__PURE__*/
   messageDesc(file_tendon, 27);
 
 /**
- * Tells a client with the feature "channels" that the channel now takes the forces of another client.
+ * Notifies a client with the feature "channels" that the lease of the channel was taken by another client.
  *
  * @generated from message tendon.v1.LeaseLost
  */
@@ -1603,7 +1637,7 @@ export type LeaseLost = Message<"tendon.v1.LeaseLost"> & {
   channel: number;
 
   /**
-   * [0, 64] bytes: name of the new lease holder
+   * [0, 64] bytes: the name of the new holder
    *
    * @generated from field: string to = 3;
    */
@@ -1624,7 +1658,7 @@ export const LeaseLostSchema: GenMessage<LeaseLost> = /*@__PURE__*/
  */
 export type ControlAck = Message<"tendon.v1.ControlAck"> & {
   /**
-   * [1, …]: id of the answered Control
+   * [1, …]: the id of the Control that is answered
    *
    * @generated from field: uint32 id = 1;
    */
@@ -1643,7 +1677,8 @@ export type ControlAck = Message<"tendon.v1.ControlAck"> & {
   detail: string;
 
   /**
-   * with CODE_BUSY of TakeLease: time until the lease ends, unless its holder renews it; 0 if it is not known
+   * If the answer to TakeLease is CODE_BUSY, this is the time until the lease ends if it is not renewed, or 0 if it is
+   * unknown
    *
    * [0, 3600000]
    *
@@ -1652,14 +1687,14 @@ export type ControlAck = Message<"tendon.v1.ControlAck"> & {
   waitMs: number;
 
   /**
-   * with CODE_OK of Describe
+   * the answer to a Describe with CODE_OK
    *
    * @generated from field: tendon.v1.DeviceDescription device = 5;
    */
   device?: DeviceDescription | undefined;
 
   /**
-   * with CODE_OK of Describe, if it requested the handle
+   * the answer to a Describe with CODE_OK if `handle` was set
    *
    * @generated from field: tendon.v1.HandleDescription handle = 6;
    */
@@ -1687,70 +1722,74 @@ export type DeviceDescription = Message<"tendon.v1.DeviceDescription"> & {
   device: number;
 
   /**
-   * [0, 24] bytes: the server's name for the device, which a claim uses
+   * [0, 24] bytes: the name of the device, which can be used in a claim
    *
    * @generated from field: string name = 2;
    */
   name: string;
 
   /**
-   * [0, 64] bytes: the kind of device, as Welcome.device_name
+   * [0, 64] bytes: the kind of device, as in Welcome.device_name
    *
    * @generated from field: string model = 3;
    */
   model: string;
 
   /**
-   * [1, 6]: number of measured axes
+   * [1, 6]: the number of axes that are measured
    *
    * @generated from field: uint32 position_dof = 4;
    */
   positionDof: number;
 
   /**
-   * [1, 6]: number of axes with a motor
+   * [1, 6]: the number of axes that have a motor
    *
    * @generated from field: uint32 force_dof = 5;
    */
   forceDof: number;
 
   /**
-   * corner of the box that the handle stays in, min ≤ max; both absent: not known
+   * The minimum corner of the workspace of the handle. Both corners are absent if the workspace is unknown
    *
    * @generated from field: tendon.v1.Vec3 workspace_min_m = 6;
    */
   workspaceMinM?: Vec3 | undefined;
 
   /**
-   * the opposite corner; both or neither, or it is refused
+   * The maximum corner. If only one of the corners is present, the message is refused
    *
    * @generated from field: tendon.v1.Vec3 workspace_max_m = 7;
    */
   workspaceMaxM?: Vec3 | undefined;
 
   /**
-   * [0, 1e12]: norm of the peak force; 0 if it is not known
+   * [0, 1e12]: the maximum norm of the force, or 0 if it is unknown
    *
    * @generated from field: double max_force_n = 8;
    */
   maxForceN: number;
 
   /**
-   * [0, 1e12]: norm of the force for any length of time; 0 if it is not known
+   * The maximum norm of the force that has no time limit, or 0 if it is unknown
+   *
+   * [0, 1e12]
    *
    * @generated from field: double continuous_force_n = 9;
    */
   continuousForceN: number;
 
   /**
-   * [0, 1e12]: largest stiffness that the device renders stably; 0 if it is not known
+   * [0, 1e12]: the maximum stiffness that is rendered stably, or 0 if it is unknown
    *
    * @generated from field: double max_stiffness_npm = 10;
    */
   maxStiffnessNpm: number;
 
   /**
-   * [0, 1e12]: one encoder count at the handle; 0 if the position is exact
+   * The size of an encoder count at the handle, or 0 if the position is exact
+   *
+   * [0, 1e12]
    *
    * @generated from field: double position_resolution_m = 11;
    */
@@ -1764,7 +1803,9 @@ export type DeviceDescription = Message<"tendon.v1.DeviceDescription"> & {
   loopHz: number;
 
   /**
-   * [1, 8] entries: channels of the device, by number
+   * The channels of the device, in the order of their numbers
+   *
+   * [1, 8] entries
    *
    * @generated from field: repeated tendon.v1.ChannelDescription channels = 13;
    */
@@ -1779,7 +1820,7 @@ export const DeviceDescriptionSchema: GenMessage<DeviceDescription> = /*@__PURE_
   messageDesc(file_tendon, 30);
 
 /**
- * The properties of a device's handle, with the feature "handle" only.
+ * The properties of the handle of a device. Requires the feature "handle".
  *
  * @generated from message tendon.v1.HandleDescription
  */
@@ -1792,15 +1833,15 @@ export type HandleDescription = Message<"tendon.v1.HandleDescription"> & {
   device: number;
 
   /**
-   * rotation from the device base frame to the operator's frame: x to the right, y up, z towards the user; absent: not
-   * known
+   * The rotation from the base frame of the device to the frame of the operator, where x is to the right, y is up, and
+   * z is towards the user. Absent if it is unknown
    *
    * @generated from field: tendon.v1.Quat operator_from_device = 2;
    */
   operatorFromDevice?: Quat | undefined;
 
   /**
-   * names by bit of DeviceState.buttons; a name may be empty
+   * The name for each bit of DeviceState.buttons. Names can be empty
    *
    * [0, 16] entries of [0, 24] bytes
    *
@@ -1809,35 +1850,38 @@ export type HandleDescription = Message<"tendon.v1.HandleDescription"> & {
   buttons: string[];
 
   /**
-   * true if every state has an orientation, false if none has
+   * If true, all states contain an orientation. Otherwise, none of them do
    *
    * @generated from field: bool orientation_measured = 4;
    */
   orientationMeasured: boolean;
 
   /**
-   * [0, 1e12]: norm of the torque that the device can exert; 0 if it has no such motors
+   * [0, 1e12]: the maximum norm of the torque, or 0 if the device cannot exert torques
    *
    * @generated from field: double max_torque_nm = 5;
    */
   maxTorqueNm: number;
 
   /**
-   * [0, 1e12]: opening of the open gripper; absent: no gripper
+   * The opening of the gripper if it is open. Absent if there is no gripper
+   *
+   * [0, 1e12]
    *
    * @generated from field: optional double gripper_open_rad = 6;
    */
   gripperOpenRad?: number | undefined;
 
   /**
-   * [0, 1e12]: force on the fingers; 0 if the gripper has no motor
+   * [0, 1e12]: the maximum force on the fingers, or 0 if the gripper has no motor
    *
    * @generated from field: double max_gripper_force_n = 7;
    */
   maxGripperForceN: number;
 
   /**
-   * name that the devices of one body share (two arms, five fingers); empty if the device is by itself
+   * The name of a group of devices that belong together, such as two arms or five fingers. It is empty if the device is
+   * not part of a group
    *
    * [0, 24] bytes
    *
@@ -1852,7 +1896,7 @@ export type HandleDescription = Message<"tendon.v1.HandleDescription"> & {
 
   /**
    * With the feature "joints" only:
-   * names of the joints, in the order of DeviceState.joint_rad
+   * The names of the joints, in the order of DeviceState.joint_rad
    *
    * [0, 8] entries of [0, 24] bytes
    *
@@ -1862,8 +1906,9 @@ export type HandleDescription = Message<"tendon.v1.HandleDescription"> & {
 
   /**
    * With the feature "outputs" only:
+   * The outputs that can be set using SetOutput, in the order of their numbers
    *
-   * [0, 8] entries: outputs that SetOutput can set, by number
+   * [0, 8] entries
    *
    * @generated from field: repeated tendon.v1.OutputDescription outputs = 11;
    */
@@ -1904,13 +1949,13 @@ export const OutputDescriptionSchema: GenMessage<OutputDescription> = /*@__PURE_
   messageDesc(file_tendon, 32);
 
 /**
- * A channel of a device and its lease.
+ * The properties of a channel.
  *
  * @generated from message tendon.v1.ChannelDescription
  */
 export type ChannelDescription = Message<"tendon.v1.ChannelDescription"> & {
   /**
-   * [0, 24] bytes: the name that a claim uses
+   * [0, 24] bytes: the name that is used in a claim
    *
    * @generated from field: string name = 1;
    */
@@ -1922,7 +1967,8 @@ export type ChannelDescription = Message<"tendon.v1.ChannelDescription"> & {
   rule: ChannelRule;
 
   /**
-   * time without a force after which another client may take the lease; 0 if the lease does not expire
+   * If the holder does not send a force for this time, another client can take the lease. It is 0 if the lease does not
+   * expire
    *
    * [0, 3600000]
    *
@@ -1931,7 +1977,9 @@ export type ChannelDescription = Message<"tendon.v1.ChannelDescription"> & {
   leaseMs: number;
 
   /**
-   * [0, 24] bytes: first 24 bytes of the lease holder's name; empty if there is none
+   * The first 24 bytes of the name of the holder. It is empty if there is no holder
+   *
+   * [0, 24] bytes
    *
    * @generated from field: string holder = 4;
    */
@@ -1974,8 +2022,9 @@ export const ByeSchema: GenMessage<Bye> = /*@__PURE__*/
   messageDesc(file_tendon, 34);
 
 /**
- * Statistics of a client's forces and datagrams: why forces were late, and how the network performed. One-way delays
- * depend on the estimated clock offset: they are accurate to ± clock_error_ns and can be negative.
+ * Statistics of the forces and datagrams of a client, which show why forces were late and how the network performed.
+ * One-way delays depend on the estimated offset of the clocks. They have an error of up to ± clock_error_ns and can be
+ * negative.
  *
  * @generated from message tendon.v1.LinkReport
  */
@@ -2004,63 +2053,63 @@ export type LinkReport = Message<"tendon.v1.LinkReport"> & {
   /**
    * In the interval:
    *
-   * forces that arrived
+   * the number of forces that have arrived
    *
    * @generated from field: uint64 forces = 4;
    */
   forces: bigint;
 
   /**
-   * forces that were late because the server sent a state late
+   * the number of forces that were late because a state was late
    *
    * @generated from field: uint64 late_server = 5;
    */
   lateServer: bigint;
 
   /**
-   * forces that were late because of the network, in either direction
+   * the number of forces that were late because of the network, in either direction
    *
    * @generated from field: uint64 late_network = 6;
    */
   lateNetwork: bigint;
 
   /**
-   * forces that were late because the engine took longer than usual
+   * the number of forces that were late because the engine was slower than usual
    *
    * @generated from field: uint64 late_engine = 7;
    */
   lateEngine: bigint;
 
   /**
-   * [0, 2^60]: longest time that the device was without a valid force
+   * [0, 2^60]: the maximum time for which the device did not have a valid force
    *
    * @generated from field: uint64 worst_late_ns = 8;
    */
   worstLateNs: bigint;
 
   /**
-   * [0, 2^60]: longest time without a datagram from the client
+   * [0, 2^60]: the maximum time without a datagram from the client
    *
    * @generated from field: uint64 longest_gap_ns = 9;
    */
   longestGapNs: bigint;
 
   /**
-   * absent: not measured
+   * absent if it was not measured
    *
    * @generated from field: tendon.v1.Delays round_trip = 10;
    */
   roundTrip?: Delays | undefined;
 
   /**
-   * one way; absent: not measured
+   * one way; absent if it was not measured
    *
    * @generated from field: tendon.v1.Delays to_server = 11;
    */
   toServer?: Delays | undefined;
 
   /**
-   * one way; absent: not measured
+   * one way; absent if it was not measured
    *
    * @generated from field: tendon.v1.Delays to_client = 12;
    */
@@ -2069,21 +2118,21 @@ export type LinkReport = Message<"tendon.v1.LinkReport"> & {
   /**
    * Clocks:
    *
-   * [-2^60, 2^60]: the client's clock minus the server's
+   * [-2^60, 2^60]: the clock of the client minus the clock of the server
    *
    * @generated from field: sint64 clock_offset_ns = 13;
    */
   clockOffsetNs: bigint;
 
   /**
-   * [-1e12, 1e12]: rate at which the offset grows
+   * [-1e12, 1e12]: the rate at which the offset increases
    *
    * @generated from field: double clock_drift_ppm = 14;
    */
   clockDriftPpm: number;
 
   /**
-   * [0, 2^60]: upper bound of |true offset − clock_offset_ns|
+   * [0, 2^60]: an upper bound of |true offset − clock_offset_ns|
    *
    * @generated from field: uint64 clock_error_ns = 15;
    */
@@ -2113,15 +2162,16 @@ export type LinkReport = Message<"tendon.v1.LinkReport"> & {
 
   /**
    * In the interval:
+   * An explanation of late and refused forces that can be shown to the user. It is empty if there are none
    *
-   * [0, 128] bytes: explanation of late and refused forces, for people; empty if there are none
+   * [0, 128] bytes
    *
    * @generated from field: string words = 20;
    */
   words: string;
 
   /**
-   * forces that are late for an unknown reason, because nothing is received from the client
+   * the number of forces that are late for an unknown reason, because the client is silent
    *
    * @generated from field: uint64 late_unknown = 21;
    */
@@ -2144,14 +2194,14 @@ export type LinkReport = Message<"tendon.v1.LinkReport"> & {
   refusedOutOfBounds: bigint;
 
   /**
-   * no step had the number based_on_tick, or it was more than 4096 ticks ago
+   * based_on_tick was unknown or more than 4096 ticks ago
    *
    * @generated from field: uint64 refused_unknown_tick = 24;
    */
   refusedUnknownTick: bigint;
 
   /**
-   * sequence has not grown, although the datagram is the newest
+   * the sequence was not increased even though the datagram is the newest
    *
    * @generated from field: uint64 refused_old_sequence = 25;
    */
@@ -2166,7 +2216,7 @@ export const LinkReportSchema: GenMessage<LinkReport> = /*@__PURE__*/
   messageDesc(file_tendon, 35);
 
 /**
- * Two quantiles of a delay. A one-way delay can be negative, because it compares two clocks.
+ * Two quantiles of a delay. The delay can be negative if two clocks are compared.
  *
  * @generated from message tendon.v1.Delays
  */
@@ -2194,63 +2244,67 @@ export const DelaysSchema: GenMessage<Delays> = /*@__PURE__*/
   messageDesc(file_tendon, 36);
 
 /**
- * The state of one end of a coupling, sent to the other end. Vectors are in the base frame and the scale of the
- * SENDER's device. core/teleoperation/coupling.h describes their use.
+ * The state of one end of a coupling, which is sent to the other end. Vectors use the base frame and the scale of the
+ * SENDER's device. For their use, see core/teleoperation/coupling.h.
  *
  * @generated from message tendon.v1.PortState
  */
 export type PortState = Message<"tendon.v1.PortState"> & {
   /**
-   * [0, 15]: device of the session's server, in both directions
+   * [0, 15]: the device of the server of this session, in both directions
    *
    * @generated from field: uint32 device = 1;
    */
   device: number;
 
   /**
-   * [0, 7]: channel of the session's server, in both directions
+   * [0, 7]: the channel of the server of this session, in both directions
    *
    * @generated from field: uint32 channel = 2;
    */
   channel: number;
 
   /**
-   * [1, …]: epoch of the sender, which increases when the sender restarts
+   * [1, …]: the epoch of the sender, which is increased if the sender is restarted
    *
    * @generated from field: uint64 epoch = 3;
    */
   epoch: bigint;
 
   /**
-   * [1, …]: 1, 2, 3 … within an epoch: the sender's haptic steps
+   * [1, …]: the number of the haptic step of the sender in this epoch: 1, 2, 3 …
    *
    * @generated from field: uint64 sequence = 4;
    */
   sequence: bigint;
 
   /**
-   * epoch of the receiver that `answers`, given_j and taken_j belong to; 0: none yet
+   * the epoch of the receiver for `answers`, given_j and taken_j, or 0
    *
    * @generated from field: uint64 answers_epoch = 5;
    */
   answersEpoch: bigint;
 
   /**
-   * sequence of the receiver's newest PortState in use; 0: none yet
+   * the sequence of the receiver's newest PortState that is used, or 0
    *
    * @generated from field: uint64 answers = 6;
    */
   answers: bigint;
 
   /**
-   * [-2^60, 2^60]: time on the sender's clock; only differences are used
+   * The time on the clock of the sender, which is only used for computing differences
+   *
+   * [-2^60, 2^60]
    *
    * @generated from field: sfixed64 time_ns = 7;
    */
   timeNs: bigint;
 
   /**
-   * [0, 10000000000]: round trip measured by the sender; 0 before the first measurement
+   * The round trip that was measured by the sender, or 0 if it was not measured yet
+   *
+   * [0, 10000000000]
    *
    * @generated from field: uint64 round_trip_ns = 8;
    */
@@ -2262,78 +2316,82 @@ export type PortState = Message<"tendon.v1.PortState"> & {
   phase: PortPhase;
 
   /**
-   * number of the leader's engagement that the phase belongs to: 1, 2, 3 …; 0: none yet
+   * the number of the engagement of the leader that the phase belongs to: 1, 2, 3 …, or 0
    *
    * @generated from field: uint64 engagement = 10;
    */
   engagement: bigint;
 
   /**
-   * bit i: button i is held
+   * bit i is set if button i is pressed
    *
    * @generated from field: fixed32 buttons = 11;
    */
   buttons: number;
 
   /**
-   * displacement of the handle from the sender's offset
+   * the displacement of the handle from the offset of the sender
    *
    * @generated from field: tendon.v1.Vec3 position_m = 12;
    */
   positionM?: Vec3 | undefined;
 
   /**
-   * velocity of that displacement; zero while the displacement is frozen
+   * the velocity of this displacement, which is zero if the displacement is frozen
    *
    * @generated from field: tendon.v1.Vec3 velocity_mps = 13;
    */
   velocityMps?: Vec3 | undefined;
 
   /**
-   * actual force on the hand at the sender's handle
+   * the actual force on the hand at the handle of the sender
    *
    * @generated from field: tendon.v1.Vec3 force_n = 14;
    */
   forceN?: Vec3 | undefined;
 
   /**
-   * force of the environment on the sender's tool; absent: not measured
+   * The force of the environment on the tool of the sender. Absent if it is not measured
    *
    * @generated from field: tendon.v1.Vec3 contact_force_n = 15;
    */
   contactForceN?: Vec3 | undefined;
 
   /**
-   * [-1e3, 1e3]: energy that the sender may still give out, after its payments
+   * [-1e3, 1e3]: the energy that the sender may still output, minus its payments
    *
    * @generated from field: double account_j = 16;
    */
   accountJ: number;
 
   /**
-   * [0, 1e3]: energy that the sender needs for its desired force; 0: it has no tank
+   * The energy that the sender needs for its desired force, or 0 if it does not have a tank
+   *
+   * [0, 1e3]
    *
    * @generated from field: double need_j = 17;
    */
   needJ: number;
 
   /**
-   * [0, 1e6]: total paid to the receiver; it never decreases while both epochs last
+   * The total energy that was paid to the receiver. It does not decrease until one of the epochs changes
+   *
+   * [0, 1e6]
    *
    * @generated from field: double given_j = 18;
    */
   givenJ: number;
 
   /**
-   * [0, 1e6]: the receiver's given_j, as last received, in joules of the receiver
+   * [0, 1e6]: the given_j of the receiver that was received last, in joules of the receiver
    *
    * @generated from field: double taken_j = 19;
    */
   takenJ: number;
 
   /**
-   * COUPLING_METHOD_WAVES: √W·s, ∫ wave dt since the epoch began: a total, so a lost frame has no lasting effect; half
-   * the square of a wave is a power. Absent: nothing sent yet
+   * For COUPLING_METHOD_WAVES, √W·s: the integral of the wave since the start of the epoch. Since this is a total, lost
+   * frames have no lasting effect. Half the square of a wave is a power. Absent if nothing was sent yet
    *
    * @generated from field: tendon.v1.Vec3 wave_integral = 20;
    */
@@ -2347,28 +2405,28 @@ export type PortState = Message<"tendon.v1.PortState"> & {
   waveEnergyJ: number;
 
   /**
-   * COUPLING_METHOD_SURFACE, from the follower; absent: no surface was touched yet
+   * For COUPLING_METHOD_SURFACE, from the follower. Absent if it has not touched a surface yet
    *
    * @generated from field: tendon.v1.PortSurface surface = 22;
    */
   surface?: PortSurface | undefined;
 
   /**
-   * absent: the orientations are not coupled
+   * absent if the orientations are not coupled
    *
    * @generated from field: tendon.v1.PortTurn turn = 23;
    */
   turn?: PortTurn | undefined;
 
   /**
-   * absent: the grippers are not coupled
+   * absent if the grippers are not coupled
    *
    * @generated from field: tendon.v1.PortGrip grip = 24;
    */
   grip?: PortGrip | undefined;
 
   /**
-   * COUPLING_METHOD_PASSIVITY: energy that the sender's port took in during this epoch
+   * For COUPLING_METHOD_PASSIVITY, the energy that was received by the port of the sender in this epoch
    *
    * [0, 1e6]
    *
@@ -2377,7 +2435,7 @@ export type PortState = Message<"tendon.v1.PortState"> & {
   energyInJ: number;
 
   /**
-   * weight of the receiver among the leaders of a follower; absent: the receiver is the only leader
+   * The weight of the receiver if the follower has several leaders. Absent if the receiver is the only leader
    *
    * [0, 1]
    *
@@ -2404,7 +2462,7 @@ export type PortState = Message<"tendon.v1.PortState"> & {
   /**
    * To an observer:
    *
-   * true if this is the other end of the device's coupling, as the server received it
+   * if true, this is the other end of the coupling of the device, as received by the server
    *
    * @generated from field: bool of_peer = 29;
    */
@@ -2419,27 +2477,27 @@ export const PortStateSchema: GenMessage<PortState> = /*@__PURE__*/
   messageDesc(file_tendon, 37);
 
 /**
- * The rotation of a handle since its offset was taken.
+ * The rotation of a handle since its offset was set.
  *
  * @generated from message tendon.v1.PortTurn
  */
 export type PortTurn = Message<"tendon.v1.PortTurn"> & {
   /**
-   * rotation in the axes of the sender's base frame
+   * the rotation in the axes of the sender's base frame
    *
    * @generated from field: tendon.v1.Quat turn = 1;
    */
   turn?: Quat | undefined;
 
   /**
-   * angular velocity; zero while the rotation is frozen
+   * the angular velocity, which is zero if the rotation is frozen
    *
    * @generated from field: tendon.v1.Vec3 angular_velocity_radps = 2;
    */
   angularVelocityRadps?: Vec3 | undefined;
 
   /**
-   * actual torque on the hand at the sender's handle
+   * the actual torque on the hand at the handle of the sender
    *
    * @generated from field: tendon.v1.Vec3 torque_nm = 3;
    */
@@ -2454,7 +2512,7 @@ export const PortTurnSchema: GenMessage<PortTurn> = /*@__PURE__*/
   messageDesc(file_tendon, 38);
 
 /**
- * State of a gripper, measured at its fingers. The gripper has its own energy account.
+ * The state of a gripper, measured at its fingers. The gripper has a separate energy account.
  *
  * @generated from message tendon.v1.PortGrip
  */
@@ -2474,7 +2532,9 @@ export type PortGrip = Message<"tendon.v1.PortGrip"> & {
   velocityMps: number;
 
   /**
-   * [-1e12, 1e12]: actual force on the fingers, > 0 opens them
+   * The actual force on the fingers. Positive values open them
+   *
+   * [-1e12, 1e12]
    *
    * @generated from field: double force_n = 3;
    */
@@ -2517,13 +2577,13 @@ export const PortGripSchema: GenMessage<PortGrip> = /*@__PURE__*/
   messageDesc(file_tendon, 39);
 
 /**
- * A flat elastic surface that the sender's tool touches, or was the last to touch. It pushes and does not pull.
+ * A flat elastic surface that is or was touched by the tool of the sender. It can push but not pull.
  *
  * @generated from message tendon.v1.PortSurface
  */
 export type PortSurface = Message<"tendon.v1.PortSurface"> & {
   /**
-   * direction out of the surface
+   * the direction out of the surface
    *
    * @generated from field: tendon.v1.Vec3 normal = 1;
    */
@@ -2537,7 +2597,7 @@ export type PortSurface = Message<"tendon.v1.PortSurface"> & {
   offsetM: number;
 
   /**
-   * [0, 1e12]: stiffness; 0 if the surface is gone
+   * [0, 1e12]: the stiffness, or 0 if there is no surface
    *
    * @generated from field: double stiffness_npm = 3;
    */
@@ -2552,7 +2612,7 @@ export const PortSurfaceSchema: GenMessage<PortSurface> = /*@__PURE__*/
   messageDesc(file_tendon, 40);
 
 /**
- * Performance of a device's loop. All counts are for the reported interval.
+ * Statistics of the loop of a device. All counts are for the reported interval.
  *
  * @generated from message tendon.v1.DeviceReport
  */
@@ -2593,30 +2653,30 @@ export type DeviceReport = Message<"tendon.v1.DeviceReport"> & {
   steps: bigint;
 
   /**
-   * periods without a step, because the previous step was late
+   * the number of periods that were skipped because the previous step was late
    *
    * @generated from field: uint64 missed = 6;
    */
   missed: bigint;
 
   /**
-   * steps that began too long after the previous one (reason overrun)
+   * the number of steps that started too late (reason overrun)
    *
    * @generated from field: uint64 overruns = 7;
    */
   overruns: bigint;
 
   /**
-   * steps in which the device reported no position
+   * the number of steps without a position
    *
    * @generated from field: uint64 unseen = 8;
    */
   unseen: bigint;
 
   /**
-   * how late the loop woke: entry 0 counts the steps that were at most 1 µs late, entry i those more than 2^(i−1) µs
-   * and at most 2^i µs late, entry 23 all those more than 2^22 µs late. Trailing zeros are omitted. The sum is less
-   * than `steps` only if the server failed to count some
+   * The number of steps by their delay. Entry 0 counts the steps that were at most 1 µs late, entry i the steps that
+   * were more than 2^(i−1) µs and at most 2^i µs late, and entry 23 all steps that were more than 2^22 µs late. Zeros
+   * at the end are omitted. If the server was not able to count all steps, the sum is smaller than `steps`
    *
    * [0, 24] entries
    *
@@ -2630,7 +2690,8 @@ export type DeviceReport = Message<"tendon.v1.DeviceReport"> & {
   safety: Safety;
 
   /**
-   * why the device exerts no force until it is armed or rearmed, for people; empty if there is no fault
+   * The reason why the device does not exert forces until it is armed or rearmed, as text for the user. It is empty if
+   * there is no fault
    *
    * [0, 128] bytes
    *
@@ -2639,7 +2700,7 @@ export type DeviceReport = Message<"tendon.v1.DeviceReport"> & {
   fault: string;
 
   /**
-   * service that the server reduces at present, for people; empty if there is none
+   * The service that is currently reduced by the server, as text for the user. It is empty if there is none
    *
    * [0, 128] bytes
    *
@@ -2656,7 +2717,7 @@ export const DeviceReportSchema: GenMessage<DeviceReport> = /*@__PURE__*/
   messageDesc(file_tendon, 41);
 
 /**
- * Performance of the engine that holds the lease of a channel.
+ * Statistics of the engine that holds the lease of a channel.
  *
  * @generated from message tendon.v1.PeerReport
  */
@@ -2676,14 +2737,14 @@ export type PeerReport = Message<"tendon.v1.PeerReport"> & {
   channel: number;
 
   /**
-   * [0, 64] bytes: name of the engine, as in its Hello
+   * [0, 64] bytes: the name of the engine in its Hello
    *
    * @generated from field: string name = 3;
    */
   name: string;
 
   /**
-   * the engine is sent one in this many of its requested states, because its link is full
+   * One of this many requested states is sent to the engine, because its link is congested
    *
    * [1, 1000]
    *
@@ -2692,14 +2753,14 @@ export type PeerReport = Message<"tendon.v1.PeerReport"> & {
   stateOneIn: number;
 
   /**
-   * the server ignores its forces, because its link loses too many datagrams
+   * If true, the forces of the engine are ignored because its link has lost too many datagrams
    *
    * @generated from field: bool forces_refused = 5;
    */
   forcesRefused: boolean;
 
   /**
-   * report on the engine's link; number and the counts of forces are per channel; absent is refused
+   * The report about the link of the engine. The number and the counts of forces are per channel; absent is refused
    *
    * @generated from field: tendon.v1.LinkReport link = 6;
    */
@@ -2707,15 +2768,18 @@ export type PeerReport = Message<"tendon.v1.PeerReport"> & {
 
   /**
    * Of the force in the interval with the largest ForceCommand.error_n; if none states an error, of the newest:
+   * The estimated error of this force. Absent if errors are not estimated
    *
-   * [0, 1e12]: estimated error of that force; absent: no force states an error
+   * [0, 1e12]
    *
    * @generated from field: optional double error_n = 7;
    */
   errorN?: number | undefined;
 
   /**
-   * [0, 24] bytes: entry of Hello.ways for that force; empty if it is not stated
+   * The entry of Hello.ways for this force. It is empty if it is unknown
+   *
+   * [0, 24] bytes
    *
    * @generated from field: string way = 8;
    */
@@ -2736,21 +2800,23 @@ export const PeerReportSchema: GenMessage<PeerReport> = /*@__PURE__*/
  */
 export type Hello = Message<"tendon.v1.Hello"> & {
   /**
-   * [1, …]: lowest version that the client speaks; the highest common version is used
+   * The lowest version that is supported by the client. The highest common version is used
+   *
+   * [1, …]
    *
    * @generated from field: uint32 version_min = 1;
    */
   versionMin: number;
 
   /**
-   * highest version that the client speaks
+   * the highest version that is supported by the client
    *
    * @generated from field: uint32 version_max = 2;
    */
   versionMax: number;
 
   /**
-   * with claims, the highest role among them
+   * if there are claims, this is the highest role of them
    *
    * @generated from field: tendon.v1.Role role = 3;
    */
@@ -2764,7 +2830,7 @@ export type Hello = Message<"tendon.v1.Hello"> & {
   name: string;
 
   /**
-   * offered features; a feature is used if both peers name it
+   * The features that are offered. A feature is used if both peers name it
    *
    * [0, 16] entries of [0, 32] bytes
    *
@@ -2773,8 +2839,8 @@ export type Hello = Message<"tendon.v1.Hello"> & {
   features: string[];
 
   /**
-   * claimed devices and channels, each once. Without claims, the client is granted device 0 and its channel 0 with
-   * `role`
+   * The devices and channels that are claimed, without duplicates. If this is empty, the client is granted device 0 and
+   * its channel 0 with `role`
    *
    * [0, 16] entries
    *
@@ -2784,7 +2850,8 @@ export type Hello = Message<"tendon.v1.Hello"> & {
 
   /**
    * With the feature "ways" only:
-   * names of the ways in which this engine computes forces, the fastest first; ForceCommand.way is an index in it
+   * The names of the ways in which this engine can compute forces, starting with the fastest. They are used by
+   * ForceCommand.way
    *
    * [0, 8] entries of [0, 24] bytes
    *
@@ -2801,20 +2868,20 @@ export const HelloSchema: GenMessage<Hello> = /*@__PURE__*/
   messageDesc(file_tendon, 43);
 
 /**
- * A device or a channel that the client wants.
+ * Claims a device or a channel.
  *
  * @generated from message tendon.v1.Claim
  */
 export type Claim = Message<"tendon.v1.Claim"> & {
   /**
-   * [0, 24] bytes: name of the device; empty: device 0
+   * [0, 24] bytes: the name of the device, or empty for device 0
    *
    * @generated from field: string device = 1;
    */
   device: string;
 
   /**
-   * [0, 24] bytes: name of the channel, from a controller; empty: channel 0
+   * [0, 24] bytes: the name of the channel if the role is controller, or empty for channel 0
    *
    * @generated from field: string channel = 2;
    */
@@ -2871,14 +2938,14 @@ export const AnswerSchema: GenMessage<Answer> = /*@__PURE__*/
  */
 export type Welcome = Message<"tendon.v1.Welcome"> & {
   /**
-   * [1, …]: version of the session, within the client's range
+   * [1, …]: the version of this session, which is in the range of the client
    *
    * @generated from field: uint32 version = 1;
    */
   version: number;
 
   /**
-   * [0, 16] entries of [0, 32] bytes: features that both peers named
+   * [0, 16] entries of [0, 32] bytes: the features that were named by both peers
    *
    * @generated from field: repeated string features = 2;
    */
@@ -2899,14 +2966,16 @@ export type Welcome = Message<"tendon.v1.Welcome"> & {
   deviceName: string;
 
   /**
-   * [0, 1e12]: norm of the force that the device can exert
+   * [0, 1e12]: the maximum norm of the force
    *
    * @generated from field: double max_force_n = 5;
    */
   maxForceN: number;
 
   /**
-   * [0, 1e12]: one encoder count at the handle; 0 if the position is exact
+   * The size of an encoder count at the handle, or 0 if the position is exact
+   *
+   * [0, 1e12]
    *
    * @generated from field: double position_resolution_m = 6;
    */
@@ -2920,22 +2989,22 @@ export type Welcome = Message<"tendon.v1.Welcome"> & {
   loopHz: number;
 
   /**
-   * [1, 3600000]: silence after which the server forgets this client
+   * [1, 3600000]: the server forgets the client if it is silent for this time
    *
    * @generated from field: uint32 timeout_ms = 8;
    */
   timeoutMs: number;
 
   /**
-   * [0, 64] bytes: name and version of the server
+   * [0, 64] bytes: the name and the version of the server
    *
    * @generated from field: string server = 9;
    */
   server: string;
 
   /**
-   * one for each claim, in the claims' order; device_name … loop_hz are those of the first grant's device. A server
-   * that does not know claims sends none, and treats the Hello as one without claims
+   * One for each claim, in the same order. The fields device_name … loop_hz describe the device of the first one.
+   * Servers that do not support claims do not send any, and ignore the claims of the Hello
    *
    * [0, 16] entries
    *
@@ -2952,27 +3021,28 @@ export const WelcomeSchema: GenMessage<Welcome> = /*@__PURE__*/
   messageDesc(file_tendon, 46);
 
 /**
- * The numbers of a device and a channel that were claimed by name.
+ * The numbers of a device and a channel that were claimed using their names.
  *
  * @generated from message tendon.v1.Grant
  */
 export type Grant = Message<"tendon.v1.Grant"> & {
   /**
-   * [0, 15]: number of the device in all later messages
+   * [0, 15]: the number of the device in all later messages
    *
    * @generated from field: uint32 device = 1;
    */
   device: number;
 
   /**
-   * [0, 7]: number of the channel in all later messages
+   * [0, 7]: the number of the channel in all later messages
    *
    * @generated from field: uint32 channel = 2;
    */
   channel: number;
 
   /**
-   * granted role; ROLE_OBSERVER for a controller's claim if another client holds the lease (TakeLease)
+   * The role that was granted. It is ROLE_OBSERVER if a controller was claimed, but another client holds the lease
+   * (TakeLease)
    *
    * @generated from field: tendon.v1.Role role = 3;
    */
@@ -3007,14 +3077,14 @@ export type Refused = Message<"tendon.v1.Refused"> & {
   detail: string;
 
   /**
-   * lowest version that the server speaks
+   * the lowest version that is supported by the server
    *
    * @generated from field: uint32 version_min = 3;
    */
   versionMin: number;
 
   /**
-   * highest version that the server speaks
+   * the highest version that is supported by the server
    *
    * @generated from field: uint32 version_max = 4;
    */
@@ -3042,7 +3112,7 @@ export enum Mode {
   UNSPECIFIED = 0,
 
   /**
-   * no force has arrived yet, or none since the last safe stop
+   * no force has arrived since the start or the last safe stop
    *
    * @generated from enum value: MODE_IDLE = 1;
    */
@@ -3070,14 +3140,14 @@ export enum Mode {
   DECAYING = 4,
 
   /**
-   * the force has faded to zero; only a fresh force ends this
+   * the force is zero until a fresh force arrives
    *
    * @generated from enum value: MODE_SAFE_STOP = 5;
    */
   SAFE_STOP = 5,
 
   /**
-   * latched: zero force until a Rearm
+   * latched: the force is zero until a Rearm
    *
    * @generated from enum value: MODE_FAULT = 6;
    */
@@ -3091,7 +3161,7 @@ export const ModeSchema: GenEnum<Mode> = /*@__PURE__*/
   enumDesc(file_tendon, 0);
 
 /**
- * Which end of a coupling.
+ * The role of an end in a coupling.
  *
  * @generated from enum tendon.v1.PortRole
  */
@@ -3134,42 +3204,43 @@ export enum CouplingMethod {
   UNSPECIFIED = 0,
 
   /**
-   * a spring and a damper between the handles, at both ends
+   * springs and dampers between the handles at both ends
    *
    * @generated from enum value: COUPLING_METHOD_POSITION_POSITION = 1;
    */
   POSITION_POSITION = 1,
 
   /**
-   * a spring pulls the follower; the leader feels the contact force that the follower measures
+   * the follower is pulled by a spring, and the leader feels the contact force that is measured by the follower
    *
    * @generated from enum value: COUPLING_METHOD_POSITION_FORCE = 2;
    */
   POSITION_FORCE = 2,
 
   /**
-   * wave variables, through a playout buffer
+   * wave variables with a playout buffer
    *
    * @generated from enum value: COUPLING_METHOD_WAVES = 3;
    */
   WAVES = 3,
 
   /**
-   * a spring pulls the follower; the leader feels a model of the surface that the follower found
+   * the follower is pulled by a spring, and the leader feels a model of the surface that was found by the follower
    *
    * @generated from enum value: COUPLING_METHOD_SURFACE = 4;
    */
   SURFACE = 4,
 
   /**
-   * velocity to the follower and force to the leader, each paid from the energy that the other end took in
+   * the velocity is sent to the follower and the force to the leader, and each end pays with the energy that was
+   * received by the other end
    *
    * @generated from enum value: COUPLING_METHOD_PASSIVITY = 5;
    */
   PASSIVITY = 5,
 
   /**
-   * springs to delayed positions, stretched only as far as the energy account allows
+   * springs to delayed positions, which are only stretched as far as the energy account allows
    *
    * @generated from enum value: COUPLING_METHOD_SET_POSITION = 6;
    */
@@ -3208,7 +3279,7 @@ export enum OutputKind {
   OUTPUT_LAMP = 1,
 
   /**
-   * a separate vibrator, not the motors of the axes
+   * a separate vibrator that is not one of the motors of the axes
    *
    * @generated from enum value: OUTPUT_VIBRATION = 2;
    */
@@ -3250,8 +3321,8 @@ export const HandSchema: GenEnum<Hand> = /*@__PURE__*/
   enumDesc(file_tendon, 4);
 
 /**
- * How a device combines the forces of its channels: it adds the forces of all sum channels and the first fresh force of
- * the priority channels, in the order of their numbers.
+ * Describes how the forces of the channels of a device are combined. The result is the sum of the forces of all sum
+ * channels and of the first fresh force of the priority channels, in the order of their numbers.
  *
  * @generated from enum tendon.v1.ChannelRule
  */
@@ -3264,14 +3335,14 @@ export enum ChannelRule {
   UNSPECIFIED = 0,
 
   /**
-   * its force is added to the others
+   * the force is added to the others
    *
    * @generated from enum value: CHANNEL_RULE_SUM = 1;
    */
   SUM = 1,
 
   /**
-   * it silences the later channels of this rule
+   * later channels with this rule are silent while the force is fresh
    *
    * @generated from enum value: CHANNEL_RULE_PRIORITY = 2;
    */
@@ -3285,7 +3356,7 @@ export const ChannelRuleSchema: GenEnum<ChannelRule> = /*@__PURE__*/
   enumDesc(file_tendon, 5);
 
 /**
- * Phase of one end of a coupling.
+ * The phase of an end of a coupling.
  *
  * @generated from enum tendon.v1.PortPhase
  */
@@ -3305,7 +3376,7 @@ export enum PortPhase {
   ALONE = 1,
 
   /**
-   * connected to the peer, and waiting for the operator's Engage; no force
+   * connected to the peer, but the operator has not engaged the coupling yet; no force
    *
    * @generated from enum value: PORT_PHASE_COUPLED = 2;
    */
@@ -3333,7 +3404,7 @@ export enum PortPhase {
   CLUTCHED = 5,
 
   /**
-   * the peer fell silent while engaged; only another Engage engages again
+   * the peer fell silent during an engagement and the coupling must be engaged again
    *
    * @generated from enum value: PORT_PHASE_LOST = 6;
    */
@@ -3354,7 +3425,7 @@ export const PortPhaseSchema: GenEnum<PortPhase> = /*@__PURE__*/
   enumDesc(file_tendon, 6);
 
 /**
- * The state of a device between being plugged in and exerting forces.
+ * The state of a device and its safety layer.
  *
  * @generated from enum tendon.v1.Safety
  */
@@ -3395,7 +3466,7 @@ export enum Safety {
   UNHOMED = 4,
 
   /**
-   * ready, and waits to be armed
+   * ready, but must be armed first
    *
    * @generated from enum value: SAFETY_HOMED = 5;
    */
@@ -3409,14 +3480,14 @@ export enum Safety {
   ARMED = 6,
 
   /**
-   * disarmed by a fault: no force until it is armed again
+   * disarmed because of a fault, and must be armed again
    *
    * @generated from enum value: SAFETY_FAULT = 7;
    */
   FAULT = 7,
 
   /**
-   * ready; its scene has no safety layer that could be armed
+   * ready, and there is no safety layer that can be armed
    *
    * @generated from enum value: SAFETY_UNGUARDED = 8;
    */
@@ -3430,7 +3501,7 @@ export const SafetySchema: GenEnum<Safety> = /*@__PURE__*/
   enumDesc(file_tendon, 7);
 
 /**
- * Why a request was refused, or why a session ended.
+ * Explains why a request was refused or a session was closed.
  *
  * @generated from enum tendon.v1.Code
  */
@@ -3448,21 +3519,21 @@ export enum Code {
   OK = 1,
 
   /**
-   * a value is out of bounds or makes no sense
+   * a value is out of bounds or does not make sense
    *
    * @generated from enum value: CODE_INVALID = 2;
    */
   INVALID = 2,
 
   /**
-   * this peer does not know the request, or has no version in common
+   * the request is not known or there is no common version
    *
    * @generated from enum value: CODE_UNSUPPORTED = 3;
    */
   UNSUPPORTED = 3,
 
   /**
-   * another client has it, such as another controller
+   * used by another client, such as another controller
    *
    * @generated from enum value: CODE_BUSY = 4;
    */
@@ -3483,21 +3554,21 @@ export enum Code {
   SHUTDOWN = 6,
 
   /**
-   * nothing was received for too long
+   * nothing was received until the timeout
    *
    * @generated from enum value: CODE_TIMED_OUT = 7;
    */
   TIMED_OUT = 7,
 
   /**
-   * the session of suite 1 or 2 is too old: repeat the handshake
+   * the session of suite 1 or 2 is too old, and the handshake must be repeated
    *
    * @generated from enum value: CODE_EXPIRED = 8;
    */
   EXPIRED = 8,
 
   /**
-   * another program with the same key has taken over: do not reconnect without being asked to
+   * replaced by another program with the same key; the client must not reconnect automatically
    *
    * @generated from enum value: CODE_REPLACED = 9;
    */
@@ -3511,7 +3582,7 @@ export const CodeSchema: GenEnum<Code> = /*@__PURE__*/
   enumDesc(file_tendon, 8);
 
 /**
- * An observer receives states; a controller also sends forces.
+ * The role of a client. Observers receive states, and controllers also send forces.
  *
  * @generated from enum tendon.v1.Role
  */
