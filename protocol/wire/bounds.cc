@@ -5,12 +5,13 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <limits>
+#include <optional>
 
 #include "core/base/rotation.h"
 #include "protocol/limits.h"
 #include "protocol/wire/fields/reader.h"
 #include "protocol/wire/fields/writer.h"
+#include "protocol/wire/generated/frame_fields.h"
 #include "protocol/wire/generated/request_fields.h"
 
 namespace tendon {
@@ -18,33 +19,65 @@ namespace {
 
 bool all_bounded(const auto& numbers) noexcept { return (numbers.array().abs() <= limits::kMaxValue).all(); }
 
-bool in_bounds(const ForceTable& table) noexcept {
-  return table.size >= ForceTable::kMinEntries && table.size <= ForceTable::kMaxEntries && bounded(table.first) &&
-         bounded(table.step) && table.step > 0 &&
-         std::all_of(table.force.begin(), table.force.begin() + table.size, [](double f) { return bounded(f); });
-}
+using wire::Name;
+using wire::Within;
 
-bool in_bounds(const Contact& contact) noexcept {
-  return wire::is_unit(contact.normal) && bounded(contact.gap) && (!contact.table || in_bounds(*contact.table));
-}
+/// A visitor of lists (fields/field.h) that checks all fields of floating-point numbers, and no others.
+class Numbers {
+ public:
+  bool in_bounds = true;
+  bool finite = true;
 
-bool in_bounds(const LocalModel& model) noexcept {
-  const bool anywhere = model.valid_radius == std::numeric_limits<double>::infinity();
-  return all_bounded(model.at) && all_bounded(model.stiffness) && (anywhere || bounded(model.valid_radius)) &&
-         model.valid_radius >= 0 && (!model.contact || in_bounds(*model.contact));
-}
+  void number(auto /*field*/, Name /*name*/, double value, const Within& bound = {}) noexcept { check(value, bound); }
+  void maybe(auto /*field*/, Name /*name*/, const auto& value, const auto&... bound) noexcept {
+    if (value) check(*value, bound...);
+  }
+  void radius(auto /*field*/, Name /*name*/, double value) noexcept { check(value, {.least = 0, .infinity = true}); }
+  void vector(auto /*field*/, Name /*name*/, const Vec3& value) noexcept { check(value); }
+  void normal(auto /*field*/, Name /*name*/, const Vec3& value) noexcept {
+    check(value);
+    in_bounds &= wire::is_unit(value);
+  }
+  void rotation(auto /*field*/, Name /*name*/, const Quat& value) noexcept { check(value); }
+  void matrix(auto /*field*/, Name /*name*/, const Mat3& value) noexcept { check(value); }
+  void numbers(auto /*field*/, Name /*name*/, const auto& value, std::size_t size, std::size_t least = 0,
+               const Within& bound = {}) noexcept {
+    in_bounds &= size >= least && size <= value.size();
+    for (std::size_t i = 0; i < std::min(size, value.size()); ++i) check(value[i], bound);
+  }
+  template <class Value>
+  void message(auto /*field*/, Name /*name*/, const std::optional<Value>& value, auto list) noexcept {
+    if (value) list(*this, *value);
+  }
+  void part(auto /*field*/, const auto& value, auto fields) noexcept {
+    if (value) fields(*value);
+  }
+  void count(const auto&... /*unused*/) noexcept {}
+  void flag(const auto&... /*unused*/) noexcept {}
+  void choice(const auto&... /*unused*/) noexcept {}
+  void period(const auto&... /*unused*/) noexcept {}
+  void duration(const auto&... /*unused*/) noexcept {}
+  void text(const auto&... /*unused*/) noexcept {}
 
-bool in_bounds(const RemoteTorque& torque) noexcept {
-  return all_bounded(torque.torque) &&
-         (!torque.model || (is_rotation(torque.model->at) && all_bounded(torque.model->stiffness)));
-}
+ private:
+  void check(double value, const Within& bound = {}) noexcept {
+    in_bounds &= bound.holds(value);
+    finite &= std::isfinite(value) || (bound.infinity && !std::isnan(value));
+  }
+  void check(const Quat& value) noexcept {
+    in_bounds &= is_rotation(value);
+    finite &= Eigen::Vector4d(value.w, value.x, value.y, value.z).allFinite();
+  }
+  void check(const auto& matrix) noexcept {
+    in_bounds &= all_bounded(matrix);
+    finite &= matrix.allFinite();
+  }
+};
 
-bool is_finite(const RemoteTorque& torque) noexcept {
-  if (!torque.torque.allFinite()) return false;
-  if (!torque.model) return true;
-  const Quat& at = torque.model->at;
-  return torque.model->stiffness.allFinite() && std::isfinite(at.w) && std::isfinite(at.x) && std::isfinite(at.y) &&
-         std::isfinite(at.z);
+Numbers numbers_of(const ForceCommand& command) noexcept {
+  Numbers numbers;
+  wire::kForceCommandFields(numbers, command);
+  return numbers;
 }
 
 /// Encodes a request and returns the name of a field that would be refused.
@@ -62,34 +95,12 @@ std::string_view refused(Wanted& wanted, List list) noexcept {
 
 }  // namespace
 
-bool in_bounds(const ForceCommand& command) noexcept {
-  return all_bounded(command.force) && (!command.model || in_bounds(*command.model)) &&
-         (!command.error || (bounded(*command.error) && *command.error >= 0)) &&
-         (!command.torque || in_bounds(*command.torque)) && (!command.grip_force || bounded(*command.grip_force));
-}
+bool in_bounds(const ForceCommand& command) noexcept { return numbers_of(command).in_bounds; }
+bool is_finite(const ForceCommand& command) noexcept { return numbers_of(command).finite; }
 
 std::string_view refused_field(SetOutput wanted) noexcept { return refused(wanted, wire::kSetOutputFields); }
 std::string_view refused_field(SetScale wanted) noexcept { return refused(wanted, wire::kSetScaleFields); }
 std::string_view refused_field(SetShare wanted) noexcept { return refused(wanted, wire::kSetShareFields); }
-
-bool is_finite(const ForceCommand& command) noexcept {
-  const auto contact_is_finite = [](const Contact& contact) {
-    if (!contact.normal.allFinite() || !std::isfinite(contact.gap)) return false;
-    if (!contact.table) return true;
-    const ForceTable& table = *contact.table;
-    const auto size = std::min<std::size_t>(table.size, table.force.size());
-    return std::isfinite(table.first) && std::isfinite(table.step) &&
-           std::all_of(table.force.begin(), table.force.begin() + static_cast<std::ptrdiff_t>(size),
-                       [](double f) { return std::isfinite(f); });
-  };
-  const auto model_is_finite = [&](const LocalModel& model) {
-    return model.at.allFinite() && model.stiffness.allFinite() && !std::isnan(model.valid_radius) &&
-           (!model.contact || contact_is_finite(*model.contact));
-  };
-  return command.force.allFinite() && (!command.model || model_is_finite(*command.model)) &&
-         (!command.error || std::isfinite(*command.error)) && (!command.torque || is_finite(*command.torque)) &&
-         (!command.grip_force || std::isfinite(*command.grip_force));
-}
 
 std::string_view objection(const ForceCommand& command) noexcept {
   if (in_bounds(command)) return {};
@@ -97,7 +108,7 @@ std::string_view objection(const ForceCommand& command) noexcept {
   if (!all_bounded(command.force)) return "the force exceeds 1e12 N";
   if (command.torque && !command.torque->torque.allFinite()) return "the torque is not finite (NaN or infinity)";
   if (command.torque && !all_bounded(command.torque->torque)) return "the torque exceeds 1e12 N·m";
-  if (command.torque && !in_bounds(*command.torque)) {
+  if (command.torque && !in_bounds({.torque = command.torque})) {
     return "its rotation model has a number out of bounds (WIRE.md), or an orientation whose length is not 1";
   }
   if (command.grip_force && !bounded(*command.grip_force)) return "the grip force is not finite, or exceeds 1e12 N";
