@@ -2,9 +2,11 @@
 #include "protocol/session.h"
 #include "protocol/wire/bounds.h"
 #include "tests/fuzz/target.h"
+#include "tests/protocol/wire/by_protobuf.h"
 #include "tests/protocol/wire/told.h"
 
-// The input is encrypted and passed to a session. The fast parser and the one for any order of fields must agree.
+// Sealed with the peer's key and given to a session. The fast parser, the one for fields in arbitrary order, and
+// libprotobuf agree.
 
 using namespace tendon;
 
@@ -22,7 +24,10 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const auto body = std::as_bytes(std::span(data, std::min(size, kMaxDatagram - kHeaderSize - crypto::kTagSize)));
   DataReader reader;
   DataReader reference;
-  fuzz::require(told(reader.read(body)) == told(reference.read_in_any_order(body)));
+  const std::string read = told(reader.read(body));
+  fuzz::require(read == told(reference.read_in_any_order(body)));
+  const auto anew = by_protobuf(body);
+  fuzz::require(read == told(anew ? reference.read(*anew) : nullptr));
   Sealer peer(SealingKey(Suite::kNoise, keys.receive), {}, kOpened);
   const Header header{.suite = Suite::kNoise, .connection_id = kConnection};
   const auto clear = encode_header(header);

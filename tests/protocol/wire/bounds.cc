@@ -4,6 +4,7 @@
 #include <google/protobuf/descriptor.h>
 #include <google/protobuf/message.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <functional>
@@ -127,8 +128,10 @@ class Maker {
  public:
   Maker(const std::map<std::string, Bound>& bounds, std::vector<Case>& out) : bounds_(bounds), out_(out) {}
 
-  void make(Message& root) {
+  /// With `fill`, also of the lists that are empty in all examples.
+  void make(Message& root, bool fill) {
     root_ = &root;
+    fill_ = fill;
     visit(root, "");
   }
 
@@ -141,7 +144,14 @@ class Maker {
     for (int i = 0; i < type.field_count(); ++i) {
       const FieldDescriptor& field = *type.field(i);
       const std::string name = (path.empty() ? type.name() : path) + '.' + field.name();
-      if (field.is_repeated() && reflection.FieldSize(message, &field) == 0) continue;  // a later example has entries
+      if (field.is_repeated() && reflection.FieldSize(message, &field) == 0) {
+        const auto bound = bounds_.find(type.name() + '.' + field.name());
+        if (!fill_ || bound == bounds_.end() || seen_.contains(bound->first)) continue;
+        resize(message, field, std::max(1, *bound->second.entries.begin()));
+        mutate(message, field, name);
+        reflection.ClearField(&message, &field);
+        continue;
+      }
       if (fresh(name)) mutate(message, field, name);
       lengthen(message, field, name);
       if (field.cpp_type() != FieldDescriptor::CPPTYPE_MESSAGE) continue;
@@ -329,6 +339,7 @@ class Maker {
   const std::map<std::string, Bound>& bounds_;
   std::vector<Case>& out_;
   Message* root_ = nullptr;
+  bool fill_ = false;
   std::set<std::string> paths_;
   std::set<std::string> seen_;
 };
@@ -362,25 +373,27 @@ std::vector<Case> cases(std::string_view proto) {
   }
   std::vector<Case> out;
   Maker maker(bounds, out);
-  for (const auto& example : examples::datagrams()) {
-    const auto& datagram = example.bytes;  // clang 14 cannot capture structured bindings
-    const auto body = [&](std::size_t at) { return std::span(datagram).subspan(at); };
-    const auto parse = [](Message& message, std::span<const std::byte> bytes) {
-      if (!message.ParseFromArray(bytes.data(), static_cast<int>(bytes.size())))
-        throw std::invalid_argument("an example");
-    };
-    if (const auto hello = decode_hello(datagram)) {
-      pb::Hello message;
-      parse(message, hello->body);
-      maker.make(message);
-    } else if (const auto answer = decode_answer(datagram)) {
-      pb::Answer message;
-      parse(message, answer->body);
-      maker.make(message);
-    } else if (!decode_retry(datagram)) {
-      pb::Datagram message;
-      parse(message, body(kHeaderSize));
-      maker.make(message);
+  for (const bool fill : {false, true}) {
+    for (const auto& example : examples::datagrams()) {
+      const auto& datagram = example.bytes;  // clang 14 cannot capture structured bindings
+      const auto body = [&](std::size_t at) { return std::span(datagram).subspan(at); };
+      const auto parse = [](Message& message, std::span<const std::byte> bytes) {
+        if (!message.ParseFromArray(bytes.data(), static_cast<int>(bytes.size())))
+          throw std::invalid_argument("an example");
+      };
+      if (const auto hello = decode_hello(datagram)) {
+        pb::Hello message;
+        parse(message, hello->body);
+        maker.make(message, fill);
+      } else if (const auto answer = decode_answer(datagram)) {
+        pb::Answer message;
+        parse(message, answer->body);
+        maker.make(message, fill);
+      } else if (!decode_retry(datagram)) {
+        pb::Datagram message;
+        parse(message, body(kHeaderSize));
+        maker.make(message, fill);
+      }
     }
   }
   for (const auto& [name, bound] : bounds) {

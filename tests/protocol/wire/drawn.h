@@ -6,21 +6,32 @@
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <string>
+#include <string_view>
+#include <type_traits>
 #include <variant>
 #include <vector>
 
 #include "core/base/rotation.h"
 #include "protocol/limits.h"
 #include "protocol/wire/codec.h"
+#include "protocol/wire/generated/frame_fields.h"
+#include "protocol/wire/generated/request_fields.h"
 #include "tests/protocol/examples.h"
 #include "tests/protocol/wire/read_back.h"
 #include "tests/support/dice.h"
 
-// Most of the random values are ordinary, and some are difficult.
+// Random frames: mostly ordinary, some with difficult values.
 
 namespace tendon::drawn {
 
 using examples::Bytes;
+using wire::Counts;
+using wire::Entries;
+using wire::Field;
+using wire::Name;
+using wire::Period;
+using wire::Within;
 
 inline double a_number(Dice& dice) {
   constexpr std::array kHard = {0.0,
@@ -31,214 +42,243 @@ inline double a_number(Dice& dice) {
                                 std::numeric_limits<double>::denorm_min()};
   return dice.chance(0.2) ? kHard[dice.bits() % kHard.size()] : dice.within(-10, 10);
 }
-inline Vec3 a_vector(Dice& dice) { return {a_number(dice), a_number(dice), a_number(dice)}; }
 inline std::uint64_t a_count(Dice& dice) { return dice.chance(0.1) ? 0 : dice.bits() >> (dice.bits() % 64); }
 inline Duration a_time(Dice& dice) {
   const auto ns = static_cast<std::int64_t>(a_count(dice) >> 4U);
   return Duration(dice.chance(0.2) ? -ns : ns);
 }
-inline Quat a_rotation(Dice& dice) {
-  if (dice.chance(0.2)) return {.w = 0, .x = 1, .y = 0, .z = 0};
-  return unit({dice.within(-1, 1), dice.within(-1, 1), dice.within(-1, 1), dice.within(0.1, 1)});
-}
-inline Mat3 a_stiffness(Dice& dice) {
-  if (dice.chance(0.3)) return a_number(dice) * Mat3::Identity();
-  if (dice.chance(0.4)) return a_vector(dice).asDiagonal();
-  Mat3 stiffness;
-  stiffness << a_vector(dice), a_vector(dice), a_vector(dice);
-  return stiffness;
-}
 
-inline DeviceState a_state(Dice& dice) {
-  DeviceState state;
-  state.tick = a_count(dice);
-  state.sampled = PeerTime(a_time(dice));
-  state.position = a_vector(dice);
-  state.velocity = a_vector(dice);
-  state.force_applied = a_vector(dice);
-  state.energy = a_number(dice);
-  state.permitted_force = dice.chance(0.1) ? kInf : std::abs(a_number(dice));
-  state.reasons = static_cast<std::uint32_t>(a_count(dice));
-  state.force_sequence = a_count(dice);
-  state.force_age = std::chrono::abs(a_time(dice));
-  state.mode = static_cast<Mode>(1 + dice.bits() % 6);
-  state.device = static_cast<std::uint32_t>(dice.bits() % limits::kMaxDevices);
-  state.channel = static_cast<std::uint32_t>(dice.bits() % limits::kMaxChannels);
-  if (dice.chance(0.2)) state.force_wanted = a_vector(dice);
-  if (dice.chance(0.05)) state.stiffness_wanted = a_stiffness(dice);
-  if (dice.chance(0.3)) state.buttons = static_cast<std::uint32_t>(a_count(dice));
-  if (dice.chance(0.3)) state.turning = Turning{a_rotation(dice), a_vector(dice)};
-  if (dice.chance(0.3)) state.torque_applied = a_vector(dice);
-  if (dice.chance(0.3)) state.grip = Grip{a_number(dice), a_number(dice)};
-  if (dice.chance(0.3)) state.grip_applied = a_number(dice);
-  if (dice.chance(0.3)) state.hand_force = a_vector(dice);
-  if (dice.chance(0.05)) state.joints = Joints::three(a_vector(dice), a_vector(dice));
-  return state;
-}
+/// A visitor of lists (wire/fields/field.h) that gives each field a value within its bound.
+class Draw {
+ public:
+  struct Config {
+    double present = 0.3;  ///< share of the optional fields
+    double spoilt = 0;     ///< share of the numbers that are out of bounds
+    bool full = false;     ///< all fields are there and take as many bytes as they can
+  };
+  explicit Draw(Dice& dice, const Config& config) : dice_(dice), config_(config) {}
+  bool sound() const { return sound_; }  ///< false if two fields contradict each other
 
-inline ForceCommand a_force(Dice& dice) {
-  ForceCommand command;
-  command.sequence = a_count(dice) | 1U;
-  command.based_on_tick = a_count(dice);
-  command.force = a_vector(dice);
-  command.valid_for = Duration(1 + static_cast<std::int64_t>(dice.bits() % 10'000'000'000));
-  command.device = static_cast<std::uint32_t>(dice.bits() % limits::kMaxDevices);
-  command.channel = static_cast<std::uint32_t>(dice.bits() % limits::kMaxChannels);
-  command.topology_changed = dice.chance(0.1);
-  if (dice.chance(0.4)) {
-    command.model = LocalModel{.at = a_vector(dice), .stiffness = a_stiffness(dice)};
-    if (dice.chance(0.5)) command.model->valid_radius = std::abs(a_number(dice));
-    if (dice.chance(0.1)) command.model->contact = examples::force_with_all().model->contact;
+  template <class Count>
+  void count(auto /*field*/, Name /*name*/, Count& value, Counts bound = {}) {
+    const std::uint64_t most = std::min<std::uint64_t>(bound.most, std::numeric_limits<Count>::max());
+    const std::uint64_t drawn = bound.most == Counts{}.most ? a_count(dice_) : dice_.bits() % (most + 1);
+    value = static_cast<Count>(config_.full ? most : std::max(bound.least, drawn));
+    if (spoils()) value = static_cast<Count>(dice_.bits());
   }
-  if (dice.chance(0.2)) command.error = std::abs(a_number(dice));
-  if (dice.chance(0.3)) {
-    command.torque = RemoteTorque{.torque = a_vector(dice)};
-    if (dice.chance(0.5)) command.torque->model = RotationModel{a_rotation(dice), a_stiffness(dice)};
+  void flag(auto /*field*/, Name /*name*/, bool& value) { value = there(); }
+  template <class Enum>
+  void choice(auto /*field*/, Name /*name*/, Enum& value, Enum first, Enum last, unsigned /*offset*/ = 0) {
+    const auto least = static_cast<unsigned>(first);
+    const unsigned choices = static_cast<unsigned>(last) - least + 1;
+    value = config_.full ? last : static_cast<Enum>(least + dice_.bits() % choices);
+    if (spoils()) value = static_cast<Enum>(dice_.bits() % 256);
   }
-  if (dice.chance(0.3)) command.grip_force = a_number(dice);
-  if (dice.chance(0.3)) command.way = static_cast<std::uint32_t>(dice.bits() % (limits::kMaxWays + 1));
-  return command;
+  void duration(auto /*field*/, Name /*name*/, Duration& value, Duration most = limits::kMaxTime) {
+    value = config_.full ? most : std::chrono::abs(a_time(dice_)) % most;
+    if (spoils()) value = -value;
+  }
+  void period(auto /*field*/, Name /*name*/, Duration& value, const Period& bound) {
+    const auto span = static_cast<std::uint64_t>((bound.most - bound.least).count());
+    value = config_.full ? bound.most : bound.least + Duration(static_cast<std::int64_t>(dice_.bits() % (span + 1)));
+    if (spoils()) value = -value;
+  }
+  void difference(auto /*field*/, Name /*name*/, Duration& value) {
+    value = config_.full ? limits::kMaxTime : a_time(dice_);
+  }
+  template <class Time>
+  void time(auto /*field*/, Name /*name*/, Time& value) {
+    value = Time(config_.full ? limits::kMaxTime : a_time(dice_));
+  }
+  void bits(auto /*field*/, Name /*name*/, std::uint32_t& value) {
+    value = config_.full ? ~0U : static_cast<std::uint32_t>(a_count(dice_));
+  }
+  void number(auto /*field*/, Name /*name*/, double& value, const Within& bound = {}) { value = a_double(bound); }
+  void present(auto /*field*/, Name /*name*/, double& value, const Within& bound = {}) { value = a_double(bound); }
+  void present(auto f, Name name, std::uint32_t& value, Counts bound) { count(f, name, value, bound); }
+  void radius(auto /*field*/, Name /*name*/, double& value) { value = a_double({.least = 0, .infinity = true}); }
+  void vector(auto /*field*/, Name name, Vec3& value) {
+    value = {a_double(), a_double(), a_double()};
+    if (std::string_view(name) == "normal") value = dice_.direction();
+  }
+  void vector_unless_zero(auto f, Name name, Vec3& value) { vector(f, name, value); }
+  void normal(auto /*field*/, Name /*name*/, Vec3& value) {
+    value = config_.full ? Vec3(0.6, 0.64, 0.48) : dice_.direction();
+  }
+  void rotation(auto /*field*/, Name /*name*/, Quat& value) {
+    value = config_.full ? Quat{.w = 0.5, .x = -0.5, .y = 0.5, .z = 0.5}
+            : dice_.chance(0.2)
+                ? Quat{.w = 0, .x = 1, .y = 0, .z = 0}
+                : unit({dice_.within(-1, 1), dice_.within(-1, 1), dice_.within(-1, 1), dice_.within(0.1, 1)});
+  }
+  void matrix(auto /*field*/, Name /*name*/, Mat3& value) {
+    value = a_double() * Mat3::Identity();
+    if (!config_.full && dice_.chance(0.3)) return;
+    value.diagonal() = Vec3(a_double(), a_double(), a_double());
+    if (!config_.full && dice_.chance(0.4)) return;
+    for (Eigen::Index i = 0; i < value.size(); ++i) value.coeffRef(i) = a_double();
+  }
+  void numbers(auto /*field*/, Name /*name*/, auto& value, auto& size, std::size_t least = 0,
+               const Within& bound = {}) {
+    const std::size_t drawn = config_.full ? value.size() : least + dice_.bits() % (value.size() - least + 1);
+    size = static_cast<std::remove_reference_t<decltype(size)>>(drawn);
+    for (std::size_t i = 0; i < drawn; ++i) value[i] = a_double(bound);
+  }
+  void joints(auto f, auto /*velocities*/, Name name, std::optional<Joints>& value) {
+    if (!there()) return;
+    value.emplace();
+    numbers(f, name, value->velocity, value->count, 1);
+    for (std::size_t i = 0; i < value->count; ++i) value->angle[i] = a_double();
+  }
+  void counts(auto /*field*/, Name /*name*/, auto& value) {
+    for (auto& entry : value) entry = dice_.bits() % (config_.full ? ~0ULL : 16);
+  }
+  void text(auto /*field*/, Name /*name*/, std::string& value, std::size_t most) { value = a_text(most); }
+  void texts(auto /*field*/, Name /*name*/, std::vector<std::string>& value, Entries bound, std::size_t most) {
+    value.resize(entries(bound));
+    for (std::string& entry : value) entry = a_text(most);
+  }
+  void messages(auto /*field*/, Name /*name*/, auto& value, Entries bound, auto list) {
+    value.resize(entries(bound));
+    for (auto& entry : value) list(*this, entry);
+  }
+  void message(auto /*field*/, Name /*name*/, auto& value, auto list) { list(*this, value); }
+  template <class Value>
+  void message(auto /*field*/, Name /*name*/, std::optional<Value>& value, auto list) {
+    if (there()) list(*this, value.emplace());
+  }
+  template <class Value>
+  void maybe(auto f, Name name, std::optional<Value>& value, const Within& bound = {}) {
+    if (!there()) return;
+    if constexpr (std::is_same_v<Value, double>) {
+      number(f, name, value.emplace(), bound);
+    } else if constexpr (std::is_same_v<Value, Quat>) {
+      rotation(f, name, value.emplace());
+    } else {
+      vector(f, name, value.emplace());
+    }
+  }
+  void matrix(auto f, Name name, std::optional<Mat3>& value) {
+    if (there()) matrix(f, name, value.emplace());
+  }
+  void part(auto f, auto& value, auto fields) {
+    if (!value && there()) value.emplace();
+    rest(f, value, fields);
+  }
+  void rest(auto /*field*/, auto& value, auto fields) {
+    if (value) fields(*value);
+  }
+  void box(auto f, auto /*most*/, Name name, auto& value) {
+    if (!there()) return;
+    std::remove_reference_t<decltype(*value)> box{};
+    vector(f, name, box.min);
+    box.max = box.min.cwiseAbs();
+    value = box;
+  }
+  template <class Value>
+  bool arm(auto /*field*/, Name /*name*/, wire::Kind<Value> /*unused*/, auto& one, auto list) {
+    const bool taken = dice_.chance(0.15);  // of none, `one` keeps its usual value
+    if (taken) list(*this, wire::make_arm<Value>(one));
+    return taken;
+  }
+  void one_of(Name /*name*/, auto... /*arms*/) {}
+  void require(Name /*name*/, auto holds) { sound_ = sound_ && holds(); }
+
+ private:
+  bool there() { return config_.full || dice_.chance(config_.present); }
+  bool spoils() { return config_.spoilt > 0 && dice_.chance(config_.spoilt); }
+  std::size_t entries(Entries bound) {
+    return config_.full ? bound.most : bound.least + dice_.bits() % (bound.most - bound.least + 1);
+  }
+  double a_double(const Within& bound = {}) {
+    constexpr std::array kBad = {kNan, kInf, -kInf, 2 * limits::kMaxValue};
+    if (spoils()) return kBad[dice_.bits() % kBad.size()];
+    if (config_.full) return bound.holds(-0.1) ? -0.1 : 0.1;
+    if (bound.infinity && dice_.chance(0.1)) return kInf;
+    const double number = a_number(dice_);
+    if (bound.holds(number)) return number;
+    return bound.holds(-number) ? -number : dice_.within(std::max(bound.least, -10.0), std::min(bound.most, 10.0));
+  }
+  std::string a_text(std::size_t most) {
+    if (config_.full) return std::string(most, 'x');
+    std::string text(dice_.bits() % (most + 1), 'x');
+    if (text.size() > 1 && dice_.chance(0.3)) text.replace(text.size() - 2, 2, "µ");
+    return text;
+  }
+
+  Dice& dice_;
+  Config config_;
+  bool sound_ = true;
+};
+
+constexpr auto fields_of(const DeviceState& /*unused*/) { return wire::kDeviceStateFields; }
+constexpr auto fields_of(const ForceCommand& /*unused*/) { return wire::kForceCommandFields; }
+constexpr auto fields_of(const Control& /*unused*/) { return wire::kControlFields; }
+constexpr auto fields_of(const ControlAck& /*unused*/) { return wire::kControlAckFields; }
+constexpr auto fields_of(const Bye& /*unused*/) { return wire::kByeFields; }
+constexpr auto fields_of(const LinkReport& /*unused*/) { return wire::kLinkReportFields; }
+constexpr auto fields_of(const DeviceReport& /*unused*/) { return wire::kDeviceReportFields; }
+constexpr auto fields_of(const PeerReport& /*unused*/) { return wire::kPeerReportFields; }
+constexpr auto fields_of(const PortFrame& /*unused*/) { return wire::kPortStateFields; }
+
+template <class Value>
+Value a(Dice& dice, const Draw::Config& config = {}) {
+  for (;;) {
+    Value value;
+    Draw draw(dice, config);
+    fields_of(value)(draw, value);
+    if (draw.sound() || config.spoilt > 0 || config.full) return value;
+  }
 }
 
-// These values are as long as possible: eight bytes for every component, and ten for every counter.
-
-inline const Vec3 kThirds = Vec3::Constant(-1.0 / 3);
-inline const Mat3 kNineEntries{{1.1, 2.1, 3.1}, {4.1, 5.1, 6.1}, {7.1, 8.1, 9.1}};
-inline constexpr Quat kTurned{.w = 0.5, .x = -0.5, .y = 0.5, .z = 0.5};
-
-inline DeviceState fullest_state() {
-  DeviceState state{.tick = ~std::uint64_t{0},
-                    .sampled = PeerTime{limits::kMaxTime},
-                    .position = kThirds,
-                    .velocity = kThirds,
-                    .force_applied = kThirds,
-                    .energy = -0.1,
-                    .permitted_force = kInf,
-                    .reasons = ~0U,
-                    .force_sequence = ~std::uint64_t{0},
-                    .force_age = limits::kMaxTime,
-                    .mode = Mode::kFault,
-                    .device = limits::kMaxDevices - 1,
-                    .channel = limits::kMaxChannels - 1,
-                    .force_wanted = kThirds,
-                    .stiffness_wanted = kNineEntries,
-                    .buttons = ~0U,
-                    .turning = Turning{.orientation = kTurned, .angular_velocity = kThirds},
-                    .torque_applied = kThirds,
-                    .grip = Grip{.opening = 0.1, .velocity = -0.1},
-                    .grip_applied = 0.1,
-                    .hand_force = kThirds,
-                    .joints = Joints{.count = Joints::kMost, .angle = {}, .velocity = {}}};
-  state.joints->angle.fill(-0.1);
-  state.joints->velocity.fill(0.1);
-  return state;
+/// Of any kind.
+template <std::size_t kIndex = std::variant_size_v<Frame> - 1>
+Frame a_frame(Dice& dice, const Draw::Config& config = {}) {
+  if constexpr (kIndex > 0) {
+    if (dice.bits() % (kIndex + 1) != 0) return a_frame<kIndex - 1>(dice, config);
+  }
+  return a<std::variant_alternative_t<kIndex, Frame>>(dice, config);
 }
 
-inline ForceCommand fullest_force() {
-  ForceTable table{.first = -0.1, .step = 0.1, .size = ForceTable::kMaxEntries, .force = {}};
-  table.force.fill(0.1);
-  ForceCommand force{.sequence = ~std::uint64_t{0},
-                     .based_on_tick = ~std::uint64_t{0},
-                     .force = kThirds,
-                     .model = LocalModel{.at = kThirds,
-                                         .stiffness = kNineEntries,
-                                         .valid_radius = 0.1,
-                                         .contact = Contact{.normal = {0.6, 0.64, 0.48}, .gap = -0.1, .table = table}},
-                     .valid_for = limits::kMaxValidFor,
-                     .device = limits::kMaxDevices - 1,
-                     .channel = limits::kMaxChannels - 1,
-                     .topology_changed = true,
-                     .error = 0.1,
-                     .torque = RemoteTorque{.torque = kThirds, .model = RotationModel{}},
-                     .grip_force = -0.1};
-  force.torque->model->at = kTurned;
-  force.torque->model->stiffness = kNineEntries;
-  return force;
-}
-
-inline void spoil(Dice& dice, DeviceState& state) {
-  constexpr std::array kBad = {kNan, kInf, -kInf, 2 * limits::kMaxValue};
-  const double bad = kBad[dice.bits() % kBad.size()];
-  const std::array<double*, 4> places = {&state.position.y(), &state.velocity.z(), &state.energy,
-                                         &state.permitted_force};
-  *places[dice.bits() % places.size()] = bad;
-  if (dice.chance(0.2)) state.mode = static_cast<Mode>(dice.bits() % 256);
-  if (dice.chance(0.2)) state.device = static_cast<std::uint32_t>(dice.bits());
-  if (dice.chance(0.2)) state.force_age = -state.force_age;
-}
-inline void spoil(Dice& dice, ForceCommand& command) {
-  constexpr std::array kBad = {kNan, kInf, -kInf, -2 * limits::kMaxValue};
-  command.force.x() = kBad[dice.bits() % kBad.size()];
-  if (dice.chance(0.2)) command.sequence = 0;
-  if (dice.chance(0.2)) command.valid_for = -command.valid_for;
-  if (dice.chance(0.2)) command.channel = static_cast<std::uint32_t>(dice.bits());
-  if (command.model && dice.chance(0.5)) command.model->stiffness(1, 2) = kNan;
+/// All its fields are within bounds.
+template <class Value>
+Value the_fullest() {
+  Dice dice(1);
+  return a<Value>(dice, {.full = true});
 }
 
 inline std::optional<OutgoingEcho> an_echo(Dice& dice) {
   if (dice.chance(0.1)) return {};
-  return OutgoingEcho{.sent = PeerTime(a_time(dice)),
-                      .received = LocalTime(a_time(dice)),
-                      .packet_number = a_count(dice),
-                      .received_mask = static_cast<std::uint32_t>(a_count(dice))};
+  OutgoingEcho echo;
+  Draw draw(dice, {});
+  wire::kEchoFields(draw, echo);
+  return echo;
 }
 
-/// Returns the states of one, two or all devices in the same step, for columns. A share `spoilt` of them is invalid.
+/// Returns the states of one step for columns, of one, two or all devices. A share `spoilt` is invalid.
 inline std::vector<DeviceState> states_of_a_step(Dice& dice, double spoilt) {
-  DeviceState common = a_state(dice);
+  const auto common = a<DeviceState>(dice);
   std::vector<DeviceState> states;
   const double share = dice.chance(0.5) ? 1 : 0.2;
   const bool usual = dice.chance(0.5);
   for (std::uint32_t device = 0; device < limits::kMaxDevices; ++device) {
     if (!dice.chance(share) && device > 0) continue;
-    DeviceState state = a_state(dice);
+    auto state = a<DeviceState>(dice, {.present = 0, .spoilt = dice.chance(spoilt) ? 0.1 : 0});
+    state.tick = common.tick;
+    state.sampled = common.sampled;
+    state.device = device;
     if (usual) {
       state.reasons = 1;
       state.force_sequence = 1'000'000 + device;
       state.force_age = Duration(1'500'000);
       state.channel = state.buttons = 0;
     }
-    state.tick = common.tick;
-    state.sampled = common.sampled;
-    state.device = device;
-    if (dice.chance(spoilt)) spoil(dice, state);
-    state.device = device;
-    state.force_wanted.reset();
-    state.stiffness_wanted.reset();
-    state.turning.reset();
-    state.torque_applied.reset();
-    state.grip.reset();
-    state.grip_applied.reset();
-    state.hand_force.reset();
-    state.joints.reset();
     states.push_back(state);
   }
   return states;
 }
 
-inline const std::vector<Frame>& others() {
-  static const std::vector<Frame> all = [] {
-    std::vector<Frame> out = {
-        examples::report(),     examples::device_report(),      examples::peer_report(),
-        examples::port(),       examples::port_in_contact(),    examples::port_by_model(),
-        examples::described(7), examples::handle_described(7),  examples::joints_described(7),
-        examples::busy(7),      examples::outputs_described(7), Bye{.code = Code::kOk, .reason = "µ"}};
-    out.emplace_back(examples::port_with_all());
-    out.emplace_back(examples::peer_report_with_way());
-    for (const Request& request :
-         {Request(SetStateRate{.hz = 500, .device = 2}), Request(Rearm{1}), Request(Disarm{2}),
-          Request(Describe{3, true}), Request(TakeLease{1, 2}), Request(GiveLease{2, 1}),
-          Request(LeaseLost{1, 2, "other"}), Request(SetStateDeadband{0.1, 0.01, std::chrono::milliseconds(7)}),
-          Request(examples::couple_with_all()), Request(Engage{1}), Request(Disengage{2}), Request(examples::lamp()),
-          Request(examples::vibration()), Request(examples::set_scale()), Request(examples::set_share())}) {
-      out.emplace_back(Control{.id = 9, .request = request});
-    }
-    return out;
-  }();
-  return all;
-}
-
-/// Returns a few frames. A share `spoilt` of the states and forces is invalid.
+/// A few frames. A share `spoilt` of them is invalid.
 inline Bytes a_datagram(Dice& dice, double spoilt) {
   std::array<std::byte, kMaxDatagram> buffer{};
   DataWriter writer;
@@ -249,17 +289,11 @@ inline Bytes a_datagram(Dice& dice, double spoilt) {
   for (const DeviceState& state : together) columns.push_back(&state);
   if (!columns.empty()) writer.add(std::span<const DeviceState* const>(columns));
   for (std::uint64_t left = dice.chance(0.8) ? 1 : dice.bits() % 9; left > 0; --left) {
-    if (dice.chance(0.2)) {
-      std::visit([&](const auto& frame) { writer.add(frame); }, others()[dice.bits() % others().size()]);
-    } else if (dice.chance(0.5)) {
-      DeviceState state = a_state(dice);
-      if (dice.chance(spoilt)) spoil(dice, state);
-      writer.add(state);
-    } else {
-      ForceCommand command = a_force(dice);
-      if (dice.chance(spoilt)) spoil(dice, command);
-      writer.add(command);
-    }
+    const Draw::Config config{.spoilt = dice.chance(spoilt) ? 0.1 : 0};
+    const Frame frame = dice.chance(0.3)   ? a_frame(dice, config)
+                        : dice.chance(0.5) ? Frame(a<DeviceState>(dice, config))
+                                           : Frame(a<ForceCommand>(dice, config));
+    std::visit([&](const auto& value) { writer.add(value); }, frame);
   }
   return {buffer.begin() + kHeaderSize, buffer.begin() + static_cast<std::ptrdiff_t>(writer.size())};
 }

@@ -123,51 +123,33 @@ ControlAck read_from_a_sealed_datagram(const ControlAck& answer) {
 }
 
 TEST(Codec, TheLongestDescriptionFitsIntoADatagramOfItsOwn) {
-  const std::string name(limits::kMaxName, 'n');
-  const Vec3 most = Vec3::Constant(limits::kMaxValue);
-  ControlAck answer{.id = ~0U, .code = Code::kOk, .detail = std::string(limits::kMaxDetail, 'd')};
-  answer.device = DeviceDescription{.device = 15,
-                                    .name = name,
-                                    .model = name,
-                                    .workspace = DeviceDescription::Box{-most, most},
-                                    .max_force = 1,
-                                    .continuous_force = 1,
-                                    .max_stiffness = 1,
-                                    .position_resolution = 1,
-                                    .loop_hz = limits::kMaxLoopHz};
-  answer.device->channels.resize(
-      limits::kMaxChannels + 1,
-      {.name = name, .rule = ChannelRule::kPriority, .lease = limits::kMaxTimeout, .holder = name});
+  auto answer = drawn::the_fullest<ControlAck>();
+  answer.handle.reset();
+  const DeviceDescription most = *answer.device;
+  answer.device->name += 'n';
+  answer.device->channels.resize(limits::kMaxChannels + 1);
   const auto device = read_from_a_sealed_datagram(answer).device;
   ASSERT_TRUE(device.has_value());
   EXPECT_EQ(device->channels.size(), limits::kMaxChannels);
-  EXPECT_EQ(device->name.size(), limits::kMaxLabel);
+  EXPECT_EQ(device->name, most.name);
 }
 
 TEST(Codec, TheLongestDescriptionOfAHandleFitsIntoADatagramOfItsOwn) {
-  ControlAck answer{.id = ~0U, .code = Code::kOk, .detail = std::string(limits::kMaxDetail, 'd')};
-  answer.handle = HandleDescription{.device = 15,
-                                    .operator_from_device = Quat{.w = 0.5, .x = -0.5, .y = 0.5, .z = 0.5},
-                                    .buttons = std::vector(limits::kMaxButtons + 1, std::string(limits::kMaxName, 'n')),
-                                    .orientation_measured = true,
-                                    .max_torque = 0.1,
-                                    .gripper_open = 0.3,
-                                    .max_gripper_force = 1e12,
-                                    .group = std::string(limits::kMaxName, 'g'),
-                                    .hand = Hand::kRight,
-                                    .joints = std::vector(limits::kMaxJoints + 1, std::string(limits::kMaxName, 'j'))};
+  auto answer = drawn::the_fullest<ControlAck>();
+  answer.device.reset();
+  const HandleDescription most = *answer.handle;
+  answer.handle->group += 'g';
+  answer.handle->joints.resize(limits::kMaxJoints + 1);
+  answer.handle->buttons.resize(limits::kMaxButtons + 1);
+  answer.handle->buttons.back() += 'n';
   const auto handle = read_from_a_sealed_datagram(answer).handle;
   ASSERT_TRUE(handle.has_value());
-  EXPECT_EQ(handle->operator_from_device, answer.handle->operator_from_device);
-  EXPECT_TRUE(handle->orientation_measured);
-  EXPECT_EQ(handle->max_torque, 0.1);
-  EXPECT_EQ(handle->gripper_open, 0.3);
-  EXPECT_EQ(handle->max_gripper_force, 1e12);
-  EXPECT_EQ(handle->group.size(), limits::kMaxLabel);
-  EXPECT_EQ(handle->hand, Hand::kRight);
-  EXPECT_EQ(handle->joints, std::vector(limits::kMaxJoints, std::string(limits::kMaxLabel, 'j')));
-  EXPECT_EQ(handle->buttons.size(), limits::kMaxButtons);
-  EXPECT_EQ(handle->buttons.back().size(), limits::kMaxLabel);
+  EXPECT_EQ(handle->operator_from_device, most.operator_from_device);
+  EXPECT_EQ(handle->gripper_open, most.gripper_open);
+  EXPECT_EQ(handle->group, most.group);
+  EXPECT_EQ(handle->joints, most.joints);
+  EXPECT_EQ(handle->buttons, most.buttons);
+  EXPECT_EQ(handle->outputs, most.outputs);
 }
 
 TEST(Codec, AStateAndAForceAlwaysFitTogetherIntoASealedDatagram) {
@@ -177,11 +159,8 @@ TEST(Codec, AStateAndAForceAlwaysFitTogetherIntoASealedDatagram) {
   std::array<std::byte, kMaxDatagram> buffer;
   DataWriter writer;
   writer.begin(std::span(buffer).first(kMaxDatagram - crypto::kTagSize), {}, LocalTime{limits::kMaxTime}, echo);
-  const std::size_t empty = writer.size();
-  ASSERT_TRUE(writer.add(drawn::fullest_state()));
-  EXPECT_EQ(writer.size() - empty, 565U);
-  ASSERT_TRUE(writer.add(drawn::fullest_force()));
-  EXPECT_EQ(writer.size() + crypto::kTagSize, 1179U);
+  ASSERT_TRUE(writer.add(drawn::the_fullest<DeviceState>()));
+  ASSERT_TRUE(writer.add(drawn::the_fullest<ForceCommand>()));
 
   DataReader reader;
   const DataContent* content = reader.read(std::span(buffer).subspan(kHeaderSize, writer.size() - kHeaderSize));
