@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Tests the output of protocol/generator for tendon.proto."""
 
+import re
 import shutil
 import sys
 
@@ -124,7 +125,7 @@ def test_a_new_field_needs_no_other_file(tmp_path):
     assert "    hints: clipAll(value.hints ?? [], 4, 24),\n" in codec
     if shutil.which("clang-format") is not None:
         frames, requests = (made[f"protocol/wire/generated/{name}_fields.h"] for name in ("frame", "request"))
-        values = made["protocol/wire/generated/messages.h"]
+        values = re.sub(r" +///<", "  ///<", made["protocol/wire/generated/messages.h"])
         assert "  double grip_energy = 0;  ///< J, ± 10³: of the gripper\n" in values
         assert "  std::optional<Vec3> bias{};  ///< N, empty if there is none\n" in values
         assert "  Duration ramp{};" in values
