@@ -15,13 +15,13 @@
 #include "protocol/limits.h"
 #include "protocol/wire/generated/messages.h"
 
-// The messages of the protocol as plain values. Their structs are generated from tendon.proto, whose comments they have.
-// See WIRE.md for their encoding. SI units are used, forces act on the hand, and vectors are in the base frame of the
-// device.
+// The messages of the protocol as plain values. Their structs are generated from tendon.proto. See WIRE.md for their
+// encoding. SI units are used, forces act on the hand, and vectors are in the base frame of the device.
 
 namespace tendon {
 
-/// The number of steps for each wake-up delay: [0] at most 1 µs, [i] above 2^(i−1) µs and at most 2^i µs, [23] all others.
+/// The number of steps for each wake-up delay: [0] at most 1 µs, [i] above 2^(i−1) µs and at most 2^i µs, and all
+/// others in the last one.
 using LatenessHistogram = decltype(DeviceReport::lateness);
 static_assert(std::tuple_size_v<LatenessHistogram> == limits::kLatenessBuckets);
 
@@ -53,7 +53,7 @@ inline constexpr std::string_view kFeatureJoints = "joints";  ///< joint angles 
 
 inline constexpr std::string_view kFeatureOutputs = "outputs";  ///< lamps and vibration, which can be set by the client
 
-/// The client can be the remote end of a coupling (Couple, PortState). Observers are also sent the PortStates of both ends.
+/// The client can be the remote end of a coupling (Couple, PortState). Observers are sent the PortStates of both ends.
 inline constexpr std::string_view kFeatureTeleoperation = "teleoperation";
 
 /// States of several devices at the same step are sent in columns if this halves the size, using single precision

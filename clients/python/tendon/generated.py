@@ -131,7 +131,7 @@ class OutputKind(IntEnum):
 
 
 class Hand(IntEnum):
-    """Which hand holds a device."""
+    """The hand that is used for holding a device."""
 
     ANY = 0
     LEFT = 1

@@ -22,7 +22,7 @@
 
 namespace tendon {
 
-/// Which hand holds a device. Part of the wire: never renumber.
+/// The hand that is used for holding a device. Part of the wire: never renumber.
 enum class Hand : std::uint8_t {
   kAny = 0,
   kLeft = 1,

@@ -169,6 +169,7 @@ TEST(Protobuf, ReadsOfDistortedBytesWhatProtobufDoes) {
   for (int i = 0; i < kDatagrams; ++i) {
     Bytes body = a_datagram(dice, 0.05);
     for (std::uint64_t left = 1 + dice.bits() % 3; left > 0; --left) distort(dice, body);
+    body.resize(std::min(body.size(), kMaxDatagram));
     ASSERT_TRUE(readers.agree(body)) << "datagram " << i;
   }
 }

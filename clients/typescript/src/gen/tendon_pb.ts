@@ -3293,7 +3293,7 @@ export const OutputKindSchema: GenEnum<OutputKind> = /*@__PURE__*/
   enumDesc(file_tendon, 3);
 
 /**
- * Which hand holds a device.
+ * The hand that is used for holding a device.
  *
  * @generated from enum tendon.v1.Hand
  */
