@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""All files that the generator writes."""
+"""The files that are written by the generator."""
 
 import cpp
 import page

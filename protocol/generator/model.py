@@ -70,7 +70,7 @@ def _entries(text: str) -> tuple[int, int] | frozenset[int]:
 
 
 def split_comment(comment: str) -> tuple[Bound, str]:
-    """Splits a comment into the bound at its front and the rest."""
+    """Splits a comment into the bound and the rest of the comment."""
     if not comment.startswith(("[", "(", "{")):
         return Bound(), comment
     found = _BOUND.match(comment)
@@ -307,12 +307,12 @@ class Message:
         return 1 + next(i for i, member in enumerate(self.members(language)) if member.wire == last)
 
     def default(self, wire: str, language: str) -> str | None:
-        """Returns the default of a member as code of the language. None: the zero of its type."""
+        """Returns the default value of a member in the given language. None: the zero of its type."""
         found = _of(self.values.get("defaults", {}).get(wire), language, None)
         return None if found is None else str(found)
 
     def hint(self, wire: str, language: str) -> str | None:
-        """Returns the type of a member as code of the language. None: the type that follows from the field."""
+        """Returns the type of a member in the given language. None: the type that follows from the field."""
         found = _of(self.values.get("types", {}).get(wire), language, None)
         return None if found is None else str(found)
 

@@ -366,7 +366,7 @@ class SetStateRate:
 
 @dataclass(frozen=True, slots=True)
 class SetStateDeadband:
-    """Suppresses the states that the client can predict. After a state with velocity v, the server sends the first
+    """Suppresses states that can be predicted by the client. After a state with velocity v, the server sends the first
     state whose velocity differs from v by more than max(share · ‖v‖, floor), whose mode or buttons differ, or that is
     max_silence_us newer. Between two states the client extrapolates: x + v · (t − sampled_ns)."""
 
@@ -401,7 +401,7 @@ class Disarm:
 @dataclass(frozen=True, slots=True)
 class RateControl:
     """Describes how the displacement of the leader's handle sets the speed of the follower. A spring pulls the handle
-    to its center. All values are in the scale of the leader."""
+    to its center. All values use the scale of the leader."""
 
     dead_zone: float  # m. If the leader is closer to its center than this distance, the follower does not move
     gain: float  # 1/s, the speed of the follower per meter of displacement beyond the dead zone
@@ -413,9 +413,9 @@ class Couple:
     """Offers the sender's device as the other end of a coupling with this device, and describes that end. Can only be
     used by a client that has claimed the channel as a controller, and requires the feature "teleoperation". If the two
     ends match, the answer is Code.OK. After that, both peers send PortState frames, and the server does not send
-    states. Code.INVALID means that the ends do not match, and the detail contains the first difference.
-    Code.UNSUPPORTED means that this device cannot be coupled. Code.BUSY means that the channel is coupled with another
-    client. A follower has one channel for each of its leaders."""
+    states. Code.INVALID is returned if the ends do not match, and the detail contains the first difference.
+    Code.UNSUPPORTED is returned if this device cannot be coupled. Code.BUSY is returned if the channel is coupled with
+    another client. A follower has one channel for each of its leaders."""
 
     device: int  # the device of the server
     channel: int  # the channel of the server
@@ -446,8 +446,8 @@ class Couple:
 @dataclass(frozen=True, slots=True)
 class Engage:
     """Engages the coupling on the command of the operator. Can only be used by controllers of the leader's device, at
-    its server. If the answer is Code.OK, the loop of the device has received the order. Code.UNSUPPORTED means that the
-    device is not coupled, or that it is the follower."""
+    its server. If the answer is Code.OK, the loop of the device has received the order. Code.UNSUPPORTED is returned if
+    the device is not coupled, or if it is the follower."""
 
     device: int = 0
 
@@ -462,8 +462,8 @@ class Disengage:
 @dataclass(frozen=True, slots=True)
 class SetScale:
     """Sets the scales of the coupling. Can only be used by controllers of the leader's device, at its server. If the
-    answer is Code.OK, the loop of the device has received the order. Code.BUSY means that the leader is engaged and its
-    clutch is not held. Code.UNSUPPORTED means that the device is not coupled, or that it is the follower."""
+    answer is Code.OK, the loop of the device has received the order. Code.BUSY is returned if the leader is engaged and
+    its clutch is not held. Code.UNSUPPORTED is returned if the device is not coupled, or if it is the follower."""
 
     device: int
     position_scale: float  # as in Couple
@@ -474,7 +474,7 @@ class SetScale:
 class SetShare:
     """Sets the weight of the leader of one channel if a follower has several leaders. Can only be used by controllers
     of the follower's device, at its server. The weight reaches the value within 0.5 s, and the ratios of the other
-    weights do not change. Code.UNSUPPORTED means that the device is not coupled, that it only has one leader, or that
+    weights do not change. Code.UNSUPPORTED is returned if the device is not coupled, if it only has one leader, or if
     it is a leader."""
 
     device: int
@@ -502,8 +502,8 @@ class LampColour:
 class SetOutput:
     """Sets a lamp of the device or starts a vibration pulse. Can only be used by a controller that holds one of the
     channels of the device, and requires the feature "outputs". An output is turned off if the client that has set it
-    gives up or loses a channel of the device, or if the device is disarmed. Code.INVALID means that the device does not
-    have this output, that the output is of the other kind, or that both `rgb` and `vibration` are missing."""
+    gives up or loses a channel of the device, or if the device is disarmed. Code.INVALID is returned if the device does
+    not have this output, if the output is of the other kind, or if both `rgb` and `vibration` are missing."""
 
     device: int
     # The index in HandleDescription.outputs. If the device does not have this output, the answer is Code.INVALID

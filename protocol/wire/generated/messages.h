@@ -135,8 +135,8 @@ struct SetStateRate {
   std::uint32_t device = 0;  ///< 0 … 15
 };
 
-/// Suppresses the states that the client can predict. After a state with velocity v, the server sends the first state
-/// whose velocity differs from v by more than max(share · ‖v‖, floor), whose mode or buttons differ, or that is
+/// Suppresses states that can be predicted by the client. After a state with velocity v, the server sends the first
+/// state whose velocity differs from v by more than max(share · ‖v‖, floor), whose mode or buttons differ, or that is
 /// max_silence newer. Between two states the client extrapolates: x + v · (t − sampled).
 struct SetStateDeadband {
   /// The fraction of the speed (Weber fraction). If it is not in 0 … 0.5, the answer is Code::kInvalid
@@ -166,9 +166,9 @@ struct Disarm {
 /// Offers the sender's device as the other end of a coupling with this device, and describes that end. Can only be used
 /// by a client that has claimed the channel as a controller, and requires the feature "teleoperation". If the two ends
 /// match, the answer is Code::kOk. After that, both peers send PortState frames, and the server does not send states.
-/// Code::kInvalid means that the ends do not match, and the detail contains the first difference. Code::kUnsupported
-/// means that this device cannot be coupled. Code::kBusy means that the channel is coupled with another client. A
-/// follower has one channel for each of its leaders.
+/// Code::kInvalid is returned if the ends do not match, and the detail contains the first difference.
+/// Code::kUnsupported is returned if this device cannot be coupled. Code::kBusy is returned if the channel is coupled
+/// with another client. A follower has one channel for each of its leaders.
 struct Couple {
   std::uint32_t device = 0;           ///< 0 … 15: the device of the server
   std::uint32_t channel = 0;          ///< 0 … 7: the channel of the server
@@ -200,8 +200,8 @@ struct Couple {
 };
 
 /// Engages the coupling on the command of the operator. Can only be used by controllers of the leader's device, at its
-/// server. If the answer is Code::kOk, the loop of the device has received the order. Code::kUnsupported means that the
-/// device is not coupled, or that it is the follower.
+/// server. If the answer is Code::kOk, the loop of the device has received the order. Code::kUnsupported is returned if
+/// the device is not coupled, or if it is the follower.
 struct Engage {
   std::uint32_t device = 0;  ///< 0 … 15
 };
@@ -212,8 +212,8 @@ struct Disengage {
 };
 
 /// Sets the scales of the coupling. Can only be used by controllers of the leader's device, at its server. If the
-/// answer is Code::kOk, the loop of the device has received the order. Code::kBusy means that the leader is engaged and
-/// its clutch is not held. Code::kUnsupported means that the device is not coupled, or that it is the follower.
+/// answer is Code::kOk, the loop of the device has received the order. Code::kBusy is returned if the leader is engaged
+/// and its clutch is not held. Code::kUnsupported is returned if the device is not coupled, or if it is the follower.
 struct SetScale {
   std::uint32_t device = 0;   ///< 0 … 15
   double position_scale = 1;  ///< 0.01 … 100: as in Couple
@@ -222,7 +222,7 @@ struct SetScale {
 
 /// Sets the weight of the leader of one channel if a follower has several leaders. Can only be used by controllers of
 /// the follower's device, at its server. The weight reaches the value within 0.5 s, and the ratios of the other weights
-/// do not change. Code::kUnsupported means that the device is not coupled, that it only has one leader, or that it is a
+/// do not change. Code::kUnsupported is returned if the device is not coupled, if it only has one leader, or if it is a
 /// leader.
 struct SetShare {
   std::uint32_t device = 0;   ///< 0 … 15
@@ -232,8 +232,8 @@ struct SetShare {
 
 /// Sets a lamp of the device or starts a vibration pulse. Can only be used by a controller that holds one of the
 /// channels of the device, and requires the feature "outputs". An output is turned off if the client that has set it
-/// gives up or loses a channel of the device, or if the device is disarmed. Code::kInvalid means that the device does
-/// not have this output, that the output is of the other kind, or that both `rgb` and `vibration` are missing.
+/// gives up or loses a channel of the device, or if the device is disarmed. Code::kInvalid is returned if the device
+/// does not have this output, if the output is of the other kind, or if both `rgb` and `vibration` are missing.
 struct SetOutput {
   std::uint32_t device = 0;  ///< 0 … 15
   /// 0 … 7. The index in HandleDescription::outputs. If the device does not have this output, the answer is

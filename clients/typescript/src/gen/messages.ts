@@ -231,8 +231,8 @@ export interface SetStateRate {
 }
 
 /**
- * Suppresses the states that the client can predict. After a state with velocity v, the server sends the first state
- * whose velocity differs from v by more than max(share · ‖v‖, floor), whose mode or buttons differ, or that is
+ * Suppresses states that can be predicted by the client. After a state with velocity v, the server sends the first
+ * state whose velocity differs from v by more than max(share · ‖v‖, floor), whose mode or buttons differ, or that is
  * maxSilenceUs newer. Between two states the client extrapolates: x + v · (t − sampledNs).
  */
 export interface StateDeadband {
@@ -270,9 +270,9 @@ export interface Disarm {
  * Offers the sender's device as the other end of a coupling with this device, and describes that end. Can only be used
  * by a client that has claimed the channel as a controller, and requires the feature "teleoperation". If the two ends
  * match, the answer is Code.OK. After that, both peers send PortState frames, and the server does not send states.
- * Code.INVALID means that the ends do not match, and the detail contains the first difference. Code.UNSUPPORTED means
- * that this device cannot be coupled. Code.BUSY means that the channel is coupled with another client. A follower has
- * one channel for each of its leaders.
+ * Code.INVALID is returned if the ends do not match, and the detail contains the first difference. Code.UNSUPPORTED is
+ * returned if this device cannot be coupled. Code.BUSY is returned if the channel is coupled with another client. A
+ * follower has one channel for each of its leaders.
  */
 export interface Couple {
   /** The device of the server */
@@ -322,7 +322,7 @@ export interface Couple {
 
 /**
  * Describes how the displacement of the leader's handle sets the speed of the follower. A spring pulls the handle to
- * its center. All values are in the scale of the leader.
+ * its center. All values use the scale of the leader.
  */
 export interface RateControl {
   /** m. If the leader is closer to its center than this distance, the follower does not move */
@@ -335,8 +335,8 @@ export interface RateControl {
 
 /**
  * Engages the coupling on the command of the operator. Can only be used by controllers of the leader's device, at its
- * server. If the answer is Code.OK, the loop of the device has received the order. Code.UNSUPPORTED means that the
- * device is not coupled, or that it is the follower.
+ * server. If the answer is Code.OK, the loop of the device has received the order. Code.UNSUPPORTED is returned if the
+ * device is not coupled, or if it is the follower.
  */
 export interface Engage {
   readonly device: number;
@@ -349,8 +349,8 @@ export interface Disengage {
 
 /**
  * Sets the scales of the coupling. Can only be used by controllers of the leader's device, at its server. If the answer
- * is Code.OK, the loop of the device has received the order. Code.BUSY means that the leader is engaged and its clutch
- * is not held. Code.UNSUPPORTED means that the device is not coupled, or that it is the follower.
+ * is Code.OK, the loop of the device has received the order. Code.BUSY is returned if the leader is engaged and its
+ * clutch is not held. Code.UNSUPPORTED is returned if the device is not coupled, or if it is the follower.
  */
 export interface SetScale {
   readonly device: number;
@@ -363,7 +363,7 @@ export interface SetScale {
 /**
  * Sets the weight of the leader of one channel if a follower has several leaders. Can only be used by controllers of
  * the follower's device, at its server. The weight reaches the value within 0.5 s, and the ratios of the other weights
- * do not change. Code.UNSUPPORTED means that the device is not coupled, that it only has one leader, or that it is a
+ * do not change. Code.UNSUPPORTED is returned if the device is not coupled, if it only has one leader, or if it is a
  * leader.
  */
 export interface SetShare {
@@ -381,8 +381,8 @@ export interface LampColour {
 /**
  * Sets a lamp of the device or starts a vibration pulse. Can only be used by a controller that holds one of the
  * channels of the device, and requires the feature "outputs". An output is turned off if the client that has set it
- * gives up or loses a channel of the device, or if the device is disarmed. Code.INVALID means that the device does not
- * have this output, that the output is of the other kind, or that both `rgb` and `vibration` are missing.
+ * gives up or loses a channel of the device, or if the device is disarmed. Code.INVALID is returned if the device does
+ * not have this output, if the output is of the other kind, or if both `rgb` and `vibration` are missing.
  */
 export interface SetOutput {
   readonly device: number;

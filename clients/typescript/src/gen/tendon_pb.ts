@@ -1021,9 +1021,9 @@ export const SetStateRateSchema: GenMessage<SetStateRate> = /*@__PURE__*/
   messageDesc(file_tendon, 13);
 
 /**
- * Suppresses the states that the client can predict. After a state with velocity v, the server sends the first state
- * whose velocity differs from v by more than max(share · ‖v‖, floor_mps), whose mode or buttons differ, or that is
- * max_silence_us newer. Between two states the client extrapolates: x + v · (t − sampled_ns).
+ * Suppresses states that can be predicted by the client. After a state with velocity v, the server sends the first
+ * state whose velocity differs from v by more than max(share · ‖v‖, floor_mps), whose mode or buttons differ, or that
+ * is max_silence_us newer. Between two states the client extrapolates: x + v · (t − sampled_ns).
  *
  * @generated from message tendon.v1.SetStateDeadband
  */
@@ -1113,9 +1113,9 @@ export const DisarmSchema: GenMessage<Disarm> = /*@__PURE__*/
  * Offers the sender's device as the other end of a coupling with this device, and describes that end. Can only be used
  * by a client that has claimed the channel as a controller, and requires the feature "teleoperation". If the two ends
  * match, the answer is CODE_OK. After that, both peers send PortState frames, and the server does not send states.
- * CODE_INVALID means that the ends do not match, and the detail contains the first difference. CODE_UNSUPPORTED means
- * that this device cannot be coupled. CODE_BUSY means that the channel is coupled with another client. A follower has
- * one channel for each of its leaders.
+ * CODE_INVALID is returned if the ends do not match, and the detail contains the first difference. CODE_UNSUPPORTED is
+ * returned if this device cannot be coupled. CODE_BUSY is returned if the channel is coupled with another client. A
+ * follower has one channel for each of its leaders.
  *
  * @generated from message tendon.v1.Couple
  */
@@ -1280,7 +1280,7 @@ export const CoupleSchema: GenMessage<Couple> = /*@__PURE__*/
 
 /**
  * Describes how the displacement of the leader's handle sets the speed of the follower. A spring pulls the handle to
- * its center. All values are in the scale of the leader.
+ * its center. All values use the scale of the leader.
  *
  * @generated from message tendon.v1.RateControl
  */
@@ -1318,8 +1318,8 @@ export const RateControlSchema: GenMessage<RateControl> = /*@__PURE__*/
 
 /**
  * Engages the coupling on the command of the operator. Can only be used by controllers of the leader's device, at its
- * server. If the answer is CODE_OK, the loop of the device has received the order. CODE_UNSUPPORTED means that the
- * device is not coupled, or that it is the follower.
+ * server. If the answer is CODE_OK, the loop of the device has received the order. CODE_UNSUPPORTED is returned if the
+ * device is not coupled, or if it is the follower.
  *
  * @generated from message tendon.v1.Engage
  */
@@ -1362,8 +1362,8 @@ export const DisengageSchema: GenMessage<Disengage> = /*@__PURE__*/
 
 /**
  * Sets the scales of the coupling. Can only be used by controllers of the leader's device, at its server. If the answer
- * is CODE_OK, the loop of the device has received the order. CODE_BUSY means that the leader is engaged and its clutch
- * is not held. CODE_UNSUPPORTED means that the device is not coupled, or that it is the follower.
+ * is CODE_OK, the loop of the device has received the order. CODE_BUSY is returned if the leader is engaged and its
+ * clutch is not held. CODE_UNSUPPORTED is returned if the device is not coupled, or if it is the follower.
  *
  * @generated from message tendon.v1.SetScale
  */
@@ -1400,7 +1400,7 @@ export const SetScaleSchema: GenMessage<SetScale> = /*@__PURE__*/
 /**
  * Sets the weight of the leader of one channel if a follower has several leaders. Can only be used by controllers of
  * the follower's device, at its server. The weight reaches the value within 0.5 s, and the ratios of the other weights
- * do not change. CODE_UNSUPPORTED means that the device is not coupled, that it only has one leader, or that it is a
+ * do not change. CODE_UNSUPPORTED is returned if the device is not coupled, if it only has one leader, or if it is a
  * leader.
  *
  * @generated from message tendon.v1.SetShare
@@ -1438,8 +1438,8 @@ export const SetShareSchema: GenMessage<SetShare> = /*@__PURE__*/
 /**
  * Sets a lamp of the device or starts a vibration pulse. Can only be used by a controller that holds one of the
  * channels of the device, and requires the feature "outputs". An output is turned off if the client that has set it
- * gives up or loses a channel of the device, or if the device is disarmed. CODE_INVALID means that the device does not
- * have this output, that the output is of the other kind, or that both `rgb` and `vibration` are missing.
+ * gives up or loses a channel of the device, or if the device is disarmed. CODE_INVALID is returned if the device does
+ * not have this output, if the output is of the other kind, or if both `rgb` and `vibration` are missing.
  *
  * @generated from message tendon.v1.SetOutput
  */
