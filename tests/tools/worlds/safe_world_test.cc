@@ -5,10 +5,8 @@
 #include <vector>
 
 #include "devices/safety/safe_device.h"
-#include "devices/simulated/profiles.h"
-#include "devices/simulated/simulated_device.h"
+#include "tests/tools/worlds/pressed_wall.h"
 #include "tests/tools/worlds/watched_device.h"
-#include "tests/tools/worlds/world.h"
 
 namespace tendon::simulation::safe_world_test {
 namespace {
@@ -16,39 +14,16 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-constexpr Friction kBounds = {.coulomb = 0.3, .viscous = 0.8};  // below the falcon's true friction
-
-/// Rests at first, then moves back and forth through a wall at x = 0.
+/// Rests at first, then moves back and forth through the wall.
 SimulatedDevice::Config hand(const Vec3& to = Vec3(0.02, 0.004, 0)) {
-  SimulatedDevice::Config device = find_device_profile("falcon")->device();
-  device.hand = OperatorHand::Config{
-      .stiffness = 300,
-      .damping = 3,
-      .mass = 0.05,
-      .motion = ScriptedMotion(ScriptedMotion::RampHold{
-          .from = Vec3(-0.01, 0, 0), .to = to, .ramp = milliseconds(400), .hold = milliseconds(200)})};
-  return device;
+  return moved_falcon(to, milliseconds(400), milliseconds(200));
 }
 
-World::Config world_config(const DeviceInfo& device) {
-  World::Config config;
-  config.seed = 7;
-  config.loop.control.limiter.friction = kBounds;
-  config.loop.control.limiter.longest_hold = milliseconds(2);
-  config.loop.control.max_force = device.max_force;
-  config.loop.control.max_slew = 1000;
-  return config;
-}
-
-ForceClient::Config at_100_hz() {
-  ForceClient::Config config;
-  config.name = "Z";
-  config.rate_hz = 100;
-  return config;
-}
-
-Physics wall() {
-  return [](const DeviceState& state) -> Touch { return Vec3(-2000 * std::max(0.0, state.position.x()), 0, 0); };
+/// N, in the next `duration`.
+double peak_of(World& world, Log& log, Duration duration) {
+  log.steps.clear();
+  world.run_for(duration);
+  return log.peak();
 }
 
 class Pluggable final : public Device {
@@ -83,20 +58,17 @@ TEST(SafeWorld, TheLedgerBooksTheForceAfterTheSafetyLayerAndStaysPassive) {
   SafeDevice safe(config, watched);
   World world(world_config(safe.info()), safe);
   world.add_controller(at_100_hz(), wall());
-  double least = 0;
-  double peak = 0;
+  Log log(world);
+  world.run_for(seconds(5));
   int left = 0;
-  world.watch_steps([&](const StepRecord& step) {
-    least = std::min(least, step.energy);
-    peak = std::max(peak, step.applied.norm());
+  for (const StepRecord& step : log.steps) {
     left += step.applied != step.force ? 1 : 0;
     ASSERT_LE(step.applied.norm(), step.permitted + 1e-12);
-  });
-  world.run_for(seconds(5));
+  }
   EXPECT_EQ(safe.status().state, SafetyState::kArmed);
-  EXPECT_GT(peak, 1);     // N: the wall is felt
-  EXPECT_GT(left, 1000);  // steps in which the safety layer reduced the force
-  EXPECT_GE(least, -1e-9);
+  EXPECT_GT(log.peak(), 1);  // N: the wall is felt
+  EXPECT_GT(left, 1000);     // steps in which the safety layer reduced the force
+  EXPECT_GE(log.least_energy(), -1e-9);
   EXPECT_GE(watched.energy(), -1e-9);
 }
 
@@ -107,31 +79,23 @@ TEST(SafeWorld, ADeviceReplugedInMidForceWaitsForHomingAndTheEnginesRequest) {
   SafeDevice safe({}, plug);
   World world(world_config(safe.info()), safe);
   const std::size_t engine = world.add_controller(at_100_hz(), wall());
-  std::vector<StepRecord> steps;
-  world.watch_steps([&](const StepRecord& step) { steps.push_back(step); });
-  const auto peak_of = [&](Duration duration) {
-    steps.clear();
-    world.run_for(duration);
-    double peak = 0;
-    for (const StepRecord& step : steps) peak = std::max(peak, step.applied.norm());
-    return peak;
-  };
+  Log log(world);
 
-  EXPECT_EQ(peak_of(seconds(2)), 0);
+  EXPECT_EQ(peak_of(world, log, seconds(2)), 0);
   EXPECT_EQ(world.haptic().stats().fault, HapticController::Fault::kNone) << "not ready is no fault";
   plug.stage = Device::State::kHomed;
-  EXPECT_EQ(peak_of(seconds(2)), 0);
+  EXPECT_EQ(peak_of(world, log, seconds(2)), 0);
   EXPECT_TRUE(world.client(engine).rearm());
-  EXPECT_GT(peak_of(seconds(3)), 1);
+  EXPECT_GT(peak_of(world, log, seconds(3)), 1);
 
   plug.stage = Device::State::kAbsent;
-  EXPECT_EQ(peak_of(milliseconds(200)), 0);
+  EXPECT_EQ(peak_of(world, log, milliseconds(200)), 0);
   EXPECT_EQ(safe.status().state, SafetyState::kFault);
   plug.stage = Device::State::kHomed;
-  EXPECT_EQ(peak_of(seconds(2)), 0);
+  EXPECT_EQ(peak_of(world, log, seconds(2)), 0);
   EXPECT_EQ(world.haptic().stats().fault, HapticController::Fault::kDeviceSilent);
   EXPECT_TRUE(world.client(engine).rearm());
-  EXPECT_GT(peak_of(seconds(3)), 1);
+  EXPECT_GT(peak_of(world, log, seconds(3)), 1);
   EXPECT_EQ(world.haptic().stats().fault, HapticController::Fault::kNone);
 }
 
@@ -144,25 +108,17 @@ TEST(SafeWorld, WhatItsEngineHasDisarmedInMidForceGivesNoneUntilItRearms) {
     SafeDevice safe(config, device);
     World world(world_config(device.info()), guarded ? static_cast<Device&>(safe) : device);
     const std::size_t engine = world.add_controller(at_100_hz(), wall());
-    std::vector<StepRecord> steps;
-    world.watch_steps([&](const StepRecord& step) { steps.push_back(step); });
-    const auto peak_of = [&](Duration duration) {
-      steps.clear();
-      world.run_for(duration);
-      double peak = 0;
-      for (const StepRecord& step : steps) peak = std::max(peak, step.applied.norm());
-      return peak;
-    };
-    EXPECT_GT(peak_of(seconds(2)), 1);
+    Log log(world);
+    EXPECT_GT(peak_of(world, log, seconds(2)), 1);
     EXPECT_TRUE(world.client(engine).disarm());
     world.run_for(milliseconds(500));
-    EXPECT_EQ(peak_of(seconds(2)), 0);
+    EXPECT_EQ(peak_of(world, log, seconds(2)), 0);
     EXPECT_EQ(world.haptic().stats().fault, HapticController::Fault::kNone);
     if (guarded) {
       EXPECT_EQ(safe.status().state, SafetyState::kHomed);
     }
     EXPECT_TRUE(world.client(engine).rearm());
-    EXPECT_GT(peak_of(seconds(3)), 1);
+    EXPECT_GT(peak_of(world, log, seconds(3)), 1);
   }
 }
 

@@ -1,21 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "tests/tools/worlds/world.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
+#include <span>
 #include <sstream>
 #include <vector>
 
-#include "devices/simulated/profiles.h"
-#include "devices/simulated/simulated_device.h"
 #include "protocol/wire/codec.h"
 #include "server/recording/flight_file.h"
 #include "server/recording/recording_reader.h"
 #include "tests/tools/worlds/adversary.h"
+#include "tests/tools/worlds/pressed_wall.h"
 #include "tests/tools/worlds/watched_device.h"
 
 namespace tendon::simulation::world_test {
@@ -23,75 +21,17 @@ namespace {
 
 using std::chrono::milliseconds;
 using std::chrono::seconds;
-constexpr double kStiffness = 2000;
-
-Physics wall() {
-  return [](const DeviceState& hand) -> Touch { return Vec3(-kStiffness * std::max(0.0, hand.position.x()), 0, 0); };
-}
-
-ForceClient::Config at_100_hz() {
-  ForceClient::Config config;
-  config.name = "Z";
-  config.rate_hz = 100;
-  return config;
-}
-
-// A falcon pressed against a wall at x = 0; in contact from 0.5 s on.
-SimulatedDevice::Config pressing_hand() {
-  SimulatedDevice::Config device = find_device_profile("falcon")->device();
-  device.hand = OperatorHand::Config{
-      .stiffness = 300,
-      .damping = 3,
-      .mass = 0.05,
-      .motion = ScriptedMotion(ScriptedMotion::RampHold{
-          .from = Vec3(-0.01, 0, 0), .to = Vec3(0.015, 0, 0), .ramp = milliseconds(800), .hold = std::nullopt})};
-  return device;
-}
-
-World::Config world_config(const SimulatedDevice& device, std::uint64_t seed = 7) {
-  World::Config config;
-  config.seed = seed;
-  config.loop.control.limiter.friction = {0.3, 0.8};  // below the falcon's true friction
-  config.loop.control.limiter.longest_hold = milliseconds(2);
-  config.loop.control.max_force = device.info().max_force;
-  config.loop.control.max_slew = 1000;
-  return config;
-}
-
-struct Log {
-  std::vector<StepRecord> steps;
-  void attach(World& world) {
-    world.watch_steps([this](const StepRecord& step) { steps.push_back(step); });
-  }
-  double largest_rise() const {
-    double largest = 0;
-    for (std::size_t i = 1; i < steps.size(); ++i) {
-      largest = std::max(largest, steps[i].applied.norm() - steps[i - 1].applied.norm());
-    }
-    return largest;
-  }
-  std::vector<Mode> modes() const {
-    std::vector<Mode> seen;
-    for (const StepRecord& step : steps) {
-      if (seen.empty() || seen.back() != step.mode) seen.push_back(step.mode);
-    }
-    return seen;
-  }
-};
+// In contact from 0.5 s on.
+SimulatedDevice::Config pressing_hand() { return moved_falcon(Vec3(0.015, 0, 0), milliseconds(800), std::nullopt); }
 
 TEST(World, AHandFeelsARemoteLateSlowWallAndItStaysStable) {
   SimulatedDevice device(pressing_hand());
-  World world(world_config(device), device);
+  World world(world_config(device.info()), device);
   world.add_controller(at_100_hz(), wall());
-  Log log;
-  log.attach(world);
+  Log log(world);
   world.run_for(seconds(5));
-  double peak = 0;
-  for (const StepRecord& step : log.steps) {
-    EXPECT_GE(step.energy, -1e-9);
-    peak = std::max(peak, step.applied.norm());
-  }
-  EXPECT_GT(peak, 1);
+  EXPECT_GE(log.least_energy(), -1e-9);
+  EXPECT_GT(log.peak(), 1);
   const StepRecord& last = log.steps.back();
   EXPECT_EQ(last.mode, Mode::kActive);
   EXPECT_LT(last.hand.velocity.norm(), 0.005);
@@ -100,24 +40,20 @@ TEST(World, AHandFeelsARemoteLateSlowWallAndItStaysStable) {
 }
 
 TEST(World, WithoutTheLimiterTheSameWallMakesThePortActive) {
-  SimulatedDevice::Config hand = pressing_hand();
-  SimulatedDevice device(hand);
-  World::Config config = world_config(device);
+  SimulatedDevice device(pressing_hand());
+  World::Config config = world_config(device.info());
   config.loop.control.limiter.law = Law::kNone;
   World world(config, device);
   world.add_controller(at_100_hz(), wall());
-  Log log;
-  log.attach(world);
+  Log log(world);
   world.run_for(seconds(5));
-  double least = 0;
-  for (const StepRecord& step : log.steps) least = std::min(least, step.energy);
-  EXPECT_LT(least, -0.1);
+  EXPECT_LT(log.least_energy(), -0.1);
 }
 
 TEST(World, SameSeedSameBytes) {
   const auto recording = [](std::uint64_t seed) {
     SimulatedDevice device(pressing_hand());
-    World::Config config = world_config(device, seed);
+    World::Config config = world_config(device.info(), seed);
     config.record = true;
     config.latest_wake = milliseconds(1);
     config.scene_text = "kind = 'world'";
@@ -133,19 +69,21 @@ TEST(World, SameSeedSameBytes) {
   EXPECT_NE(first, recording(8));
 }
 
+RecordingReader reader_of(std::span<const std::byte> bytes) {
+  return {std::make_unique<std::istringstream>(std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size())),
+          "world"};
+}
+
 TEST(World, ARecordingHoldsEveryStepAndEveryDatagram) {
   SimulatedDevice device(pressing_hand());
-  World::Config config = world_config(device);
+  World::Config config = world_config(device.info());
   config.record = true;
   World world(config, device);
   const std::size_t z = world.add_controller(at_100_hz(), wall());
-  Log log;
-  log.attach(world);
+  Log log(world);
   world.run_for(seconds(1));
   const auto& bytes = world.finish_recording();
-  auto stream =
-      std::make_unique<std::istringstream>(std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size()));
-  RecordingReader reader(std::move(stream), "world");
+  RecordingReader reader = reader_of(bytes);
   std::size_t steps = 0;
   std::size_t datagrams_in = 0;
   while (const auto record = reader.next()) {
@@ -166,11 +104,10 @@ TEST(World, ARecordingHoldsEveryStepAndEveryDatagram) {
 
 TEST(World, AKilledEnginesForceHoldsFadesStopsAndComesBackRampedIn) {
   SimulatedDevice device(pressing_hand());
-  World world(world_config(device), device);
+  World world(world_config(device.info()), device);
   const std::size_t z = world.add_controller(at_100_hz(), wall());
   world.run_for(seconds(3));
-  Log log;
-  log.attach(world);
+  Log log(world);
   world.run_for(milliseconds(100));
   ASSERT_GT(log.steps.back().applied.norm(), 0.5);
   world.kill(z);
@@ -185,9 +122,7 @@ TEST(World, AKilledEnginesForceHoldsFadesStopsAndComesBackRampedIn) {
   EXPECT_GT(log.steps.back().applied.norm(), 0.5);
   // The slew limit is 1000 N/s, and the longest hold is 2 ms.
   EXPECT_LE(log.largest_rise(), 1000 * 2e-3 + 1e-9);
-  bool ramped = false;
-  for (const StepRecord& step : log.steps) ramped = ramped || step.reasons.has(Reason::kRampIn);
-  EXPECT_TRUE(ramped);
+  EXPECT_TRUE(log.has(Reason::kRampIn));
 }
 
 TEST(World, ADeviceFaultZeroesTheForceSavesStepsAndOnlyRearmLeavesIt) {
@@ -207,26 +142,23 @@ TEST(World, ADeviceFaultZeroesTheForceSavesStepsAndOnlyRearmLeavesIt) {
     SimulatedDevice device_;
   };
   FailingDevice device(pressing_hand());
-  World::Config config = world_config(SimulatedDevice(pressing_hand()));
+  World::Config config = world_config(device.info());
   World world(config, device);
   const std::size_t z = world.add_controller(at_100_hz(), wall());
   world.run_for(seconds(2));
   device.failing = true;
   world.run_for(milliseconds(10));
   device.failing = false;
-  Log log;
-  log.attach(world);
+  Log log(world);
   world.run_for(milliseconds(200));
   EXPECT_EQ(world.haptic().stats().fault, HapticController::Fault::kPositionNotFinite);
   EXPECT_EQ(log.modes(), std::vector{Mode::kFault});
-  for (const StepRecord& step : log.steps) EXPECT_EQ(step.applied.norm(), 0);
+  EXPECT_EQ(log.peak(), 0);
 
   ASSERT_TRUE(world.mail().flight.frozen());
   MemorySink sink;
   write_flight(world.mail().flight, world.recorder_config(), world.mail().ways, sink);
-  RecordingReader reader(std::make_unique<std::istringstream>(
-                             std::string(reinterpret_cast<const char*>(sink.bytes().data()), sink.bytes().size())),
-                         "flight");
+  RecordingReader reader = reader_of(sink.bytes());
   StepRecord last;
   std::size_t steps = 0;
   while (const auto record = reader.next()) {
@@ -244,13 +176,13 @@ TEST(World, ADeviceFaultZeroesTheForceSavesStepsAndOnlyRearmLeavesIt) {
   // The mode is idle in between, unless a fresh force arrives with the request. The force is ramped in both cases.
   EXPECT_EQ(log.modes().front(), Mode::kFault);
   EXPECT_EQ(log.modes().back(), Mode::kActive);
-  EXPECT_TRUE(std::ranges::any_of(log.steps, [](const StepRecord& step) { return step.reasons.has(Reason::kRampIn); }));
+  EXPECT_TRUE(log.has(Reason::kRampIn));
   EXPECT_GT(log.steps.back().applied.norm(), 0.5);
 }
 
 TEST(World, OneControllerAndSeveralObserversAndNobodyElse) {
   SimulatedDevice device(pressing_hand());
-  World::Config config = world_config(device);
+  World::Config config = world_config(device.info());
   config.max_observers = 2;
   World world(config, device);
   const std::size_t z = world.add_controller(at_100_hz(), wall());
@@ -276,7 +208,7 @@ TEST(World, OneControllerAndSeveralObserversAndNobodyElse) {
 
 TEST(World, AnObserverCannotRearmNorSendForces) {
   SimulatedDevice device(pressing_hand());
-  World world(world_config(device), device);
+  World world(world_config(device.info()), device);
   const std::size_t y = world.add_observer({.name = "Y"}, [](const DeviceState&, const LinkStats&) {});
   world.run_for(seconds(1));
   ASSERT_TRUE(world.client(y).rearm());
@@ -287,14 +219,13 @@ TEST(World, AnObserverCannotRearmNorSendForces) {
 TEST(World, ALocalModelIsUsedWhenBothEndsKnowItAndMakesTheContactStiffer) {
   const auto depth = [](bool with_model) {
     SimulatedDevice device(pressing_hand());
-    World world(world_config(device), device);
+    World world(world_config(device.info()), device);
     world.add_controller(at_100_hz(), [with_model](const DeviceState& hand) -> Touch {
       Touch touch = wall()(hand);
-      if (with_model && hand.position.x() > 0) touch.stiffness = Vec3(kStiffness, 0, 0).asDiagonal();
+      if (with_model && hand.position.x() > 0) touch.stiffness = Vec3(kWallStiffness, 0, 0).asDiagonal();
       return touch;
     });
-    Log log;
-    log.attach(world);
+    Log log(world);
     world.run_for(seconds(5));
     return log.steps.back().hand.position.x();
   };
@@ -303,7 +234,7 @@ TEST(World, ALocalModelIsUsedWhenBothEndsKnowItAndMakesTheContactStiffer) {
 
 TEST(World, BadAndReplayedDatagramsAreCountedAndChangeNothing) {
   SimulatedDevice device(pressing_hand());
-  World world(world_config(device), device);
+  World world(world_config(device.info()), device);
   const std::size_t z = world.add_controller(at_100_hz(), wall());
   world.run_for(seconds(2));
   const auto before = world.server().stats();
@@ -316,8 +247,7 @@ TEST(World, BadAndReplayedDatagramsAreCountedAndChangeNothing) {
     world.network().forge(i % 2 == 0 ? stranger : world.client_address(z), server, std::move(garbage));
   }
   world.network().forge(stranger, server, std::vector<std::byte>(60000));
-  Log log;
-  log.attach(world);
+  Log log(world);
   world.run_for(seconds(1));
   const auto after = world.server().stats();
   const auto dropped = [](const NetworkLoop::Stats& stats) { return stats.malformed + stats.unknown_connection; };
@@ -330,7 +260,7 @@ TEST(World, BadAndReplayedDatagramsAreCountedAndChangeNothing) {
 
 TEST(World, NotANumberOnTheWireIsCountedAndNeverReachesTheDevice) {
   SimulatedDevice device(pressing_hand());
-  World world(world_config(device), device);
+  World world(world_config(device.info()), device);
   const std::size_t z = world.add_controller(at_100_hz(), wall());
   world.run_for(seconds(2));
   // Our clients cannot send such a force; writes it as an attacker who knows the session.
@@ -351,8 +281,7 @@ TEST(World, NotANumberOnTheWireIsCountedAndNeverReachesTheDevice) {
     world.network().forge(world.client_address(z), world.server_address(),
                           {buffer.begin(), buffer.begin() + static_cast<std::ptrdiff_t>(writer.size())});
   }
-  Log log;
-  log.attach(world);
+  Log log(world);
   world.run_for(seconds(1));
   EXPECT_EQ(world.server().stats().controller.invalid, invalid + 4);
   for (const StepRecord& step : log.steps) {
@@ -364,7 +293,7 @@ TEST(World, NotANumberOnTheWireIsCountedAndNeverReachesTheDevice) {
 
 TEST(World, TheLawBooksTheForceThatADeviceKeepsWhenItIsToldZero) {
   SimulatedDevice device(pressing_hand());
-  World::Config config = world_config(device);
+  World::Config config = world_config(device.info());
   config.loop.control.limiter.law = Law::kAol;
   WatchedDevice port(
       device,
@@ -386,14 +315,13 @@ TEST(World, PausesOfTheMachineAreFlaggedAndTheLedgerRecoversByItself) {
   SimulatedDevice::Config hand = pressing_hand();
   hand.watchdog = milliseconds(5);
   SimulatedDevice device(hand);
-  World::Config config = world_config(device);
+  World::Config config = world_config(device.info());
   config.loop.control.watchdog = milliseconds(5);
   config.pause_probability = 5e-3;
   config.pause = milliseconds(30);
   World world(config, device);
   world.add_controller(at_100_hz(), wall());
-  Log log;
-  log.attach(world);
+  Log log(world);
   world.run_for(seconds(10));
   std::uint64_t overruns = 0;
   for (std::size_t i = 1; i < log.steps.size(); ++i) {
@@ -415,7 +343,7 @@ TEST(World, PausesOfTheMachineAreFlaggedAndTheLedgerRecoversByItself) {
 // The link's 700 kbit/s carry 400 states/s.
 NetworkLoop::Stats on_a_narrow_link(bool adapt) {
   SimulatedDevice device(pressing_hand());
-  World::Config config = world_config(device);
+  World::Config config = world_config(device.info());
   config.weather = {.up = injector::parse_profile("base=5ms"),
                     .down = injector::parse_profile("base=5ms rate=700kbit/s queue=2000packets")};
   config.adapt_state_rate = adapt;
@@ -432,13 +360,12 @@ TEST(World, WhereALinkIsNarrowStatesLeaveMoreRarelyAndSoArriveSooner) {
 
 TEST(World, OverALinkThatLosesTooMuchForcesAreNotTakenWhereTheRateIsAdapted) {
   SimulatedDevice device(pressing_hand());
-  World::Config config = world_config(device);
+  World::Config config = world_config(device.info());
   config.weather = {.up = injector::parse_profile("base=5ms"), .down = injector::parse_profile("base=5ms loss=30%")};
   config.adapt_state_rate = true;
   World world(config, device);
   world.add_controller(at_100_hz(), wall());
-  Log log;
-  log.attach(world);
+  Log log(world);
   world.run_for(seconds(12));
   EXPECT_GT(world.server().stats().unusable, 100U);
   EXPECT_NE(log.steps.back().mode, Mode::kActive);
@@ -452,7 +379,7 @@ std::string told(World& world) {
 
 TEST(World, TheOperatorIsToldWhyAForceWasLate) {
   SimulatedDevice device(pressing_hand());
-  World::Config config = world_config(device);
+  World::Config config = world_config(device.info());
   config.weather = {.up = injector::parse_profile("base=20ms"),
                     .down = injector::parse_profile("base=20ms spike(at=3s,for=300ms,150ms)")};
   World world(config, device);
@@ -470,7 +397,7 @@ TEST(World, TheOperatorIsToldWhyAForceWasLate) {
 
 TEST(World, TheServerKnowsTheClockOfTheEngineWithinTheBoundItStates) {
   SimulatedDevice device(pressing_hand());
-  World world(world_config(device), device);
+  World world(world_config(device.info()), device);
   const injector::DriftingClock clock({.offset = std::chrono::hours(30), .drift_ppb = -150'000, .steps = {}});
   world.add_controller(at_100_hz(), wall(), clock);
   world.run_for(seconds(60));
