@@ -6,6 +6,7 @@
 #include <string>
 
 #include "core/base/rotation.h"
+#include "tests/core/teleoperation/expect_ports.h"
 #include "tests/core/teleoperation/ports.h"
 
 namespace tendon::coupling_force_test {
@@ -28,11 +29,6 @@ PortSetup leader_of(std::function<double(double)> along_x, double stiffness = 30
   leader.coupling.clutch = Coupling::Button{.bit = 0};
   leader.around = hand_of(stiffness, std::move(along_x));
   return leader;
-}
-
-void expect_passive(const Ports& ports, const std::string& when) {
-  EXPECT_GE(ports.least_account(), kRounding) << when;
-  EXPECT_GE(ports.least_sum, kRounding) << when;
 }
 
 class Steps {
@@ -179,44 +175,6 @@ TEST(CouplingForce, AClutchThatChattersUnderForceMovesNothing) {
   expect_passive(ports, "chatter");
 }
 
-TEST(CouplingForce, APeerThatStartsAnewUnderForceIsNoStep) {
-  for (const bool leads : {true, false}) {
-    Ports ports = pressing(3);
-    const double felt = -ports.leader.demand.force.x();
-    Port& other = leads ? ports.follower : ports.leader;
-    Vec3 before = other.demand.force;
-    double largest = 0;
-    const auto look = [&](int) {
-      largest = std::max(largest, (other.demand.force - before).norm());
-      before = other.demand.force;
-    };
-    (leads ? ports.leader : ports.follower).begin(2);
-    ports.run(200, look);
-    EXPECT_LT(largest, felt / 50 + kCoulomb) << leads;
-    EXPECT_EQ(other.demand.force, Vec3(Vec3::Zero()));
-    EXPECT_TRUE(ports.engage());
-    ports.run(600, look);
-    EXPECT_LT(largest, felt / 50 + kCoulomb) << leads << ", and engaged again";
-    expect_passive(ports, "restart");
-  }
-}
-
-TEST(CouplingForce, ABriefLossUnderForceIsNoStep) {
-  Ports ports = pressing(3);
-  const double felt = -ports.leader.demand.force.x();
-  Steps steps;
-  steps.from(ports);
-  ports.cut_there = ports.cut_back = true;
-  ports.run(150, [&](int) { steps.look(ports); });
-  EXPECT_EQ(ports.leader.demand.force, Vec3(Vec3::Zero()));
-  ports.cut_there = ports.cut_back = false;
-  ports.run(1000, [&](int) { steps.look(ports); });
-  EXPECT_TRUE(ports.leader.coupling->live()) << "not lost yet";
-  EXPECT_LT(steps.leader, felt / 50 + 0.1);
-  EXPECT_GT(-ports.leader.demand.force.x(), 0.5);
-  expect_passive(ports, "brief loss");
-}
-
 TEST(CouplingForce, AScaledAndTurnedPairHoldsScaledForcesAndStaysPassive) {
   struct Case {
     double position_scale, force_scale;
@@ -352,60 +310,6 @@ TEST(CouplingForce, HandsAtBothEndsThatPushEachOtherFeelTheSame) {
   ports.follower.setup.around = {};
   ports.run(2000);
   expect_passive(ports, "one hand");
-}
-
-TEST(CouplingForce, FiveMillisecondsOneWayAnd200TheOtherAreQuiet) {
-  for (const bool turned : {false, true}) {
-    PortSetup leader = leader_of([](double t) { return 0.02 * std::clamp((t - 1.5) / 0.5, 0.0, 1.0); });
-    PortSetup follower = port_of(PortRole::kFollower);
-    follower.around[0] = {.stiffness = 500, .reference = [](double) { return 0.01; }, .wall = true};
-    Ports ports(leader, follower, {.delay = turned ? 200 : 5, .jitter = 5, .loss = 0.1, .seed = 3},
-                {.delay = turned ? 5 : 200, .jitter = 5, .loss = 0.1, .seed = 4});
-    ports.run(400);
-    ASSERT_TRUE(ports.engage());
-    ports.run(3000);
-    HighPass leader_unrest(50);
-    HighPass follower_unrest(50);
-    ports.run(2000, [&](int) {
-      leader_unrest.add(ports.leader.applied.x());
-      follower_unrest.add(ports.follower.applied.x());
-    });
-    EXPECT_NEAR(-ports.leader.applied.x(), ports.follower.applied.x(), 2 * kCoulomb + 0.01);
-    EXPECT_GT(-ports.leader.applied.x(), 0.2);
-    EXPECT_LT(std::max(leader_unrest.rms(), follower_unrest.rms()), 0.02);
-    expect_passive(ports, turned ? "200 and 5" : "5 and 200");
-  }
-}
-
-TEST(CouplingForce, A500HzFollowerAndStatesSentTwiceAreAsPassive) {
-  PortSetup leader = leader_of([](double t) { return 0.02 * std::sin(4 * t); });
-  PortSetup follower = port_of(PortRole::kFollower);
-  follower.every = 2;
-  follower.around[0] = {.stiffness = 5000, .reference = [](double) { return 0.01; }, .wall = true};
-  leader.coupling.peer_period = milliseconds(2);
-  Ports ports(leader, follower, {.delay = 4, .jitter = 9, .loss = 0.2, .seed = 3},
-              {.delay = 4, .jitter = 9, .loss = 0.2, .seed = 4});
-  ports.copies = 2;
-  ASSERT_TRUE(ports.engage());
-  double farthest = 0;
-  ports.run(4000, [&](int) { farthest = std::max(farthest, -ports.follower.x().x()); });
-  EXPECT_GT(farthest, 0.015) << "it follows";
-  expect_passive(ports, "500 Hz");
-}
-
-TEST(CouplingForce, TheForceOfALawIsNeverAboveItsMost) {
-  Ports ports = [] {
-    PortSetup follower = port_of(PortRole::kFollower);
-    follower.coupling.spring.max_force = 0.7;
-    return pressing(3, follower);
-  }();
-  EXPECT_NEAR(ports.follower.demand.force.norm(), 0.7, 1e-12);
-  double most = 0;
-  ports.run(1000, [&](int now) {
-    ports.leader.buttons = now / 10 % 2 == 0 ? 1 : 0;
-    most = std::max(most, ports.follower.demand.force.norm());
-  });
-  EXPECT_LE(most, 0.7 + 1e-12);
 }
 
 }  // namespace

@@ -3,6 +3,8 @@
 
 #include <array>
 #include <limits>
+#include <stdexcept>
+#include <string>
 #include <utility>
 
 #include "core/teleoperation/coupling_config.h"
@@ -12,6 +14,7 @@
 #include "core/teleoperation/phases/force_ramp.h"
 #include "core/teleoperation/phases/loss_stages.h"
 #include "core/teleoperation/phases/phase_machine.h"
+#include "tests/support/refusal.h"
 
 namespace tendon::coupling_phases_test {
 namespace {
@@ -182,38 +185,27 @@ TEST(MappedEnd, FollowsTheLeadersScalesAndKeepsWhatTheAccountIsWorth) {
 }
 
 TEST(CouplingRules, NameTheFieldThatDoesNotGoWithTheOthers) {
-  const auto first = [](void (*change)(CouplingConfig&)) {
-    CouplingConfig config;
-    config.spring.own_damping = 4;
-    change(config);
-    const auto reasons = check(config);
-    return reasons.empty() ? std::string_view() : reasons.front().key;
+  CouplingConfig leader;
+  leader.spring.own_damping = 4;
+  CouplingConfig follower = leader;
+  follower.role = PortRole::kFollower;
+  const auto use = [](const CouplingConfig& config) {
+    for (const auto& reason : check(config)) throw std::invalid_argument(std::string(reason.key));
   };
-  EXPECT_EQ(first([](CouplingConfig&) {}), "");
-  EXPECT_EQ(first([](CouplingConfig& c) {
-              c.role = PortRole::kFollower;
-              c.clutch.emplace();
-            }),
-            "clutch");
-  EXPECT_EQ(first([](CouplingConfig& c) {
-              c.role = PortRole::kFollower;
-              c.engage_by = 1;
-            }),
-            "engage_by");
-  EXPECT_EQ(first([](CouplingConfig& c) { c.holds_place = true; }), "holds_place");
-  EXPECT_EQ(first([](CouplingConfig& c) { c.share = 0.5; }), "share");
-  EXPECT_EQ(first([](CouplingConfig& c) { c.rate.emplace(); }), "rate");
-  EXPECT_EQ(first([](CouplingConfig& c) { c.method = CouplingMethod::kRate; }), "rate");
-  EXPECT_EQ(first([](CouplingConfig& c) {
-              c.method = CouplingMethod::kWaves;
-              c.absolute.emplace();
-            }),
-            "absolute");
-  EXPECT_EQ(first([](CouplingConfig& c) {
-              c.absolute.emplace();
-              c.clutch.emplace();
-            }),
-            "clutch");
+  expect_refusals(follower, use,
+                  {
+                      {"clutch", [](auto& c) { c.clutch.emplace(); }},
+                      {"engage_by", [](auto& c) { c.engage_by = 1; }},
+                  });
+  expect_refusals(leader, use,
+                  {
+                      {"holds_place", [](auto& c) { c.holds_place = true; }},
+                      {"share", [](auto& c) { c.share = 0.5; }},
+                      {"rate", [](auto& c) { c.rate.emplace(); }},
+                      {"rate", [](auto& c) { c.method = CouplingMethod::kRate; }},
+                      {"absolute", [](auto& c) { c.absolute.emplace(), c.method = CouplingMethod::kWaves; }},
+                      {"clutch", [](auto& c) { c.absolute.emplace(), c.clutch.emplace(); }},
+                  });
   for (const CouplingMethod method : {CouplingMethod::kWaves, CouplingMethod::kPassivity}) {
     CouplingConfig config;
     config.method = method;

@@ -9,6 +9,14 @@
 
 namespace tendon {
 
+/// Checks accounts and pair.
+template <class AnyPorts, class When = const char*>
+requires requires(const AnyPorts& ports) { ports.least_sum; }
+void expect_passive(const AnyPorts& ports, const When& when = "") {
+  EXPECT_GE(ports.least_account(), kRounding) << when;
+  EXPECT_GE(ports.least_sum, kRounding) << when;
+}
+
 inline void expect_coupled(const Ports& ports, const std::string& when) {
   EXPECT_EQ(phase(ports.leader), PortPhase::kCoupled) << when;
   EXPECT_EQ(phase(ports.follower), PortPhase::kCoupled) << when;

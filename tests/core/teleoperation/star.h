@@ -127,8 +127,6 @@ class Star {
       double sum = follower.truth.energy();
       for (const Node& leader : leaders) sum += leader.truth.energy();
       least_sum = std::min(least_sum, sum);
-      least_account = std::min(least_account, follower.least_account);
-      for (const Node& leader : leaders) least_account = std::min(least_account, leader.least_account);
       look(now);
     }
   }
@@ -143,14 +141,18 @@ class Star {
     for (int i = 0; i < 1000 && !leaders[which].coupling().live(); ++i) run(1);
     return leaders[which].coupling().live() && follower.coupling(which).live();
   }
+  double least_account() const {
+    double least = follower.least_account;
+    for (const Node& leader : leaders) least = std::min(least, leader.least_account);
+    return least;
+  }
   void set_share(std::size_t which, double share) { follower.controller->couplings()->set_share(which, share); }
 
   Node follower;
   std::deque<Node> leaders;  // a controller must not move in memory
   std::vector<bool> cut;     ///< per leader, both directions
   int now = 0;
-  double least_sum = 0;                                            ///< J, sum of all ledgers
-  double least_account = std::numeric_limits<double>::infinity();  ///< J
+  double least_sum = 0;  ///< J, sum of all ledgers
 
  private:
   static std::vector<CoupledLeader> shares_of(const std::vector<Leader>& leaders) {
