@@ -342,6 +342,7 @@ TEST(Injector, AnImpossibleChangeIsRefusedAndLeavesEverythingAsItWas) {
   Profile profile;
   profile.duplicate = 2;
   EXPECT_THROW(injector.change(profile, kStart), std::invalid_argument);
+  EXPECT_THROW(Injector(profile, 1, 0, Direction::kUp), std::invalid_argument);
   EXPECT_EQ(delay(injector.decide({.arrival = kStart})), 5ms);
 }
 
@@ -353,12 +354,6 @@ TEST(Injector, NamesOfVerdictsAndCausesReadBack) {
     EXPECT_EQ(parse_cause(to_string(static_cast<Cause>(i))), static_cast<Cause>(i));
   }
   EXPECT_FALSE(parse_cause("bad luck"));
-}
-
-TEST(Injector, RefusesAnImpossibleProfile) {
-  Profile profile;
-  profile.loss = RandomLoss{-0.1};
-  EXPECT_THROW(Injector(profile, 1, 0, Direction::kUp), std::invalid_argument);
 }
 
 }  // namespace

@@ -55,12 +55,16 @@ TEST(SelfTest, AgreesWithTheRightLaw) {
   EXPECT_EQ(failures(check_losses("loss=fourstate(0%,0%,0%,0%,5%)", LossChain::gilbert(0.05, 1, 1, 0), kSome)), "");
 }
 
-TEST(SelfTest, SeesADeviationThatIsFivePercentOff) {
-  EXPECT_NE(failures(check_delays("delay=normal(20ms,4ms) order=free", normal_law(20, 4.2), 0, true, kSome)), "");
-}
-
-TEST(SelfTest, SeesAMeanThatIsOnePercentOff) {
-  EXPECT_NE(failures(check_delays("delay=normal(20ms,4ms) order=free", normal_law(20.2, 4), 0, true, kSome)), "");
+TEST(SelfTest, SeesALawThatIsNearTheRightOne) {
+  const char* const normal = "delay=normal(20ms,4ms) order=free";
+  EXPECT_NE(failures(check_delays(normal, normal_law(20, 4.2), 0, true, kSome)), "") << "deviation";
+  EXPECT_NE(failures(check_delays(normal, normal_law(20.2, 4), 0, true, kSome)), "") << "mean";
+  EXPECT_NE(failures(check_delays("delay=normal(20ms,4ms)", normal_law(20, 4), 0, true, kSome)), "") << "fifo";
+  EXPECT_NE(failures(check_losses("loss=5%", LossChain::burst(0.05, 1.5), kMany)), "") << "single losses";
+  EXPECT_NE(failures(check_losses("loss=burst(10%,4)", LossChain::burst(0.1, 4.4), kMany)), "") << "mean burst";
+  EXPECT_NE(failures(check_losses("loss=gilbert(0.02,0.1,0.7,0.01)", LossChain::gilbert(0.02, 0.1, 0.7, 0.015), kMany)),
+            "")
+      << "losses of a state";
 }
 
 TEST(SelfTest, SeesAnotherCorrelation) {
@@ -69,25 +73,8 @@ TEST(SelfTest, SeesAnotherCorrelation) {
             "autocorrelation of z against rho; innovations, Kolmogorov");
 }
 
-TEST(SelfTest, SeesThatFifoIsNotTheLawOfTheDelay) {
-  EXPECT_NE(failures(check_delays("delay=normal(20ms,4ms)", normal_law(20, 4), 0, true, kSome)), "");
-}
-
 TEST(SelfTest, SeesALossThatIsATenthOff) {
   EXPECT_EQ(failures(check_losses("loss=5%", LossChain::bernoulli(0.055), kMany)), "loss rate");
-}
-
-TEST(SelfTest, SeesLossesThatComeSinglyAndShouldNot) {
-  EXPECT_NE(failures(check_losses("loss=5%", LossChain::burst(0.05, 1.5), kMany)), "");
-}
-
-TEST(SelfTest, SeesAMeanBurstThatIsATenthOff) {
-  EXPECT_NE(failures(check_losses("loss=burst(10%,4)", LossChain::burst(0.1, 4.4), kMany)), "");
-}
-
-TEST(SelfTest, SeesAStateThatLosesAFewMore) {
-  EXPECT_NE(failures(check_losses("loss=gilbert(0.02,0.1,0.7,0.01)", LossChain::gilbert(0.02, 0.1, 0.7, 0.015), kMany)),
-            "");
 }
 
 TEST(SelfTest, NotANumberHasNotPassed) { EXPECT_FALSE((Check{"", "", std::nan(""), 1}.passed())); }
