@@ -33,19 +33,21 @@ class Identify : public ::testing::Test {
     experiment.device.coulomb_friction = 0.05;
     experiment.device.encoder_step = 3e-5;
     experiment.repeats = 2;
+    return written(experiment, "t_s,x_m,force_n", by);
+  }
+  std::vector<std::filesystem::path> written(const RampExperiment& experiment, const char* columns, const Mistake& by) {
     std::vector<std::filesystem::path> files;
     for (const RampRun& run : simulated_ramps(experiment)) {
       files.push_back(folder_.path() / (std::to_string(files.size()) + ".csv"));
       std::ofstream file(files.back());
       file.precision(12);
-      file << "t_s,x_m,force_n\n";
+      file << columns << '\n';
       for (const RampSample& sample : run.samples) {
         file << by.time * sample.t << ',' << by.position * sample.position << ',' << by.force * sample.force << '\n';
       }
     }
     return files;
   }
-
   std::string output_of(const IdentifyOptions& options) {
     std::ostringstream out;
     identify(options, out);
@@ -154,15 +156,7 @@ TEST_F(Identify, ReadsTheColumnsOfARotation) {
   experiment.device.rotation = SimulatedRotation::Config{
       .inertia = 1e-4, .viscous_friction = 5e-4, .coulomb_friction = 1e-3, .max_torque = 1, .encoder_step = 1e-4};
   experiment.force_noise = 1e-4;
-  std::vector<std::filesystem::path> files;
-  for (const RampRun& run : simulated_ramps(experiment)) {
-    files.push_back(folder_.path() / (std::to_string(files.size()) + ".csv"));
-    std::ofstream out(files.back());
-    out.precision(12);
-    out << "t_s,angle_rad,torque_nm\n";
-    for (const RampSample& sample : run.samples)
-      out << sample.t << ',' << sample.position << ',' << sample.force << '\n';
-  }
+  const auto files = written(experiment, "t_s,angle_rad,torque_nm", Mistake());
   const std::string text = output_of({.files = files, .freedom = Freedom::kRotation, .mass = 1e-4, .json = true});
   EXPECT_NEAR(value_after(text, "\"estimate_viscous_nm_s_per_rad\":"), 5e-4, 5e-5) << text;
   EXPECT_NEAR(value_after(text, "\"estimate_coulomb_nm\":"), 1e-3, 5e-5) << text;

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <optional>
 #include <stdexcept>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -33,9 +34,12 @@ double error_percent(Kind kind, int n, const Config& config) {
 }
 double error_percent(Kind kind, int n) { return error_percent(kind, n, soon_at_rest(kind)); }
 
-TEST(MassSpring, GivesThePressedBlockTheKnownStiffness) {
-  EXPECT_NEAR(error_percent(Kind::kMassSpring, 4), 112, 1.5);
-  EXPECT_NEAR(error_percent(Kind::kMassSpring, 8), 55, 1.5);
+TEST(ComparedModels, GiveThePressedBlockTheKnownStiffness) {
+  for (const auto& [kind, coarse, fine] :
+       {std::tuple(Kind::kMassSpring, 112, 55), {Kind::kTensorMass, 211, 70}, {Kind::kTled, 208, 66}}) {
+    EXPECT_NEAR(error_percent(kind, 4), coarse, 1.5) << info(kind).name;
+    EXPECT_NEAR(error_percent(kind, 8), fine, 1.5) << info(kind).name;
+  }
 }
 
 TEST(MassSpring, ForcesAreTheSlopeOfTheEnergyAndTheStiffnessThatOfTheForces) {
@@ -57,16 +61,6 @@ TEST(MassSpring, ForcesAreTheSlopeOfTheEnergyAndTheStiffnessThatOfTheForces) {
     const VectorXd column = stiffness.times(VectorXd::Unit(net.free_count(), net.free_of(i)));
     EXPECT_LT((slope - column).norm(), 1e-5 * column.norm());
   }
-}
-
-TEST(TensorMass, GivesThePressedBlockTheKnownStiffness) {
-  EXPECT_NEAR(error_percent(Kind::kTensorMass, 4), 211, 1.5);
-  EXPECT_NEAR(error_percent(Kind::kTensorMass, 8), 70, 1.5);
-}
-
-TEST(Tled, GivesThePressedBlockTheKnownStiffness) {
-  EXPECT_NEAR(error_percent(Kind::kTled, 4), 208, 1.5);
-  EXPECT_NEAR(error_percent(Kind::kTled, 8), 66, 1.5);
 }
 
 TEST(Xpbd, ThePressedBlocksStiffnessIsAMatterOfTheStep) {

@@ -78,22 +78,19 @@ TEST(RunSummary, AnOverrunWithinTheBoundInForceExcusesNothing) {
   EXPECT_EQ(run.holds_beyond_bound, 0U);
 }
 
-TEST(RunSummary, AFallAfterAnOverrunBreaksThePromise) {
-  auto steps = with_energies({0, -0.5, -0.4, -0.7});
-  steps[1].reasons = Reason::kOverrun;
-  EXPECT_NEAR(summarise(steps).least_energy, -0.2, 1e-15);
-}
-
-TEST(RunSummary, AnOverrunExcusesOnlyWhatItDrewItself) {
-  auto steps = with_energies({0, -1, -1.1, -1.2});
-  steps[2].reasons = Reason::kOverrun;
-  EXPECT_NEAR(summarise(steps).least_energy, -1.1, 1e-15);
-}
-
-TEST(RunSummary, AnOverrunIsForgivenOnlyUntilTheLedgerHasRecovered) {
-  auto steps = with_energies({0, -0.5, 0.1, -0.2});
-  steps[1].reasons = Reason::kOverrun;
-  EXPECT_DOUBLE_EQ(summarise(steps).least_energy, -0.2);
+TEST(RunSummary, AnOverrunExcusesWhatItDrewItselfUntilTheLedgerHasRecovered) {
+  struct Case {
+    std::vector<double> energies;
+    std::size_t overrun;
+    double least;
+  };
+  for (const auto& [energies, overrun, least] :
+       {Case{{0, -0.5, -0.4, -0.7}, 1, -0.2}, Case{{0, -1, -1.1, -1.2}, 2, -1.1},
+        Case{{0, -0.5, 0.1, -0.2}, 1, -0.2}}) {
+    auto steps = with_energies(energies);
+    steps[overrun].reasons = Reason::kOverrun;
+    EXPECT_NEAR(summarise(steps).least_energy, least, 1e-15) << least;
+  }
 }
 
 TEST(RunSummary, WhatTorquesDoToTheHandIsToldByItself) {
