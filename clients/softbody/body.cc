@@ -18,7 +18,6 @@
 #include "clients/softbody/touch/friction.h"
 #include "clients/softbody/touch/rigid_contact.h"
 #include "clients/softbody/touch/sphere.h"
-#include "protocol/expect.h"
 
 namespace tendon::softbody {
 namespace {
@@ -35,7 +34,9 @@ FileMesh mesh_of(const BodyConfig& config) {
   return read_gmsh(file.file, file.scale, file.slits);
 }
 
+/// Throws if the config is not valid.
 Solid solid_of(const BodyConfig& config) {
+  check(config);
   FileMesh read = mesh_of(config);
   Mesh& mesh = read.mesh;
   double lowest = std::numeric_limits<double>::infinity();
@@ -43,7 +44,8 @@ Solid solid_of(const BodyConfig& config) {
   const double held = lowest + std::max(config.clamped_below, 1e-9);
   const Fixed fixed = fix_where(mesh, [&](const Vec3& node) { return node.z() <= held; });
   if (const auto* file = std::get_if<FileShape>(&config.shape)) expect_held(read, fixed, file->file.string());
-  const Law law = config.model == ModelKind::kNear ? config.near.law : info(config.model).law;
+  const auto* near = std::get_if<NearConfig>(&config.model);
+  const Law law = near != nullptr ? near->law : info(config.model).law;
   std::vector<Material> of_elements = materials_of(mesh, config.material, config.regions);
   return {std::move(mesh), config.element, config.material, law, fixed, std::move(of_elements)};
 }
@@ -53,42 +55,9 @@ bool wants_glide(const BodyConfig& config, const TouchSurface& surface) {
   return config.whole_stiffness || surface.curved();
 }
 
-struct BuiltModel {
-  std::unique_ptr<Model> model;
-  std::optional<double> linear_up_to{};  ///< m, if a table file provides it
-  const CondensedModel* condensed = nullptr;
-  QuasiStaticModel* newton = nullptr;
-  StiffeningModel* stiffening = nullptr;
-  NearModel* near = nullptr;
-  const FallbackModel* fallbacks = nullptr;
-};
-
 Patch middle_patch(const TouchSurface& surface, const Vec3& middle) {
   if (auto found = surface.patch(surface.across(middle))) return *std::move(found);
   throw std::invalid_argument("the centre of the touched side is not on the body");
-}
-
-std::unique_ptr<Model> solved_model_of(const BodyConfig& config, const Solid& solid, const TouchSurface& surface,
-                                       const SolverOf& solver) {
-  EffectSet known = info(ModelKind::kLinear).always;
-  known.add(kFriction);
-  if (config.model != ModelKind::kLinear || !effects_of(config).within(known)) {
-    throw std::invalid_argument(
-        "on several machines, expected the model \"linear\" and no effects except contact and friction");
-  }
-  return std::make_unique<SolvedModel>(solid, surface, middle_patch(surface, config.middle), solver(solid));
-}
-
-std::unique_ptr<Model> plain_model_of(const BodyConfig& config, const Solid& solid, const TouchSurface& surface) {
-  QuasiStaticModel::Config newton{.max_iterations = config.max_iterations, .tolerance = config.tolerance};
-  if (config.plasticity) newton.glides = wants_glide(config, surface);
-  if (config.self_collision) newton.self_collision = config.material.young / *config.self_collision;
-  const EffectsConfig& effects = config.effects;
-  if (config.plasticity) return std::make_unique<PlasticModel>(solid, surface, newton, effects, *config.plasticity);
-  if (config.model == ModelKind::kLinear) {
-    return std::make_unique<LinearModel>(solid, surface, effects, wants_glide(config, surface));
-  }
-  return std::make_unique<QuasiStaticModel>(solid, surface, newton, effects);
 }
 
 std::vector<int> touchable(const BodyConfig& config, const TouchSurface& surface) {
@@ -97,157 +66,132 @@ std::vector<int> touchable(const BodyConfig& config, const TouchSurface& surface
 
 double stiffness_under(Model& model, const Patch& patch) { return model.press(patch, Prescribed::kForce, 1).stiffness; }
 
-/// Throws if the table does not belong to this body, or does not reproduce its recorded stiffness.
-std::unique_ptr<CondensedModel> condensed_from(const BodyConfig& config, const Solid& solid,
-                                               const TouchSurface& surface, double& linear_up_to) {
-  SurfaceTable table = read_table(*config.table_file);
-  const auto refuse = [&](const std::string& why) { throw std::invalid_argument(config.table_file->string() + why); };
-  if (table.body != digest_of(solid, surface.normal())) {
-    refuse(" is the table of another body: create it again with tendon-softbody condense");
-  }
-  for (const int node : touchable(config, surface)) {
-    if (!std::ranges::binary_search(table.nodes, node)) refuse(" does not cover reach_mm");
-  }
-  linear_up_to = table.linear_up_to;
-  const double expected = table.stiffness;
-  const TouchSurface then(solid.mesh(), surface.normal(), table.patch_radius);
-  const auto patch = then.patch(table.middle);
-  auto model = std::make_unique<CondensedModel>(solid.mesh().nodes.size(), std::move(table.nodes),
-                                                std::move(table.compliance), wants_glide(config, surface));
-  constexpr double kSame = 1e-9;  // summation order differs
-  if (!patch || !(std::abs(stiffness_under(*model, *patch) / expected - 1) < kSame)) {
-    refuse(" does not reproduce the answers for which it was created");
-  }
-  return model;
+template <class... Models>
+using OneOf = std::variant<std::unique_ptr<Models>...>;
+using AnyModel =
+    OneOf<LinearModel, SolvedModel, CondensedModel, QuasiStaticModel, PlasticModel, NearModel, FallbackModel>;
+
+Model& base_of(const AnyModel& model) {
+  return std::visit([](const auto& of) -> Model& { return *of; }, model);
 }
 
-int near_modes(const BodyConfig& config) {
-  return config.near.exact_interface ? std::numeric_limits<int>::max() : NearModel::Config{}.modes;
+template <class Kind>
+Kind* as(const AnyModel& model) {
+  const auto* found = std::get_if<std::unique_ptr<Kind>>(&model);
+  return found != nullptr ? found->get() : nullptr;
 }
 
-Learned learn_of(const BodyConfig& config, const Solid& solid, const TouchSurface& surface, const Tell& tell) {
+NearModel* near_in(const AnyModel& model) {
+  if (auto* fallbacks = as<FallbackModel>(model)) return &fallbacks->near();
+  return as<NearModel>(model);
+}
+
+Learned learn_of(const BodyConfig& config, const NearConfig& near, const Solid& solid, const TouchSurface& surface,
+                 const Tell& tell) {
   return learn(solid, surface,
-               {.shapes = config.near.learn,
-                .answers = config.near.tabulate,
+               {.shapes = near.learn,
+                .answers = near.tabulate,
                 .middle = surface.across(config.middle),
                 .reach = *config.reach,
-                .folder = config.near.learned_in},
+                .folder = near.learned_in},
                tell);
 }
 
-std::vector<std::unique_ptr<FallbackLevel>> levels_of(const BodyConfig& config, const Solid& solid,
-                                                      const TouchSurface& surface) {
-  std::vector<std::unique_ptr<FallbackLevel>> levels;
-  const Learned learned = config.near.learned ? *config.near.learned : learn_of(config, solid, surface, {});
-  if (config.near.tabulate && learned.answers) {
-    levels.push_back(std::make_unique<TabulatedLevel>(*learned.answers, config.tolerance));
-  }
-  if (config.near.learn && learned.shapes) {
-    levels.push_back(std::make_unique<LearnedLevel>(solid, surface, *learned.shapes, config.tolerance));
-  }
-  return levels;
-}
+struct Factory {
+  const BodyConfig& config;
+  const Solid& solid;
+  const TouchSurface& surface;
+  Background fields;                    ///< if any, it builds the near fields
+  std::optional<double>& linear_up_to;  ///< m, set if a table file provides it
 
-/// If there are `fields`, they build the near field.
-std::unique_ptr<NearModel> near_model_of(const BodyConfig& config, const Solid& solid, const TouchSurface& surface,
-                                         Background fields) {
-  const NearModel::Config made{.newton = {.max_iterations = config.max_iterations, .tolerance = config.tolerance},
-                               .modes = near_modes(config)};
-  if (fields) return std::make_unique<NearModel>(solid, surface, made, std::move(fields));
-  return std::make_unique<NearModel>(solid, surface, middle_patch(surface, config.middle), made);
-}
+  AnyModel operator()(const LinearConfig& of) const {
+    if (of.plasticity) return plastic(newton(of), *of.plasticity);
+    return std::make_unique<LinearModel>(solid, surface, config.effects, wants_glide(config, surface));
+  }
 
-BuiltModel model_of(const BodyConfig& config, const Solid& solid, const TouchSurface& surface, const SolverOf& solver,
-                    Background fields) {
-  BuiltModel made;
-  if (solver) {
-    made.model = solved_model_of(config, solid, surface, solver);
-  } else if (config.model == ModelKind::kCondensed) {
-    auto condensed = config.table_file ? condensed_from(config, solid, surface, made.linear_up_to.emplace())
-                                       : std::make_unique<CondensedModel>(solid, surface, touchable(config, surface),
-                                                                          wants_glide(config, surface));
-    made.condensed = condensed.get();
-    made.model = std::move(condensed);
-  } else if (config.model == ModelKind::kNear) {
-    auto near = near_model_of(config, solid, surface, std::move(fields));
-    made.near = near.get();
-    if (config.near.learns()) {
-      auto fallbacks = std::make_unique<FallbackModel>(levels_of(config, solid, surface), std::move(near));
-      made.fallbacks = fallbacks.get();
-      made.model = std::move(fallbacks);
-    } else {
-      made.model = std::move(near);
-    }
-  } else {
-    made.model = plain_model_of(config, solid, surface);
-    if (is_rigid_on_nonlinear(config)) made.newton = static_cast<QuasiStaticModel*>(made.model.get());
+  AnyModel operator()(const CondensedConfig& of) const {
+    if (of.table_file) return condensed_from(*of.table_file);
+    return std::make_unique<CondensedModel>(solid, surface, touchable(config, surface), wants_glide(config, surface));
   }
-  if (config.stiffening) {
-    auto stiffening = std::make_unique<StiffeningModel>(std::move(made.model), *config.stiffening);
-    made.stiffening = stiffening.get();
-    made.model = std::move(stiffening);
-  }
-  return made;
-}
 
-const BodyConfig& checked(const BodyConfig& config) {
-  const ModelInfo& model = info(config.model);
-  const EffectSet simulated = effects_of(config);
-  for (const EffectInfo& effect : effects()) {
-    if (simulated.has(effect.kind) && !model.always.has(effect.kind) && !model.may.has(effect.kind)) {
-      throw std::invalid_argument("the model \"" + std::string(model.name) + "\" does not simulate " +
-                                  std::string(effect.name));
+  AnyModel operator()(const CorotationalConfig& of) const {
+    if (of.plasticity) return plastic(newton(of), *of.plasticity);
+    return std::make_unique<QuasiStaticModel>(solid, surface, newton(of), config.effects);
+  }
+
+  AnyModel operator()(const NeoHookeanConfig& of) const {
+    return std::make_unique<QuasiStaticModel>(solid, surface, newton(of), config.effects);
+  }
+
+  AnyModel operator()(const NearConfig& of) {
+    const NearModel::Config made{
+        .newton = newton(of),
+        .modes = of.exact_interface ? std::numeric_limits<int>::max() : NearModel::Config{}.modes};
+    auto near = fields ? std::make_unique<NearModel>(solid, surface, made, std::move(fields))
+                       : std::make_unique<NearModel>(solid, surface, middle_patch(surface, config.middle), made);
+    if (!of.learns()) return near;
+    return std::make_unique<FallbackModel>(levels(of), std::move(near));
+  }
+
+ private:
+  QuasiStaticModel::Config newton(const auto& of) const {
+    QuasiStaticModel::Config made{.max_iterations = of.newton.max_iterations, .tolerance = of.newton.tolerance};
+    if constexpr (requires { of.self_collision; }) {
+      if (of.self_collision) made.self_collision = config.material.young / *of.self_collision;
     }
-    for (const EffectInfo& other : effects()) {
-      if (simulated.has(effect.kind) && simulated.has(other.kind) && effect.not_with.has(other.kind)) {
-        throw std::invalid_argument(std::string(effect.name) + " cannot be simulated together with " +
-                                    std::string(other.name));
-      }
+    return made;
+  }
+
+  AnyModel plastic(QuasiStaticModel::Config newton, const Yield& yield) const {
+    newton.glides = wants_glide(config, surface);
+    return std::make_unique<PlasticModel>(solid, surface, newton, config.effects, yield);
+  }
+
+  /// Throws if the table does not belong to this body, or does not reproduce its recorded stiffness.
+  AnyModel condensed_from(const std::filesystem::path& file) const {
+    SurfaceTable table = read_table(file);
+    const auto refuse = [&](const std::string& why) { throw std::invalid_argument(file.string() + why); };
+    if (table.body != digest_of(solid, surface.normal())) {
+      refuse(" is the table of another body: create it again with tendon-softbody condense");
     }
-  }
-  if (config.model == ModelKind::kNear && config.near.law == Law::kLinear) {
-    throw std::invalid_argument("the law of the model \"near\" cannot be linear");
-  }
-  if (config.near.learns()) {
-    if (config.model != ModelKind::kNear) {
-      throw std::invalid_argument("only the model \"near\" can learn or tabulate answers");
+    for (const int node : touchable(config, surface)) {
+      if (!std::ranges::binary_search(table.nodes, node)) refuse(" does not cover reach_mm");
     }
-    expect(config.reach && *config.reach > 0 && *config.reach <= NearConfig::kFarthest * config.patch_radius, "reach",
-           config.reach.value_or(0), "above 0 and at most 1.5 patch radii if the body learns");
-  }
-  const auto* capsule = std::get_if<CapsuleTool>(&config.tool);
-  if (!is_patch(config.tool)) {
-    const std::string tool(name_of(config.tool));
-    if (is_rigid_on_nonlinear(config)) {
-      for (const EffectKind effect : {kInertia, kDamping, kViscosity, kCutting, kPlasticity, kSelfCollision}) {
-        if (simulated.has(effect)) {
-          throw std::invalid_argument(tool + " cannot press a body with " + std::string(info(effect).name));
-        }
-      }
-    } else if (!is_sphere(config.tool) && capsule == nullptr) {
-      throw std::invalid_argument(tool + " requires the model \"corotational\" or \"neo-hookean\"");
-    } else if (config.model != ModelKind::kCondensed) {
-      throw std::invalid_argument(tool + " requires the model \"condensed\", \"corotational\" or \"neo-hookean\"");
-    } else if (config.friction) {
-      throw std::invalid_argument(tool + " has no friction on the model \"condensed\"");
+    linear_up_to = table.linear_up_to;
+    const TouchSurface then(solid.mesh(), surface.normal(), table.patch_radius);
+    const auto patch = then.patch(table.middle);
+    auto model = std::make_unique<CondensedModel>(solid.mesh().nodes.size(), std::move(table.nodes),
+                                                  std::move(table.compliance), wants_glide(config, surface));
+    constexpr double kSame = 1e-9;  // summation order differs
+    if (!patch || !(std::abs(stiffness_under(*model, *patch) / table.stiffness - 1) < kSame)) {
+      refuse(" does not reproduce the answers for which it was created");
     }
-    if (config.stiffening) throw std::invalid_argument(tool + " cannot be used with stiffening");
-    if (config.side == PatchContact::Side::kBilateral) throw std::invalid_argument(tool + " does not stick");
+    return model;
   }
-  if (config.hands != 1 && !is_rigid_on_nonlinear(config)) {
-    throw std::invalid_argument("several hands require a rigid tool and the model \"corotational\" or \"neo-hookean\"");
-  }
-  if (config.table_file) {
-    if (config.model != ModelKind::kCondensed) {
-      throw std::invalid_argument("a table in a file requires the model \"condensed\"");
+
+  std::vector<std::unique_ptr<FallbackLevel>> levels(const NearConfig& of) const {
+    std::vector<std::unique_ptr<FallbackLevel>> made;
+    const Learned learned = of.learned ? *of.learned : learn_of(config, of, solid, surface, {});
+    if (of.tabulate && learned.answers) {
+      made.push_back(std::make_unique<TabulatedLevel>(*learned.answers, of.newton.tolerance));
     }
-    if (capsule != nullptr) throw std::invalid_argument("a capsule cannot use a table in a file");
+    if (of.learn && learned.shapes) {
+      made.push_back(std::make_unique<LearnedLevel>(solid, surface, *learned.shapes, of.newton.tolerance));
+    }
+    return made;
   }
-  if (capsule != nullptr) {
-    expect(std::abs(capsule->axis.norm() - 1) < 1e-9, "norm of tool_axis", capsule->axis.norm(), "1");
+};
+
+AnyModel model_of(const BodyConfig& config, const Solid& solid, const TouchSurface& surface, const SolverOf& solver,
+                  Background fields, std::optional<double>& linear_up_to) {
+  if (!solver) return std::visit(Factory{config, solid, surface, std::move(fields), linear_up_to}, config.model);
+  EffectSet known = info(ModelKind::kLinear).always;
+  known.add(kFriction);
+  if (!std::holds_alternative<LinearConfig>(config.model) || !effects_of(config).within(known)) {
+    throw std::invalid_argument(
+        "on several machines, expected the model \"linear\" and no effects except contact and friction");
   }
-  expect(config.tool_offset.allFinite(), "tool_offset", config.tool_offset.norm(), "finite numbers");
-  return config;
+  return std::make_unique<SolvedModel>(solid, surface, middle_patch(surface, config.middle), solver(solid));
 }
 
 std::unique_ptr<Friction> friction_of(const BodyConfig& config) {
@@ -257,19 +201,52 @@ std::unique_ptr<Friction> friction_of(const BodyConfig& config) {
 
 constexpr double kPointsAcrossTool = 4;  ///< thinner tools slip off the points of the layer (layer.h)
 
-RigidContact rigid_contact_of(const BodyConfig& config, QuasiStaticModel& body, const Solid& solid,
-                              const TouchSurface& surface) {
+struct HeldCapsule {
+  CapsuleContact contact;
+  Vec3 axis;
+};
+struct RigidHands {
+  RigidContact contact;
+  std::vector<std::optional<Pose>> handles;
+};
+using Contact = std::variant<PatchContact, SphereContact, HeldCapsule, RigidHands>;
+
+RigidHands rigid_hands_of(const BodyConfig& config, QuasiStaticModel& body, const Solid& solid,
+                          const TouchSurface& surface) {
   const RigidShape shape = shape_of(config.tool, config.layer);
+  const Newton& newton = *newton_of(config.model);
   RigidContact::Config made;
   made.layer = {.thickness = config.layer,
                 .young = config.material.young,
                 .friction = config.friction.value_or(0),
                 .shear = config.material.mu(),
                 .piece = std::min(shape.reach() / 10, shape.thinnest() / kPointsAcrossTool)};
-  made.tolerance = config.tolerance;
-  made.max_iterations = config.max_iterations;
+  made.tolerance = newton.tolerance;
+  made.max_iterations = newton.max_iterations;
   made.turns = turns_the_hand(config);
-  return {body, solid, surface, std::vector<HeldTool>(config.hands, {shape, config.tool_offset}), made};
+  return {RigidContact(body, solid, surface, std::vector<HeldTool>(config.hands, {shape, config.tool_offset}), made),
+          std::vector<std::optional<Pose>>(config.hands)};
+}
+
+/// check() ensures that the model for a rigid tool is condensed or Newton's method without plasticity.
+Contact contact_of(const BodyConfig& config, const AnyModel& made, Model& model, const Solid& solid,
+                   const TouchSurface& surface) {
+  const double radius = radius_of(config.tool);
+  if (is_patch(config.tool)) {
+    return PatchContact(model, surface, radius, config.side, friction_of(config));
+  }
+  if (auto* newton = as<QuasiStaticModel>(made)) return rigid_hands_of(config, *newton, solid, surface);
+  if (is_sphere(config.tool)) return SphereContact(*as<CondensedModel>(made), surface, radius);
+  const auto& capsule = std::get<CapsuleTool>(config.tool);
+  return HeldCapsule{CapsuleContact(solid, surface, touchable(config, surface), radius, capsule.half_length),
+                     capsule.axis};
+}
+
+std::size_t bytes_of(const Contact& contact) {
+  if (const auto* patch = std::get_if<PatchContact>(&contact)) return patch->bytes();
+  if (const auto* capsule = std::get_if<HeldCapsule>(&contact)) return capsule->contact.bytes();
+  if (const auto* rigid = std::get_if<RigidHands>(&contact)) return rigid->contact.bytes();
+  return 0;
 }
 
 double linear_limit(const Solid& solid, const TouchSurface& surface, const Patch& patch, const Solver& solver) {
@@ -283,64 +260,21 @@ double linear_limit(const Solid& solid, const TouchSurface& surface, const Patch
 
 }  // namespace
 
-bool is_rigid_on_nonlinear(const BodyConfig& config) {
-  return !is_patch(config.tool) && (config.model == ModelKind::kCorotational || config.model == ModelKind::kNeoHookean);
-}
-
-bool turns_the_hand(const BodyConfig& config) {
-  return !(is_patch(config.tool) || is_sphere(config.tool)) || config.tool_offset != Vec3::Zero();
-}
-
-Vec3 lowest_of_tool(const BodyConfig& config, const Mat3& turn) {
-  return turn * config.tool_offset + lowest_of(config.tool, config.layer, turn, config.towards_tool);
-}
-
-EffectSet effects_of(const BodyConfig& config) {
-  EffectSet set = info(config.model).always;
-  if (config.model == ModelKind::kNear && config.near.law == Law::kNeoHookean) set.add(kMaterialNonlinearity);
-  if (config.effects.gravity) set.add(kGravity);
-  if (config.effects.inertia) set.add(kInertia);
-  if (config.effects.damping) set.add(kDamping);
-  if (config.effects.viscosity) set.add(kViscosity);
-  if (config.friction) set.add(kFriction);
-  if (!config.cuts.empty()) set.add(kCutting);
-  if (config.stiffening) set.add(kStiffening);
-  if (config.plasticity) set.add(kPlasticity);
-  if (config.self_collision) set.add(kSelfCollision);
-  return set;
-}
-
-bool is_elastic(const BodyConfig& config) {
-  const EffectSet lossless{kContact, kGeometricNonlinearity, kMaterialNonlinearity, kGravity, kSelfCollision};
-  return effects_of(config).within(lossless);
-}
-
 struct Body::Parts {
-  Parts(const BodyConfig& config, const SolverOf& solver) : Parts(config, solver, solid_of(checked(config))) {
+  Parts(const BodyConfig& config, const SolverOf& solver) : Parts(config, solver, solid_of(config)) {
     if (!config.cuts.empty()) cutting = std::make_unique<Planned>(config, solid.mesh(), solid.fixed(), surface);
   }
   Parts(const BodyConfig& config, const SolverOf& solver, Solid of, Background fields = {})
       : solid(std::move(of)),
         surface(solid.mesh(), config.towards_tool, config.patch_radius),
-        made(model_of(config, solid, surface, solver, std::move(fields))),
-        model(*made.model),
-        contact(model, surface, radius_of(config.tool), config.side, friction_of(config)),
+        made(model_of(config, solid, surface, solver, std::move(fields), linear_up_to)),
+        stiffening(config.stiffening ? std::make_unique<StiffeningModel>(base_of(made), *config.stiffening) : nullptr),
+        model(stiffening ? *stiffening : base_of(made)),
+        contact(contact_of(config, made, model, solid, surface)),
         patch(middle_patch(surface, config.middle)),
         knows_turns(info(config.model).always.has(kGeometricNonlinearity)),
         turns(turns_the_hand(config)),
-        offset(config.tool_offset) {
-    // checked() ensures that the model for other spheres and capsules is condensed.
-    if (made.newton != nullptr) {
-      rigid.emplace(rigid_contact_of(config, *made.newton, solid, surface));
-      hands.resize(config.hands);
-      return;
-    }
-    if (is_sphere(config.tool)) sphere.emplace(*made.condensed, surface, radius_of(config.tool));
-    if (const auto* tool = std::get_if<CapsuleTool>(&config.tool)) {
-      axis = tool->axis;
-      capsule.emplace(solid, surface, touchable(config, surface), tool->radius, tool->half_length);
-    }
-  }
+        offset(config.tool_offset) {}
 
   void cut(PlannedCut::When when, double value);
   void prepare();
@@ -357,18 +291,15 @@ struct Body::Parts {
 
   Solid solid;
   TouchSurface surface;
-  BuiltModel made;
+  std::optional<double> linear_up_to{};  ///< m, if a table file provides it
+  AnyModel made;
+  std::unique_ptr<StiffeningModel> stiffening;
   Model& model;
-  PatchContact contact;
-  std::optional<SphereContact> sphere;
-  std::optional<CapsuleContact> capsule;
-  std::optional<RigidContact> rigid;
-  std::vector<std::optional<Pose>> hands;
+  Contact contact;
   Patch patch;
   bool knows_turns;
   bool turns;
   Vec3 offset;
-  Vec3 axis = Vec3::UnitZ();
   std::unique_ptr<Planned> cutting;
   std::vector<int> node_before{};  ///< set if the body was prepared in the background
 };
@@ -377,7 +308,8 @@ struct Body::Parts {
 Body::Parts::Planned::Planned(const BodyConfig& config, const Mesh& mesh, const Fixed& fixed,
                               const TouchSurface& surface)
     : cuts(config.cuts), described(config) {
-  described.near.learned.emplace();  // precomputed data is invalid after a cut
+  // Precomputed data is invalid after a cut.
+  if (auto* near = std::get_if<NearConfig>(&described.model)) near->learned.emplace();
   Division body{.mesh = mesh, .fixed = fixed, .node_before = {}};
   for (Cutting trial = cuts; trial.left() > 0;) {
     const std::span<const Cut> done = trial.make_next();
@@ -422,7 +354,7 @@ void Body::Parts::cut(PlannedCut::When when, double value) {
 }
 
 void Body::Parts::prepare() {
-  if (made.near != nullptr) made.near->make_no_more_fields();
+  if (auto* near = near_in(made)) near->make_no_more_fields();
   std::promise<std::unique_ptr<Parts>> done;
   cutting->next = done.get_future();
   cutting->background(
@@ -441,7 +373,7 @@ void Body::Parts::prepare() {
 
 void Body::Parts::go_on_from(Parts& before) {
   model.go_on_from(before.model, node_before);
-  contact.go_on_from(before.contact);
+  std::get<PatchContact>(contact).go_on_from(std::get<PatchContact>(before.contact));  // no other tool can cut
   cutting = std::move(before.cutting);
   cutting->cuts.make_next();
 }
@@ -459,7 +391,7 @@ Body::Body(Body&&) noexcept = default;
 Body& Body::operator=(Body&&) noexcept = default;
 
 void Body::prepare_by(Background background) {
-  if (parts_->made.near != nullptr) parts_->made.near->make_fields_by(background);
+  if (auto* near = near_in(parts_->made)) near->make_fields_by(background);
   if (parts_->cutting) parts_->cutting->background = std::move(background);
 }
 
@@ -472,28 +404,31 @@ void Body::take_prepared() {
 }
 
 Feel Body::touch(const Vec3& tool) {
-  if (parts_->rigid) return touch(Pose{.position = tool - parts_->offset});
+  if (std::holds_alternative<RigidHands>(parts_->contact)) return touch(Pose{.position = tool - parts_->offset});
   if (parts_->cutting) take_prepared();
-  if (parts_->capsule) return parts_->capsule->at(tool, parts_->axis, tool);
-  Feel feel = parts_->sphere ? parts_->sphere->at(tool) : parts_->contact.at(tool);
+  if (auto* capsule = std::get_if<HeldCapsule>(&parts_->contact)) return capsule->contact.at(tool, capsule->axis, tool);
+  if (auto* sphere = std::get_if<SphereContact>(&parts_->contact)) return sphere->at(tool);
+  Feel feel = std::get<PatchContact>(parts_->contact).at(tool);
   if (parts_->cutting) parts_->note(feel);
   return feel;
 }
 
 std::vector<Feel> Body::touch(std::span<const std::optional<Pose>> handles) {
-  if (parts_->rigid) return parts_->rigid->press(handles);
+  if (auto* rigid = std::get_if<RigidHands>(&parts_->contact)) return rigid->contact.press(handles);
   return {handles.front() ? touch(*handles.front()) : Feel{}};
 }
 
 Feel Body::touch(const Pose& handle) {
-  if (parts_->rigid) {
-    parts_->hands.front() = handle;
-    return parts_->rigid->press(parts_->hands).front();
+  if (auto* rigid = std::get_if<RigidHands>(&parts_->contact)) {
+    rigid->handles.front() = handle;
+    return rigid->contact.press(rigid->handles).front();
   }
   if (!parts_->turns) return touch(handle.position);
   const Vec3 lever = handle.turn * parts_->offset;
   const Vec3 tool = handle.position + lever;
-  if (parts_->capsule) return parts_->capsule->at(tool, handle.turn * parts_->axis, handle.position);
+  if (auto* capsule = std::get_if<HeldCapsule>(&parts_->contact)) {
+    return capsule->contact.at(tool, handle.turn * capsule->axis, handle.position);
+  }
   // For sphere and patch the force depends only on the position of the tool's center.
   Feel feel = touch(tool);
   const Mat3 cross =
@@ -506,11 +441,11 @@ Feel Body::touch(const Pose& handle) {
 }
 
 void Body::tick(double time) {
-  if (parts_->made.stiffening != nullptr) parts_->made.stiffening->tick(time);
+  if (parts_->stiffening) parts_->stiffening->tick(time);
   if (parts_->cutting) parts_->cut(PlannedCut::When::kTime, time);
 }
 
-bool Body::has_clock() const noexcept { return parts_->made.stiffening != nullptr || parts_->cutting; }
+bool Body::has_clock() const noexcept { return parts_->stiffening || parts_->cutting; }
 
 Reaction Body::press(Prescribed given, double value) { return parts_->model.press(parts_->patch, given, value); }
 
@@ -519,11 +454,13 @@ Reaction Body::settle(Prescribed given, double value) {
 }
 
 SurfaceTable condense(const BodyConfig& config, const SolverOf& solver_of) {
-  if (config.model != ModelKind::kCondensed) throw std::invalid_argument("only the model \"condensed\" has a table");
+  if (!std::holds_alternative<CondensedConfig>(config.model)) {
+    throw std::invalid_argument("only the model \"condensed\" has a table");
+  }
   BodyConfig anew = config;
-  anew.table_file.reset();
+  anew.model = CondensedConfig{};
   anew.tool = PatchTool{.radius = radius_of(config.tool)};
-  const Solid solid = solid_of(checked(anew));
+  const Solid solid = solid_of(anew);
   const TouchSurface surface(solid.mesh(), anew.towards_tool, anew.patch_radius);
   const Patch patch = middle_patch(surface, anew.middle);
   const std::unique_ptr<Solver> solver = solver_of(solid);
@@ -539,47 +476,42 @@ SurfaceTable condense(const BodyConfig& config, const SolverOf& solver_of) {
 }
 
 Learned learn(const BodyConfig& config, const Tell& tell) {
-  if (!config.near.learns()) return {};
-  const Solid solid = solid_of(checked(config));
-  return learn_of(config, solid, TouchSurface(solid.mesh(), config.towards_tool, config.patch_radius), tell);
+  if (!learns(config)) return {};
+  const Solid solid = solid_of(config);
+  const TouchSurface surface(solid.mesh(), config.towards_tool, config.patch_radius);
+  return learn_of(config, std::get<NearConfig>(config.model), solid, surface, tell);
 }
 
 double Body::linear_up_to() const {
   if (parts_->knows_turns) return std::numeric_limits<double>::infinity();
-  if (parts_->made.linear_up_to) return *parts_->made.linear_up_to;
+  if (parts_->linear_up_to) return *parts_->linear_up_to;
   return linear_limit(parts_->solid, parts_->surface, parts_->patch, *with_factor(parts_->solid));
 }
 
 double Body::step() const noexcept { return parts_->model.step(); }
 
-Vec3 Body::touch_point() const {
-  Vec3 point = Vec3::Zero();
-  for (Eigen::Index i = 0; i < parts_->patch.weights.size(); ++i) {
-    const auto node = static_cast<std::size_t>(parts_->patch.nodes[static_cast<std::size_t>(i)]);
-    point += parts_->patch.weights[i] * parts_->solid.mesh().nodes[node];
-  }
-  return point;
-}
+Vec3 Body::touch_point() const { return place_of(parts_->solid.mesh(), parts_->patch); }
 
 const Vec3& Body::normal() const { return parts_->surface.normal(); }
 
 Body::Size Body::size() const {
   return {parts_->solid.mesh().nodes.size(), static_cast<std::size_t>(parts_->solid.mesh().element_count()),
           static_cast<std::size_t>(parts_->solid.free_count()), parts_->surface.nodes().size(),
-          parts_->model.bytes() + parts_->contact.bytes() + (parts_->capsule ? parts_->capsule->bytes() : 0) +
-              (parts_->rigid ? parts_->rigid->bytes() : 0) + (parts_->cutting ? parts_->cutting->cuts.bytes() : 0)};
+          parts_->model.bytes() + bytes_of(parts_->contact) + (parts_->cutting ? parts_->cutting->cuts.bytes() : 0)};
 }
 
 std::optional<NearModel::Size> Body::near_field() const {
-  return parts_->made.near == nullptr ? std::nullopt : std::optional(parts_->made.near->size());
+  const NearModel* near = near_in(parts_->made);
+  return near == nullptr ? std::nullopt : std::optional(near->size());
 }
 
 std::vector<FallbackModel::Step> Body::fallbacks() const {
-  return parts_->made.fallbacks == nullptr ? std::vector<FallbackModel::Step>() : parts_->made.fallbacks->steps();
+  const auto* fallbacks = as<FallbackModel>(parts_->made);
+  return fallbacks == nullptr ? std::vector<FallbackModel::Step>() : fallbacks->steps();
 }
 
 Body::Size Body::size_of(const BodyConfig& config, int& under_patch) {
-  const Solid solid = solid_of(checked(config));
+  const Solid solid = solid_of(config);
   const TouchSurface surface(solid.mesh(), config.towards_tool, config.patch_radius);
   under_patch = static_cast<int>(middle_patch(surface, config.middle).nodes.size());
   return {solid.mesh().nodes.size(), static_cast<std::size_t>(solid.mesh().element_count()),

@@ -43,15 +43,17 @@ BodyConfig without(BodyConfig body, EffectKind effect) {
       body.stiffening.reset();
       break;
     case EffectKind::kPlasticity:
-      body.plasticity.reset();
+      set_plasticity(body.model, {});
       break;
     case EffectKind::kSelfCollision:
-      body.self_collision.reset();
+      set_self_collision(body.model, {});
       break;
-    case EffectKind::kMaterialNonlinearity:
-      body.near.law = Law::kCorotational;
-      body.near.learned = learn(body, {});  // precomputed data depends on the law
+    case EffectKind::kMaterialNonlinearity: {
+      auto& near = std::get<NearConfig>(body.model);
+      near.law = Law::kCorotational;
+      near.learned = learn(body, {});  // precomputed data depends on the law
       break;
+    }
     case EffectKind::kContact:
     case EffectKind::kGeometricNonlinearity:
       break;
@@ -119,16 +121,37 @@ std::string milliseconds(double s, double resolution) {
   return text.str();
 }
 
+struct AnswerCount {
+  std::string key;
+  int count;
+  std::string words;
+};
+
+std::vector<AnswerCount> counts_of(const Answered& answered) {
+  std::vector<AnswerCount> counts;
+  for (const FallbackModel::Step& step : answered.levels) {
+    const std::string name(step.size.name);
+    counts.push_back({name, step.answers, "answers were " + name});
+  }
+  if (const auto& near = answered.near) {
+    counts.push_back({"linear", near->linear, "answers were from the linear body"});
+    counts.push_back({"fields", near->made - 1 + near->late, "near fields were computed by the other thread"});
+    counts.push_back({"fields_late", near->late, "of them were too late"});
+  }
+  return counts;
+}
+
 }  // namespace
 
 double off_the_exact_interface(const BodyConfig& config) {
-  if (config.model != ModelKind::kNear) {
+  BodyConfig alone = config;
+  auto* near = std::get_if<NearConfig>(&alone.model);
+  if (near == nullptr) {
     throw std::invalid_argument("only the model \"near\" has an interface, which can be compared with the exact one");
   }
-  BodyConfig alone = config;
-  alone.near.learn = alone.near.tabulate = false;
+  near->learn = near->tabulate = false;
   Body modes(alone);
-  alone.near.exact_interface = true;
+  near->exact_interface = true;
   Body exact(alone);
   double most = 0;
   for (const double share : {0.01, 0.1, 0.2}) {
@@ -141,7 +164,8 @@ double off_the_exact_interface(const BodyConfig& config) {
 
 Explanation explain(const Scene& scene, const std::function<double()>& processor_time) {
   BodyConfig config = scene.body;
-  if (!config.near.learned) config.near.learned = learn(config, {});
+  auto* near = std::get_if<NearConfig>(&config.model);
+  if (near != nullptr && !near->learned) near->learned = learn(config, {});
   std::optional<Explanation::Tool> tool;
   if (std::holds_alternative<MeshTool>(scene.body.tool)) {
     const double start = processor_time();
@@ -176,7 +200,7 @@ Explanation explain(const Scene& scene, const std::function<double()>& processor
   for (const FallbackModel::Step& step : body.fallbacks()) {
     out.learned.push_back({.size = step.size});
     bodies.push_back(config);
-    (config.near.tabulate ? config.near.tabulate : config.near.learn) = false;
+    (near->tabulate ? near->tabulate : near->learn) = false;
   }
   if (!out.learned.empty()) bodies.push_back(config);
   std::vector<Explanation::Cost> least(bodies.size(), {std::numeric_limits<double>::infinity(), 0});
@@ -251,10 +275,11 @@ std::string in_words(const Scene& scene, const Explanation& explanation) {
   }
   if (explanation.near && explanation.near->radius > 0) {
     const NearModel::Size& near = *explanation.near;
-    const std::string_view law = std::ranges::find(near_laws(), body.near.law, &NearLaw::law)->name;
-    text << "near the tool: " << law << ", " << near.elements << " of " << size.elements << " elements, within "
-         << 1e3 * near.radius << " mm or on the path of the tool; " << near.unknowns << " unknowns, including "
-         << near.modes << " modes instead of the " << near.interface << " unknowns of the interface\n";
+    const Law law = std::get<NearConfig>(body.model).law;
+    text << "near the tool: " << std::ranges::find(near_laws(), law, &NearLaw::law)->name << ", " << near.elements
+         << " of " << size.elements << " elements, within " << 1e3 * near.radius << " mm or on the path of the tool; "
+         << near.unknowns << " unknowns, including " << near.modes << " modes instead of the "
+         << near.interface << " unknowns of the interface\n";
     if (explanation.off_exact) {
       text << "  compared with the exact interface: forces differ by up to " << std::setprecision(2)
            << 100 * *explanation.off_exact << " % for depths up to " << 200 * body.patch_radius << " mm\n"
@@ -336,6 +361,21 @@ std::string in_json(const Scene& scene, const Explanation& explanation) {
   }
   if (!explanation.learned.empty()) json["near"]["answer_s"] = explanation.near_answer_s;
   return json.dump(-1, ' ', false, Json::error_handler_t::replace) + '\n';
+}
+
+std::string in_words(const Answered& answered) {
+  std::string text;
+  for (const auto& [key, count, words] : counts_of(answered)) {
+    text += (text.empty() ? "" : ", ") + std::to_string(count) + ' ' + words;
+  }
+  return text.empty() ? text : text + '\n';
+}
+
+std::string in_json(const Answered& answered) {
+  nlohmann::ordered_json counts;
+  for (const auto& [key, count, words] : counts_of(answered)) counts[key] = count;
+  if (counts.empty()) return {};
+  return nlohmann::ordered_json{{"answers", std::move(counts)}}.dump() + '\n';
 }
 
 }  // namespace tendon::softbody

@@ -164,17 +164,20 @@ void declare_effects(Table& root, Draft& draft) {
   }
   if (has(kPlasticity)) {
     root.table("plasticity", [&body](Table& keys) {
-      Yield& yield = body.plasticity.emplace();
+      Yield yield;
       keys.key("yield_pa", yield.stress, kAboveZero, "Yield stress of a bar", kRequired);
       keys.key("hardening_pa", yield.hardening, kAboveZero,
                "Hardening modulus H. After yielding, the modulus of a bar is E H/(E + H), and E on unloading",
                kRequired);
+      set_plasticity(body.model, yield);
     });
   }
   if (has(kSelfCollision)) {
     root.table("self-collision", [&body](Table& keys) {
-      keys.key("layer_mm", body.self_collision, kLength,
-               "Penetration of two sides at which their pressure is Young's modulus", kRequired);
+      std::optional<double> layer;
+      keys.key("layer_mm", layer, kLength, "Penetration of two sides at which their pressure is Young's modulus",
+               kRequired);
+      set_self_collision(body.model, layer);
     });
   }
 }
@@ -254,33 +257,42 @@ void declare_model(Table& root, Draft& draft) {
   BodyConfig& body = draft.scene.body;
   root.table("model", [&](Table& keys) {
     const ModelNames kinds{all_names(models(), &ModelInfo::kind)};
-    const bool known = keys.key("kind", body.model, kinds, described("Model of the body:", models()), kRequired);
-    const auto is = [&](auto... of) { return !known || ((body.model == of) || ...); };
-    if (is(ModelKind::kCondensed)) {
-      declare_path(keys, "table", draft, body.table_file,
+    ModelKind kind{};
+    const bool known = keys.key("kind", kind, kinds, described("Model of the body:", models()), kRequired);
+    if (known) body.model = model_config(kind);
+    // The keys of all models are known if the model is not.
+    CondensedConfig no_condensed;
+    NearConfig no_near;
+    Newton no_newton;
+    auto* const condensed = known ? std::get_if<CondensedConfig>(&body.model) : &no_condensed;
+    auto* const near = known ? std::get_if<NearConfig>(&body.model) : &no_near;
+    if (condensed != nullptr) {
+      declare_path(keys, "table", draft, condensed->table_file,
                    "For condensed: file written by `tendon-softbody condense` or `tendon-fem condense`",
                    Absent{.text = "the table is computed at the start"});
     }
-    if (is(ModelKind::kNear)) {
-      keys.key("law", body.near.law, all_names(near_laws(), &NearLaw::law),
+    if (near != nullptr) {
+      keys.key("law", near->law, all_names(near_laws(), &NearLaw::law),
                "For near: law of the elements near the tool; the rest is linear. \"neo-hookean\" requires "
                "material-nonlinearity");
-      keys.key("learn", body.near.learn, YesNo{},
+      keys.key("learn", near->learn, YesNo{},
                "For near: solve presses within reach_mm at the start, and approximate all others by a few shapes. "
                "Where the error is larger than error_percent, and after a cut, the near field is used");
-      keys.key("tabulate", body.near.tabulate, YesNo{},
+      keys.key("tabulate", near->tabulate, YesNo{},
                "For near: compute a table of the energy from the same presses, which is used before the shapes");
-      if (body.near.learns()) body.tolerance = NearConfig::kErrorOfLearned;
-      if (Table::kDocuments || body.near.learns()) {
-        declare_path(keys, "learned_in", draft, body.near.learned_in,
+      if (near->learns()) near->newton.tolerance = NearConfig::kErrorOfLearned;
+      if (Table::kDocuments || near->learns()) {
+        declare_path(keys, "learned_in", draft, near->learned_in,
                      "With learn or tabulate: folder of the results, relative to the scene",
                      Absent{.text = "nothing is stored"});
       }
     }
-    if (is(ModelKind::kCorotational, ModelKind::kNeoHookean, ModelKind::kNear) || draft.lists(kPlasticity)) {
-      keys.key("max_iterations", body.max_iterations, Count{1000, 1},
+    if (!known || draft.lists(kPlasticity) || info(kind).law != Law::kLinear) {
+      Newton* const found = newton_of(body.model);
+      Newton& newton = found != nullptr ? *found : no_newton;
+      keys.key("max_iterations", newton.max_iterations, Count{1000, 1},
                "For corotational, neo-hookean, near, and linear with plasticity: iterations of one answer");
-      keys.key("error_percent", body.tolerance, up_to(10),
+      keys.key("error_percent", newton.tolerance, up_to(10),
                "For the same models: accepted error of the force. The estimated error is part of the answer; near "
                "adds that of the linear far field",
                Absent{.text = "0.0001; with learn or tabulate 2"});
@@ -345,11 +357,12 @@ void declare_touch(Table& root, Draft& draft) {
     keys.key("middle_mm", body.middle, kPoint, "Centre of the touched side. Only its place across `from` is used");
     const bool sized = keys.key("patch_radius_mm", body.patch_radius, kLength,
                                 "Radius of the patch on which the tool presses", kRequired);
-    const bool bounded = body.near.learns() && sized;
+    const bool learned = learns(body);
+    const bool bounded = learned && sized;
     keys.key("reach_mm", body.reach, bounded ? up_to(1e3 * NearConfig::kFarthest * body.patch_radius) : kLength,
              "For condensed: maximum distance of the tool from the centre. For near with learn or tabulate: range "
              "along each axis, at most 1.5 patch radii",
-             Absent{.required = body.near.learns(), .text = "no limit; required with learn or tabulate"});
+             Absent{.required = learned, .text = "no limit; required with learn or tabulate"});
     declare_tool(keys, draft);
     keys.key("tool_offset_mm", body.tool_offset, kPoint,
              "From the handle to the tool's centre, in the handle's frame. With an offset, a capsule, a box or a mesh, "
@@ -360,7 +373,7 @@ void declare_touch(Table& root, Draft& draft) {
     }
     keys.key("side", body.side, Names<Side>{{{"unilateral", Side::kUnilateral}, {"bilateral", Side::kBilateral}}},
              "Bilateral: after the first touch, the tool sticks to the body and can pull");
-    const bool can_leave_out = info(body.model).law == Law::kLinear || body.plasticity;
+    const bool can_leave_out = info(body.model).law == Law::kLinear || draft.lists(kPlasticity);
     if (Table::kDocuments || (can_leave_out && is_patch(body.tool) && !body.effects.has_time())) {
       keys.key("whole_stiffness", body.whole_stiffness, YesNo{},
                "For a patch on linear, condensed or with plasticity, at rest: send the complete stiffness of a flat "
@@ -418,10 +431,10 @@ void check_effects(const SceneErrors& errors, const Draft& draft) {
     if (!model.always.has(effect.kind) || before.has(effect.kind)) continue;
     errors.blame("effects", {}, of_model + " simulates " + in_quotes(effect.name) + ", which is not listed");
   }
-  const bool strains = body.near.law == Law::kNeoHookean;
-  if (body.model != ModelKind::kNear || strains == before.has(kMaterialNonlinearity)) return;
+  const auto* near = std::get_if<NearConfig>(&body.model);
+  if (near == nullptr || (near->law == Law::kNeoHookean) == before.has(kMaterialNonlinearity)) return;
   errors.blame("effects", {},
-               strains
+               near->law == Law::kNeoHookean
                    ? "the law \"neo-hookean\" simulates \"material-nonlinearity\", which is not listed"
                    : "the law does not simulate \"material-nonlinearity\", which is listed: only \"neo-hookean\" does");
 }
@@ -432,8 +445,8 @@ void check_values(const SceneErrors& errors, const Draft& draft) {
     errors.blame("cutting", {}, "missing, expected one or more tables [[cutting]]");
   }
   if (body.stiffening) errors.build("stiffening", [&] { check(*body.stiffening); });
-  const bool remembers =
-      body.model != ModelKind::kCondensed || body.side != PatchContact::Side::kUnilateral || body.friction;
+  const bool remembers = !std::holds_alternative<CondensedConfig>(body.model) ||
+                         body.side != PatchContact::Side::kUnilateral || body.friction;
   if (draft.scene.table > 0 && remembers) {
     errors.blame(
         "touch.table_mm", {},

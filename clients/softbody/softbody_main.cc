@@ -15,11 +15,11 @@
 #include <string>
 #include <string_view>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "clients/cpp/engine/self_test.h"
 #include "clients/cpp/options.h"
-#include "clients/softbody/answered.h"
 #include "clients/softbody/background.h"
 #include "clients/softbody/explain.h"
 #include "clients/softbody/placed_body.h"
@@ -63,7 +63,8 @@ int test(const softbody::Scene& scene, const Options& options) {
 void learn(softbody::BodyConfig& body) {
   const bool terminal = isatty(STDERR_FILENO) != 0;
   auto told = std::chrono::steady_clock::now();
-  body.near.learned = softbody::learn(body, [&](std::string_view what) {
+  auto& learned = std::get<softbody::NearConfig>(body.model).learned;
+  learned = softbody::learn(body, [&](std::string_view what) {
     if (terminal) {
       std::cerr << "\r\033[K" << what << std::flush;
     } else if (const auto now = std::chrono::steady_clock::now(); now - told >= kBetweenLines) {
@@ -72,8 +73,7 @@ void learn(softbody::BodyConfig& body) {
     }
   });
   if (terminal) std::cerr << "\r\033[K";
-  for (const std::string& warning : body.near.learned->warnings)
-    std::cerr << "tendon-softbody: warning: " << warning << '\n';
+  for (const std::string& warning : learned->warnings) std::cerr << "tendon-softbody: warning: " << warning << '\n';
 }
 
 int condense(int argc, char** argv) {
@@ -108,7 +108,7 @@ int condense(int argc, char** argv) {
 void prepare_beside(const softbody::Scene& scene, std::optional<softbody::BackgroundThread>& thread,
                     softbody::PlacedBody& body) {
   const bool cuts = !scene.body.cuts.empty();
-  const bool near = scene.body.model == softbody::ModelKind::kNear;
+  const bool near = std::holds_alternative<softbody::NearConfig>(scene.body.model);
   if (!cuts && !near) return;
   if (softbody::factors_may_work_at_once()) {
     thread.emplace();
@@ -149,21 +149,7 @@ int answer(const softbody::Scene& scene, const Options& options, softbody::Place
   });
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
-  const std::string_view first = argc > 1 ? argv[1] : "";
-  if (first == "condense") {
-    try {
-      return condense(argc - 1, argv + 1);
-    } catch (const SceneError& error) {
-      std::cerr << "tendon-softbody: " << error.what() << '\n';
-      return 2;
-    } catch (const std::exception& error) {
-      std::cerr << "tendon-softbody: " << error.what() << '\n';
-      return 1;
-    }
-  }
+int simulate(int argc, char** argv, std::string_view first) {
   const bool explains = first == "explain";
   const bool tests = first == "selftest";
   const int skip = explains || tests ? 1 : 0;
@@ -184,33 +170,40 @@ int main(int argc, char** argv) {
   line.add_argument("SCENE", file, "Scene file; its keys:\n" + softbody::scene_reference());
   if (const auto exit_code = line.parse(argc - skip, argv + skip)) return *exit_code;
 
+  softbody::Scene scene = softbody::read_scene(file);
+  if (softbody::learns(scene.body)) learn(scene.body);
+  if (explains) {
+    softbody::Explanation explanation = softbody::explain(
+        scene, [] { return static_cast<double>(std::clock()) / static_cast<double>(CLOCKS_PER_SEC); });
+    if (exact) explanation.off_exact = softbody::off_the_exact_interface(scene.body);
+    std::cout << (options.json ? in_json(scene, explanation) : in_words(scene, explanation));
+    return 0;
+  }
+  softbody::warn(std::cerr, "tendon-softbody", scene.body);
+  if (tests) return test(scene, options);
+  const UnblockedOutput output;
+  std::optional<softbody::BackgroundThread> thread;
+  softbody::PlacedBody body(scene);
+  prepare_beside(scene, thread, body);
+  if (std::holds_alternative<softbody::NearConfig>(scene.body.model)) {
+    options.client.ways.assign(softbody::kSolverPathNames.begin(), softbody::kSolverPathNames.end());
+  }
+  const int exit_code = answer(scene, options, body);
+  const softbody::Answered answered{body.fallbacks(), thread ? body.near_field() : std::nullopt};
+  if (options.json) {
+    std::cout << in_json(answered);
+  } else if (const std::string words = in_words(answered); !words.empty()) {
+    std::cerr << "tendon-softbody: " << words;
+  }
+  return exit_code;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
   try {
-    softbody::Scene scene = softbody::read_scene(file);
-    if (scene.body.near.learns()) learn(scene.body);
-    if (explains) {
-      softbody::Explanation explanation = softbody::explain(
-          scene, [] { return static_cast<double>(std::clock()) / static_cast<double>(CLOCKS_PER_SEC); });
-      if (exact) explanation.off_exact = softbody::off_the_exact_interface(scene.body);
-      std::cout << (options.json ? in_json(scene, explanation) : in_words(scene, explanation));
-      return 0;
-    }
-    softbody::warn(std::cerr, "tendon-softbody", scene.body);
-    if (tests) return test(scene, options);
-    const UnblockedOutput output;
-    std::optional<softbody::BackgroundThread> thread;
-    softbody::PlacedBody body(scene);
-    prepare_beside(scene, thread, body);
-    if (scene.body.model == softbody::ModelKind::kNear) {
-      options.client.ways.assign(softbody::kSolverPathNames.begin(), softbody::kSolverPathNames.end());
-    }
-    const int exit_code = answer(scene, options, body);
-    const softbody::Answered answered{body.fallbacks(), thread ? body.near_field() : std::nullopt};
-    if (options.json) {
-      std::cout << in_json(answered);
-    } else if (const std::string words = in_words(answered); !words.empty()) {
-      std::cerr << "tendon-softbody: " << words;
-    }
-    return exit_code;
+    const std::string_view first = argc > 1 ? argv[1] : "";
+    return first == "condense" ? condense(argc - 1, argv + 1) : simulate(argc, argv, first);
   } catch (const SceneError& error) {
     std::cerr << "tendon-softbody: " << error.what() << '\n';
     return 2;

@@ -22,6 +22,9 @@ std::string thrown_by(Call&& call) {
   return {};
 }
 
+/// For EXPECT_PRED2(says, text, part), which prints both.
+inline bool says(std::string_view text, std::string_view part) { return text.find(part) != std::string_view::npos; }
+
 template <class T>
 struct Makes {
   void operator()(const auto& config) const { [[maybe_unused]] const T made(config); }

@@ -44,8 +44,7 @@ std::string own_worker() {
 
 softbody::PlacedBody from_table(const std::string& scene_file, const std::string& table_file) {
   softbody::Scene scene = softbody::read_scene(scene_file);
-  scene.body.model = softbody::ModelKind::kCondensed;
-  scene.body.table_file = table_file;
+  scene.body.model = softbody::CondensedConfig{.table_file = table_file};
   return softbody::PlacedBody(scene);
 }
 

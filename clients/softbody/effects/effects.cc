@@ -13,10 +13,6 @@ std::size_t bytes_of(const VectorXd& vector) noexcept {
   return static_cast<std::size_t>(vector.size()) * sizeof(double);
 }
 
-void add_diagonal(const VectorXd& diagonal, SymmetricMatrix& to) {
-  for (int i = 0; i < to.size; ++i) to.values[at(to.column_starts[at(i)])] += diagonal[i];
-}
-
 }  // namespace
 
 Gravity::Gravity(const Elastic& elastic, const Vec3& acceleration, double density)
@@ -25,38 +21,31 @@ Gravity::Gravity(const Elastic& elastic, const Vec3& acceleration, double densit
 
 std::size_t Gravity::bytes() const noexcept { return sizeof *this + bytes_of(weight_); }
 
+Damping::Damping(const Elastic& elastic, const VectorXd& u, double density, double rate, double dt)
+    : Damping(lumped_mass(elastic, density) * (rate / dt), u) {}
+
+double Damping::energy(const VectorXd& u) const { return 0.5 * weight_.dot((u - about_).cwiseAbs2()); }
+
+void Damping::add_force(const VectorXd& u, VectorXd& force) const { force -= weight_.cwiseProduct(u - about_); }
+
+void Damping::add_stiffness(SymmetricMatrix& to) const {
+  for (int i = 0; i < to.size; ++i) to.values[at(to.column_starts[at(i)])] += weight_[i];
+}
+
+std::size_t Damping::bytes() const noexcept { return sizeof *this + bytes_of(weight_) + bytes_of(about_); }
+
 Inertia::Inertia(const Elastic& elastic, const VectorXd& u, double density, double dt)
-    : weight_(lumped_mass(elastic, density) / (dt * dt)), start_(u), ahead_(u) {}
-
-double Inertia::energy(const VectorXd& u) const { return 0.5 * weight_.dot((u - ahead_).cwiseAbs2()); }
-
-void Inertia::add_force(const VectorXd& u, VectorXd& force) const { force -= weight_.cwiseProduct(u - ahead_); }
-
-void Inertia::add_stiffness(SymmetricMatrix& to) const { add_diagonal(weight_, to); }
+    : Damping(lumped_mass(elastic, density) / (dt * dt), u), start_(u) {}
 
 void Inertia::advance(const VectorXd& u) {
-  ahead_ = 2 * u - start_;  // v₀ dt = u − u₀
+  about_ = 2 * u - start_;  // v₀ dt = u − u₀
   start_ = u;
 }
 
-std::size_t Inertia::bytes() const noexcept {
-  return sizeof *this + bytes_of(weight_) + bytes_of(start_) + bytes_of(ahead_);
-}
-
-Damping::Damping(const Elastic& elastic, const VectorXd& u, double density, double rate, double dt)
-    : drag_(lumped_mass(elastic, density) * (rate / dt)), start_(u) {}
-
-double Damping::energy(const VectorXd& u) const { return 0.5 * drag_.dot((u - start_).cwiseAbs2()); }
-
-void Damping::add_force(const VectorXd& u, VectorXd& force) const { force -= drag_.cwiseProduct(u - start_); }
-
-void Damping::add_stiffness(SymmetricMatrix& to) const { add_diagonal(drag_, to); }
-
-std::size_t Damping::bytes() const noexcept { return sizeof *this + bytes_of(drag_) + bytes_of(start_); }
+std::size_t Inertia::bytes() const noexcept { return Damping::bytes() + sizeof start_ + bytes_of(start_); }
 
 Viscosity::Viscosity(const Elastic& elastic, const VectorXd& u, double relaxation, double dt)
-    : resistance_(elastic.pattern()), start_(u) {
-  elastic.stiffness(VectorXd::Zero(elastic.size()), Elastic::Curvature::kExact, resistance_);
+    : resistance_(elastic.exact_stiffness(VectorXd::Zero(elastic.size()))), start_(u) {
   for (double& value : resistance_.values) value *= relaxation / dt;
 }
 

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <memory>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "clients/softbody/fem/elastic.h"
@@ -41,22 +42,6 @@ class Gravity : public Effect {
   VectorXd weight_;  ///< N
 };
 
-/// Inertia: energy ½ Σ m (u − u₀ − v₀ dt)² / dt² for a step from u₀ with velocity v₀.
-class Inertia : public Effect {
- public:
-  Inertia(const Elastic& elastic, const VectorXd& u, double density, double dt);
-  double energy(const VectorXd& u) const override;
-  void add_force(const VectorXd& u, VectorXd& force) const override;
-  void add_stiffness(SymmetricMatrix& to) const override;
-  void advance(const VectorXd& u) override;
-  std::size_t bytes() const noexcept override;
-
- private:
-  VectorXd weight_;  ///< m/dt², N/m
-  VectorXd start_;   ///< u₀, m
-  VectorXd ahead_;   ///< u₀ + v₀ dt, m
-};
-
 /// Viscous drag on every particle, −rate·m·v: energy ½ Σ rate/dt m (u − u₀)². It also slows rigid motion, so it only
 /// serves to bring a body to rest; it is not a tissue model.
 class Damping : public Effect {
@@ -65,11 +50,25 @@ class Damping : public Effect {
   double energy(const VectorXd& u) const override;
   void add_force(const VectorXd& u, VectorXd& force) const override;
   void add_stiffness(SymmetricMatrix& to) const override;
-  void advance(const VectorXd& u) override { start_ = u; }
+  void advance(const VectorXd& u) override { about_ = u; }
+  std::size_t bytes() const noexcept override;
+
+ protected:
+  Damping(VectorXd weight, VectorXd u) : weight_(std::move(weight)), about_(std::move(u)) {}
+
+  VectorXd weight_;  ///< rate·m/dt, N/m
+  VectorXd about_;   ///< u₀, m
+};
+
+/// Inertia: energy ½ Σ m (u − u₀ − v₀ dt)² / dt² for a step from u₀ with velocity v₀. This is a drag with the rate 1/dt
+/// about u₀ + v₀ dt.
+class Inertia : public Damping {
+ public:
+  Inertia(const Elastic& elastic, const VectorXd& u, double density, double dt);
+  void advance(const VectorXd& u) override;
   std::size_t bytes() const noexcept override;
 
  private:
-  VectorXd drag_;   ///< rate·m/dt, N/m
   VectorXd start_;  ///< u₀, m
 };
 

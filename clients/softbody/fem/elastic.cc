@@ -61,6 +61,12 @@ const SymmetricMatrix& Elastic::pattern() const {
   });
 }
 
+SymmetricMatrix Elastic::exact_stiffness(const VectorXd& u) const {
+  SymmetricMatrix matrix = pattern();
+  stiffness(u, Curvature::kExact, matrix);
+  return matrix;
+}
+
 int Elastic::slot(int row_component, int column_component) const {
   const int row = free_of(row_component);
   const int column = free_of(column_component);
@@ -93,6 +99,22 @@ VectorXd lumped_mass(const Elastic& elastic, double density) {
   VectorXd all(elastic.size());
   for (int i = 0; i < elastic.size(); ++i) all[i] = density * volumes[at(i / 3)];
   return elastic.to_free(all);
+}
+
+Factor factor_of(const SymmetricMatrix& stiffness) {
+  Factor factor(stiffness);
+  if (!factor.factorize(stiffness)) {
+    throw std::runtime_error("the body can still move as a whole: expected more fixed nodes");
+  }
+  return factor;
+}
+
+Vec3 place_of(const Mesh& mesh, const Patch& patch) {
+  Vec3 place = Vec3::Zero();
+  for (Eigen::Index i = 0; i < patch.weights.size(); ++i) {
+    place += patch.weights[i] * mesh.nodes[at(patch.nodes[static_cast<std::size_t>(i)])];
+  }
+  return place;
 }
 
 VectorXd patch_load(const Elastic& elastic, const Vec3& normal, const Patch& patch) {

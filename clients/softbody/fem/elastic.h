@@ -54,6 +54,7 @@ class Elastic {
   enum class Curvature : std::uint8_t { kExact, kWithoutNegative };
   /// The second derivative with respect to the free displacements, N/m.
   virtual void stiffness(const VectorXd& u, Curvature curvature, SymmetricMatrix& to) const = 0;
+  SymmetricMatrix exact_stiffness(const VectorXd& u) const;
   const SymmetricMatrix& pattern() const;  ///< all values are zero
 
   virtual std::size_t bytes() const noexcept = 0;
@@ -84,6 +85,11 @@ class Elastic {
 };
 
 VectorXd lumped_mass(const Elastic& elastic, double density);  ///< lumped masses (kg)
+
+/// Returns the factor of a stiffness. Throws std::runtime_error if the body can move as a whole.
+Factor factor_of(const SymmetricMatrix& stiffness);
+
+Vec3 place_of(const Mesh& mesh, const Patch& patch);  ///< m, weighted mean of the nodes at rest
 
 /// Returns the forces of 1 N on the patch, against the normal.
 VectorXd patch_load(const Elastic& elastic, const Vec3& normal, const Patch& patch);

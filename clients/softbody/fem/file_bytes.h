@@ -42,6 +42,9 @@ class ByteReader {
 
 std::uint64_t checksum(std::string_view bytes);  ///< XXH3 hash (64 bits)
 
+/// Returns the bytes before the checksum, the last 8. Throws std::invalid_argument if it does not match.
+std::string_view without_checksum(std::string_view bytes);
+
 /// Writes a file for the caller to rename. If it cannot be written, removes it and throws std::runtime_error.
 void write_draft(const std::filesystem::path& draft, std::string_view bytes);
 

@@ -18,18 +18,9 @@ constexpr Eigen::Index kAtOnce = 64;  // makes CHOLMOD use products of matrices
 
 SymmetricMatrix stiffness_of(const Solid& solid, const Effects& effects) {
   if (solid.law() != Law::kLinear) throw std::invalid_argument("a linear model requires the linear law");
-  SymmetricMatrix stiffness = solid.pattern();
-  solid.stiffness(VectorXd::Zero(solid.size()), Solid::Curvature::kExact, stiffness);
+  SymmetricMatrix stiffness = solid.exact_stiffness(VectorXd::Zero(solid.size()));
   for (const auto& effect : effects) effect->add_stiffness(stiffness);
   return stiffness;
-}
-
-Factor factor_of(const SymmetricMatrix& stiffness) {
-  Factor factor(stiffness);
-  if (!factor.factorize(stiffness)) {
-    throw std::runtime_error("the body can still move as a whole: expected more fixed nodes");
-  }
-  return factor;
 }
 
 VectorXd depth_of(const Solid& solid, const Vec3& normal, const Patch& patch, const VectorXd& displacements) {

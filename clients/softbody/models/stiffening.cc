@@ -28,24 +28,24 @@ void check(const StiffnessOverTime& law) {
   }
 }
 
-StiffeningModel::StiffeningModel(std::unique_ptr<Model> model, StiffnessOverTime law)
-    : model_(std::move(model)), law_(std::move(law)), factor_(1) {
+StiffeningModel::StiffeningModel(Model& model, StiffnessOverTime law)
+    : model_(model), law_(std::move(law)), factor_(1) {
   check(law_);
   tick(0);
 }
 
 std::size_t StiffeningModel::bytes() const noexcept {
-  return sizeof *this + (law_.at.size() + law_.factor.size()) * sizeof(double) + model_->bytes();
+  return sizeof *this + (law_.at.size() + law_.factor.size()) * sizeof(double) + model_.bytes();
 }
 
 void StiffeningModel::go_on_from(const Model& before, std::span<const int> node_before) {
   const auto& same = static_cast<const StiffeningModel&>(before);  // same kind by contract
   factor_ = same.factor_;
-  model_->go_on_from(*same.model_, node_before);
+  model_.go_on_from(same.model_, node_before);
 }
 
 Reaction StiffeningModel::press(const Patch& patch, Prescribed given, double value) {
-  Reaction reaction = model_->press(patch, given, given == Prescribed::kForce ? value / factor_ : value);
+  Reaction reaction = model_.press(patch, given, given == Prescribed::kForce ? value / factor_ : value);
   reaction.force *= factor_;
   reaction.stiffness *= factor_;
   reaction.error *= factor_;

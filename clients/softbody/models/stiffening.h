@@ -2,8 +2,6 @@
 #pragma once
 
 #include <cstddef>
-#include <memory>
-#include <utility>
 #include <vector>
 
 #include "clients/softbody/models/model.h"
@@ -26,20 +24,21 @@ void check(const StiffnessOverTime& law);  ///< throws std::invalid_argument wit
 /// limiter of the server protects the hand.
 class StiffeningModel : public Model {
  public:
-  StiffeningModel(std::unique_ptr<Model> model, StiffnessOverTime law);  ///< factor at time 0; throws as check() does
+  /// Starts with the factor at time 0. `model` must outlive this object. Throws the errors of check().
+  StiffeningModel(Model& model, StiffnessOverTime law);
 
   void tick(double time) { factor_ = law_.factor_at(time); }  ///< s
 
   Reaction press(const Patch& patch, Prescribed given, double value) override;
-  void cut(const Division& division, const EffectsConfig& effects) override { model_->cut(division, effects); }
+  void cut(const Division& division, const EffectsConfig& effects) override { model_.cut(division, effects); }
   void go_on_from(const Model& before, std::span<const int> node_before) override;
-  double step() const noexcept override { return model_->step(); }
-  bool still() const noexcept override { return model_->still(); }
-  bool glides() const noexcept override { return model_->glides(); }
+  double step() const noexcept override { return model_.step(); }
+  bool still() const noexcept override { return model_.still(); }
+  bool glides() const noexcept override { return model_.glides(); }
   std::size_t bytes() const noexcept override;
 
  private:
-  std::unique_ptr<Model> model_;
+  Model& model_;
   StiffnessOverTime law_;
   double factor_;
 };

@@ -37,10 +37,7 @@ SurfaceTable table_of(std::string_view bytes) {
     throw std::invalid_argument("it has " + std::to_string(bytes.size()) + " bytes, expected " +
                                 std::to_string(bytes_of(nodes)) + " for its " + std::to_string(nodes) + " nodes");
   }
-  const std::string_view body = bytes.substr(0, bytes.size() - sizeof(std::uint64_t));
-  if (ByteReader(bytes.substr(body.size())).take<std::uint64_t>() != checksum(body)) {
-    throw std::invalid_argument("its checksum does not match");
-  }
+  without_checksum(bytes);
   SurfaceTable table;
   table.body = reader.take<std::uint64_t>();
   table.patch_radius = reader.take<double>();

@@ -15,6 +15,7 @@
 #include <stdexcept>
 #include <string>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "clients/cpp/usage.h"
@@ -96,8 +97,7 @@ int condense_scene(const Arguments& arguments, const Ranks& ranks) {
 
 /// kCondensed is replaced by kLinear, because the workers have no table.
 Body live_body(BodyConfig config, Method method) {
-  if (config.model == ModelKind::kCondensed) config.model = ModelKind::kLinear;
-  config.table_file.reset();
+  if (std::holds_alternative<CondensedConfig>(config.model)) config.model = LinearConfig{};
   return Body(config, [method](const Solid& solid) { return on_ranks(solid, method); });
 }
 

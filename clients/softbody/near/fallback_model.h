@@ -28,7 +28,7 @@ class FallbackModel : public Model {
     int answers = 0;  ///< presses that this level has answered
   };
   std::vector<Step> steps() const;  ///< without NearModel
-  const NearModel& near() const noexcept { return *near_; }
+  NearModel& near() noexcept { return *near_; }
 
  private:
   double room(const Patch& patch, double depth) const;

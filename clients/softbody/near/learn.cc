@@ -146,11 +146,7 @@ typename Kind::Value value_of(std::string_view bytes, std::uint64_t digest, cons
                               const TouchSurface& surface) {
   if (!bytes.starts_with(Kind::kBegins)) throw std::invalid_argument("it does not start with the expected header");
   if (bytes.size() < Kind::kBegins.size() + sizeof(std::uint64_t)) throw std::invalid_argument("it is truncated");
-  const std::string_view body = bytes.substr(0, bytes.size() - sizeof(std::uint64_t));
-  if (ByteReader(bytes.substr(body.size())).take<std::uint64_t>() != checksum(body)) {
-    throw std::invalid_argument("its checksum does not match");
-  }
-  ByteReader reader(body.substr(Kind::kBegins.size()));
+  ByteReader reader(without_checksum(bytes).substr(Kind::kBegins.size()));
   if (reader.take<std::uint64_t>() != kLearnedVersion || reader.take<std::uint64_t>() != digest) {
     throw std::invalid_argument("it is for another body than its name");
   }

@@ -55,14 +55,6 @@ constexpr double kAnswersInMean = 16;  ///< number of answers in the mean motion
 /// The distance (m) from the center at which a new field is needed.
 double serves_to(const TouchSurface& surface) { return kReach * surface.radius() / 2; }
 
-Vec3 place_of(const Mesh& mesh, const Patch& patch) {
-  Vec3 place = Vec3::Zero();
-  for (Eigen::Index i = 0; i < patch.weights.size(); ++i) {
-    place += patch.weights[i] * mesh.nodes[at(patch.nodes[static_cast<std::size_t>(i)])];
-  }
-  return place;
-}
-
 /// Returns the size (m) of the largest element below the patch.
 double element_below(const Mesh& mesh, const Patch& patch) {
   double largest = 0;
@@ -80,15 +72,7 @@ double element_below(const Mesh& mesh, const Patch& patch) {
   return largest;
 }
 
-Factor factor_at_rest(const Solid& solid) {
-  SymmetricMatrix stiffness = solid.pattern();
-  solid.stiffness(VectorXd::Zero(solid.size()), Elastic::Curvature::kExact, stiffness);
-  Factor factor(stiffness);
-  if (!factor.factorize(stiffness)) {
-    throw std::runtime_error("the body can still move as a whole: expected more fixed nodes");
-  }
-  return factor;
-}
+Factor factor_at_rest(const Solid& solid) { return factor_of(solid.exact_stiffness(VectorXd::Zero(solid.size()))); }
 
 }  // namespace
 

@@ -53,7 +53,7 @@ void still(benchmark::State& state, ModelKind model, Element element) {
 
 void within_half_a_percent(benchmark::State& state, ModelKind model) {
   BodyConfig config = testing::pressed_body(model, Element::kHex8Sri, static_cast<int>(state.range(0)));
-  config.tolerance = 5e-3;
+  newton_of(config.model)->tolerance = 5e-3;
   answer(state, config);
 }
 
@@ -87,8 +87,8 @@ struct Beside {
 /// simulated second thread computes the fields.
 void path(benchmark::State& state, ModelKind model, Law law, bool with_thread) {
   BodyConfig config = testing::pressed_body(model, Element::kHex8Sri, static_cast<int>(state.range(0)));
-  config.near.law = law;
-  config.tolerance = 5e-3;
+  newton_of(config.model)->tolerance = 5e-3;
+  if (auto* near = std::get_if<NearConfig>(&config.model)) near->law = law;
   Body body(config);
   std::optional<Beside> beside;
   if (with_thread) beside.emplace(body);
@@ -140,21 +140,19 @@ void path(benchmark::State& state, ModelKind model, Law law, bool with_thread) {
 /// against Newton's method on the whole mesh with a tolerance of 1e-9.
 void learned(benchmark::State& state, Law law, bool tabulate) {
   BodyConfig config = testing::pressed_body(ModelKind::kNear, Element::kHex8Sri, static_cast<int>(state.range(0)));
-  config.near.law = law;
-  config.tolerance = 0.02;
+  NearConfig near{.newton = {.tolerance = 0.02}, .law = law, .learn = !tabulate, .tabulate = tabulate};
+  config.model = near;
   config.middle = Vec3(0.01, 0, 0);
   config.reach = 0.012;
-  (tabulate ? config.near.tabulate : config.near.learn) = true;
   const double start = processor_time();
-  config.near.learned = learn(config, {});
+  near.learned = learn(config, {});
   const double set_up = processor_time() - start;
+  config.model = near;
   Body body(config);
   Beside beside(body);
   BodyConfig exact = config;
-  exact.model = law == Law::kNeoHookean ? ModelKind::kNeoHookean : ModelKind::kCorotational;
-  exact.near = {};
-  exact.tolerance = 1e-9;
-  exact.max_iterations = 200;
+  exact.model = model_config(law == Law::kNeoHookean ? ModelKind::kNeoHookean : ModelKind::kCorotational);
+  *newton_of(exact.model) = {.max_iterations = 200, .tolerance = 1e-9};
   Body truth(exact);
   constexpr int kAside = 100;
   constexpr double kStep = 2e-4;

@@ -8,11 +8,13 @@
 #include <cstddef>
 #include <cstdlib>
 #include <memory>
+#include <sstream>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "clients/softbody/models/quasi_static.h"
+#include "clients/softbody/touch/contact.h"
 #include "tests/clients/softbody/pressed_block.h"
 #include "tests/support/dice.h"
 #include "tests/support/property_cases.h"
@@ -24,11 +26,31 @@ struct AskedAndExact {
       : solid(std::move(block)),
         top(solid.mesh(), Vec3::UnitZ(), kB1PatchRadius),
         exact(solid, top, {.max_iterations = 200, .tolerance = 1e-9}) {}
+  double truth(const Vec2& place, double depth) {
+    return exact.press(*top.patch(place), Prescribed::kDepth, depth).force;
+  }
   Solid solid;
   TouchSurface top;
   QuasiStaticModel exact;
   std::unique_ptr<Model> asked{};
 };
+
+/// The force differs from the true one by at most `share` of it, and the reported error covers the difference.
+template <class... What>
+void expect_right(const Reaction& found, double truth, double share, const What&... what) {
+  std::ostringstream text;
+  ((text << what << ' '), ...);
+  EXPECT_NEAR(found.force, truth, share * truth) << text.str();
+  EXPECT_GE(found.error, std::abs(found.force - truth)) << text.str();
+}
+
+/// `Answer` is Reaction or Feel.
+template <class Answer>
+void expect_same_bits(const Answer& found, const Answer& expected, int answer) {
+  EXPECT_EQ(found.force, expected.force) << answer;
+  EXPECT_EQ(found.stiffness, expected.stiffness) << answer;
+  EXPECT_EQ(found.error, expected.error) << answer;
+}
 
 struct ErrorsSaid {
   int answers = 0;
@@ -79,6 +101,39 @@ inline void expect_covered(const ErrorsSaid& said) {
   ::testing::Test::RecordProperty("covered", said.covered);
   ::testing::Test::RecordProperty("above_half_a_percent", static_cast<int>(said.times.size()));
   ::testing::Test::RecordProperty("median_of_said_over_true", static_cast<int>(said.median()));
+}
+
+class SameAnswer : public Model {
+ public:
+  explicit SameAnswer(Reaction reaction) : reaction_(std::move(reaction)) {}
+  Reaction press(const Patch&, Prescribed, double) override { return reaction_; }
+  bool glides() const noexcept override { return true; }
+  std::size_t bytes() const noexcept override { return 0; }
+
+ private:
+  Reaction reaction_;
+};
+
+/// A reaction of 2 N at 4 mm with all parts of the stiffness set.
+inline Reaction whole_answer() {
+  Reaction answer;
+  answer.force = 2;
+  answer.depth = 4e-3;
+  answer.stiffness = 400;
+  answer.slope = Vec2(0.1, -0.2);
+  answer.error = 0.01;
+  answer.knows_glide = true;
+  answer.glide.tilting = Vec2(3, 5);
+  answer.glide.curving << 7, 1, 1, -4;
+  answer.glide.giving << 20, 3, 3, 30;
+  return answer;
+}
+
+inline Feel felt(const Reaction& answer) {
+  const Solid solid = pressed_block(Element::kHex8Sri, 8, 0.45);
+  const TouchSurface slanting(solid.mesh(), Vec3(0.3, -0.2, 1).normalized(), kB1PatchRadius);
+  SameAnswer model(answer);
+  return PatchContact(model, slanting, 0, PatchContact::Side::kUnilateral).at(Vec3(0.001, 0.002, 0.046));
 }
 
 }  // namespace tendon::softbody::testing

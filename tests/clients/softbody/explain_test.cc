@@ -17,6 +17,7 @@
 #include "tests/clients/softbody/pressed_block.h"
 #include "tests/clients/softbody/scene_text.h"
 #include "tests/support/property_cases.h"
+#include "tests/support/refusal.h"
 
 namespace tendon::softbody::explain_test {
 namespace {
@@ -38,12 +39,12 @@ TEST(SoftbodyExplain, SaysWhatIsSimulatedWhatNotAndWarnsOfElementsThatLock) {
   const std::string text = explained(parse_scene(kGood, "s.toml", "."));
   for (const std::string_view part : {"simulated:\n  contact: unilateral", "condensed", "not simulated:", "gravity",
                                       "75 nodes, 32 elements", "unknowns: 150", "touchable nodes: 25"}) {
-    EXPECT_NE(text.find(part), std::string::npos) << part << '\n' << text;
+    EXPECT_PRED2(says, text, part);
   }
   EXPECT_EQ(text.find("warning"), std::string::npos);
   std::string locking = with("hex8-sri", "tet4");
   locking.replace(locking.find("0.45"), 4, "0.49");
-  EXPECT_NE(explained(parse_scene(locking, "s.toml", ".")).find("warning: tet4 locks"), std::string::npos);
+  EXPECT_PRED2(says, explained(parse_scene(locking, "s.toml", ".")), "warning: tet4 locks");
 }
 
 TEST(SoftbodyExplain, EveryEffectIsNamedWhereItIsListedAndWhereItIsNot) {
@@ -60,17 +61,15 @@ TEST(SoftbodyExplain, EveryEffectIsNamedWhereItIsListedAndWhereItIsNot) {
 
 TEST(SoftbodyExplain, SaysWhatWasLearnedAndWhatAnswersCost) {
   Scene scene{.body = pressed_body(ModelKind::kNear, Element::kHex8Sri, 6)};
-  scene.body.near.learn = true;
-  scene.body.near.tabulate = true;
+  scene.body.model = NearConfig{.newton = {.tolerance = 0.02}, .learn = true, .tabulate = true};
   scene.body.reach = 0.005;
-  scene.body.tolerance = 0.02;
   const Explanation explanation = explain(scene, saying({0, 1e6}));
   ASSERT_EQ(explanation.learned.size(), 2U);
   const std::string text = in_words(scene, explanation);
-  EXPECT_NE(text.find("answers, where accurate enough: tabulated, within "), std::string::npos) << text;
-  EXPECT_NE(text.find("answers, where accurate enough: learned, within "), std::string::npos) << text;
-  EXPECT_NE(text.find(" in 80 of 80 cells, error up to "), std::string::npos) << text;
-  EXPECT_NE(text.find("answers elsewhere: near field, within "), std::string::npos) << text;
+  EXPECT_PRED2(says, text, "answers, where accurate enough: tabulated, within ");
+  EXPECT_PRED2(says, text, "answers, where accurate enough: learned, within ");
+  EXPECT_PRED2(says, text, " in 80 of 80 cells, error up to ");
+  EXPECT_PRED2(says, text, "answers elsewhere: near field, within ");
   const auto json = nlohmann::json::parse(in_json(scene, explanation));
   EXPECT_EQ(json["learned"][0]["name"], "tabulated");
   EXPECT_EQ(json["learned"][1]["name"], "learned");
@@ -83,23 +82,20 @@ TEST(SoftbodyExplain, SaysHowMuchOfABodyIsNearTheTool) {
   Scene scene{.body = pressed_body(ModelKind::kNear, Element::kHex8Sri, 8)};
   const Explanation explanation = explain(scene, saying({0, 1e6}));
   const std::string text = in_words(scene, explanation);
-  EXPECT_NE(text.find("near the tool: corotational, 112 of 256 elements, within 45 mm or on the path of the tool; 312 "
-                      "unknowns, including 60 modes instead of the 408 unknowns of the interface\n"),
-            std::string::npos)
-      << text;
+  EXPECT_PRED2(says, text,
+               "near the tool: corotational, 112 of 256 elements, within 45 mm or on the path of the tool; 312 "
+               "unknowns, including 60 modes instead of the 408 unknowns of the interface\n");
   const auto json = nlohmann::json::parse(in_json(scene, explanation));
   EXPECT_EQ(json["near"]["elements"], 112);
   EXPECT_EQ(json["near"]["modes"], 60);
   EXPECT_GT(json["bytes"], 100'000);
   const bool beside = factors_may_work_at_once();
-  EXPECT_NE(text.find(beside ? "next near field: in another thread" : "next near field: for the shape at rest"),
-            std::string::npos)
-      << text;
+  EXPECT_PRED2(says, text, beside ? "next near field: in another thread" : "next near field: for the shape at rest");
   EXPECT_EQ(json["near"].contains("field_s"), beside);
   EXPECT_EQ(json["near"].contains("thread_bytes"), beside);
   scene.body.shape = BlockShape{Vec3(0.1, 0.1, 0.05), {4, 4, 2}};
-  EXPECT_NE(explained(scene).find("near the tool: the whole body"), std::string::npos);
-  scene.body.model = ModelKind::kLinear;
+  EXPECT_PRED2(says, explained(scene), "near the tool: the whole body");
+  scene.body.model = LinearConfig{};
   EXPECT_EQ(explained(scene).find("near the tool"), std::string::npos);
 }
 
@@ -116,10 +112,8 @@ TEST(SoftbodyExplain, SixtyModesAreTheExactInterfaceToHalfAPercentWhenAsked) {
     EXPECT_EQ(in_words(scene, explanation).find("compared with the exact interface"), std::string::npos);
     EXPECT_FALSE(nlohmann::json::parse(in_json(scene, explanation))["near"].contains("off_exact"));
     explanation.off_exact = 0.00123;
-    EXPECT_NE(in_words(scene, explanation)
-                  .find("compared with the exact interface: forces differ by up to 0.12 % for depths up to 4 mm\n"),
-              std::string::npos)
-        << in_words(scene, explanation);
+    EXPECT_PRED2(says, in_words(scene, explanation),
+                 "compared with the exact interface: forces differ by up to 0.12 % for depths up to 4 mm\n");
     EXPECT_EQ(nlohmann::json::parse(in_json(scene, explanation))["near"]["off_exact"], 0.00123);
   }
   EXPECT_THROW(off_the_exact_interface(pressed_body(ModelKind::kLinear, Element::kHex8Sri, 4)), std::invalid_argument);
@@ -134,15 +128,11 @@ TEST(SoftbodyExplain, SaysWhatAToolOfAFileIsAndCosts) {
   EXPECT_EQ(facts.facets, 1720);
   EXPECT_EQ(explanation.tool->made_s, 0.25);
   const std::string text = in_words(scene, explanation);
-  EXPECT_NE(text.find("with a tool with the surface " TENDON_SCENES "/spoon.off, with a torque"), std::string::npos)
-      << text;
-  EXPECT_NE(text.find("\ntool: 1720 facets, "), std::string::npos) << text;
-  EXPECT_NE(text.find(std::to_string(facts.points) + " distances on a grid with a cell size of 0.8 mm, "),
-            std::string::npos)
-      << text;
-  EXPECT_NE(text.find(" MB, computed in 250 ms of processor time; accuracy of the surface "), std::string::npos)
-      << text;
-  EXPECT_NE(text.find(" x 76 mm; "), std::string::npos) << text;
+  EXPECT_PRED2(says, text, "with a tool with the surface " TENDON_SCENES "/spoon.off, with a torque");
+  EXPECT_PRED2(says, text, "\ntool: 1720 facets, ");
+  EXPECT_PRED2(says, text, std::to_string(facts.points) + " distances on a grid with a cell size of 0.8 mm, ");
+  EXPECT_PRED2(says, text, " MB, computed in 250 ms of processor time; accuracy of the surface ");
+  EXPECT_PRED2(says, text, " x 76 mm; ");
   const auto json = nlohmann::json::parse(in_json(scene, explanation));
   EXPECT_EQ(json["tool"]["bytes"], facts.bytes);
   EXPECT_EQ(json["tool"]["points"], facts.points);
@@ -168,9 +158,7 @@ TEST(SoftbodyExplain, WhatAnEffectAddsIsTheDifferenceToTheBodyWithoutIt) {
     EXPECT_EQ(part.adds->bytes, bytes(scene.body) - bare);
     EXPECT_GT(part.adds->bytes, 0);
   }
-  EXPECT_NE(in_words(scene, explanation).find("gravity: the body deforms under its weight; adds 150 ms and "),
-            std::string::npos)
-      << in_words(scene, explanation);
+  EXPECT_PRED2(says, in_words(scene, explanation), "gravity: the body deforms under its weight; adds 150 ms and ");
   const auto json = nlohmann::json::parse(in_json(scene, explanation));
   EXPECT_EQ(json["model"], "linear");
   EXPECT_EQ(json["unknowns"], 150);
@@ -178,6 +166,29 @@ TEST(SoftbodyExplain, WhatAnEffectAddsIsTheDifferenceToTheBodyWithoutIt) {
   EXPECT_EQ(json["effects"].size(), effects().size());
   for (const auto& effect : json["effects"]) EXPECT_EQ(effect.contains("adds_s"), effect["name"] == "gravity");
   EXPECT_TRUE(json["warnings"].empty());
+}
+
+constexpr NearModel::Size kNear{.made = 5, .late = 1, .linear = 3};
+
+TEST(Answered, SaysTheSameCountsInWordsAndInJson) {
+  const Answered both{{{.size = {.name = "tabulated"}, .answers = 812}, {.size = {.name = "learned"}, .answers = 97}},
+                      kNear};
+  EXPECT_EQ(in_json(both), R"({"answers":{"tabulated":812,"learned":97,"linear":3,"fields":5,"fields_late":1}})"
+                           "\n");
+  EXPECT_EQ(in_words(both),
+            "812 answers were tabulated, 97 answers were learned, 3 answers were from the linear body, 5 near fields "
+            "were computed by the other thread, 1 of them were too late\n");
+}
+
+TEST(Answered, WithoutAnotherThreadThereAreLevelsAlone) {
+  const Answered levels{{{.size = {.name = "learned"}, .answers = 0}}, {}};
+  EXPECT_EQ(in_json(levels), "{\"answers\":{\"learned\":0}}\n");
+  EXPECT_EQ(in_words(levels), "0 answers were learned\n");
+}
+
+TEST(Answered, ABodyWithoutEitherHasNothingToSay) {
+  EXPECT_EQ(in_json({}), "");
+  EXPECT_EQ(in_words({}), "");
 }
 
 }  // namespace

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <future>
 #include <utility>
+#include <vector>
 
 #include "clients/softbody/body.h"
 #include "clients/softbody/fem/solid.h"
@@ -26,7 +28,7 @@ inline BodyConfig pressed_body(ModelKind model, Element element, int n) {
   config.shape = BlockShape{Vec3(0.1, 0.1, 0.05), {n, n, n / 2}};
   config.element = element;
   config.material = {.young = 1e4, .poisson = 0.45};
-  config.model = model;
+  config.model = model_config(model);
   config.patch_radius = kB1PatchRadius;
   return config;
 }
@@ -41,6 +43,17 @@ struct PressedByNewton {
   TouchSurface top;
   QuasiStaticModel model;
   Patch patch;
+};
+
+/// Collects the second thread's work until work() runs it.
+struct Elsewhere {
+  Background background() {
+    return [this](std::packaged_task<void()> work) { given.push_back(std::move(work)); };
+  }
+  void work() {
+    for (std::packaged_task<void()>& each : std::exchange(given, {})) each();
+  }
+  std::vector<std::packaged_task<void()>> given;
 };
 
 }  // namespace tendon::softbody::testing

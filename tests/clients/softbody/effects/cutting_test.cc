@@ -11,7 +11,6 @@
 
 #include "clients/softbody/models/linear.h"
 #include "clients/softbody/models/quasi_static.h"
-#include "tests/clients/softbody/elsewhere.h"
 #include "tests/clients/softbody/pressed_block.h"
 #include "tests/support/refusal.h"
 
@@ -224,9 +223,8 @@ TEST(CutUnderLoad, TheCutItselfPutsInNoEnergyAndTheBodyThenGivesWay) {
 
 TEST(CutUnderLoad, ABodyThatSagsSagsMoreWhenItIsCut) {
   const EffectsConfig weight{.density = 1000, .gravity = Vec3(3, 0, -9.81)};
-  BodyConfig config = pressed_body(ModelKind::kLinear, Element::kHex8Sri, 4);
   for (const ModelKind model : {ModelKind::kLinear, ModelKind::kNeoHookean}) {
-    config.model = model;
+    BodyConfig config = pressed_body(model, Element::kHex8Sri, 4);
     config.effects = weight;
     config.cuts = {{across(0.025, 0.05), PlannedCut::When::kTime, 1}};
     Body body(config);
@@ -245,8 +243,7 @@ TEST(Factor, OfTwoThreadsAtOnceIsRightWhereThatIsSaid) {
   if (!factors_may_work_at_once()) GTEST_SKIP() << "this OpenBLAS only supports one thread";
   const auto off_at_most = [](int cells) {
     const Solid solid = pressed_block(Element::kHex8Sri, cells, 0.45);
-    SymmetricMatrix matrix = solid.pattern();
-    solid.stiffness(VectorXd::Zero(solid.size()), Solid::Curvature::kExact, matrix);
+    const SymmetricMatrix matrix = solid.exact_stiffness(VectorXd::Zero(solid.size()));
     const MatrixXd load = MatrixXd::Ones(matrix.size, 4);
     double off = 0;
     for (int i = 0; i < 20; ++i) {
@@ -266,14 +263,9 @@ TEST(Factor, OfTwoThreadsAtOnceIsRightWhereThatIsSaid) {
 
 TEST(Factor, SplitsAreSolvedAsByANewFactorOrRefused) {
   const Solid whole = pressed_block(Element::kHex8Sri, 8, 0.45);
-  const auto stiffness = [](const Solid& solid) {
-    SymmetricMatrix matrix = solid.pattern();
-    solid.stiffness(VectorXd::Zero(solid.size()), Solid::Curvature::kExact, matrix);
-    return matrix;
-  };
+  const auto stiffness = [](const Solid& solid) { return solid.exact_stiffness(VectorXd::Zero(solid.size())); };
   const SymmetricMatrix before = stiffness(whole);
-  Factor kept(before);
-  ASSERT_TRUE(kept.factorize(before));
+  Factor kept = factor_of(before);
   std::vector<Cut> cuts{narrow(0.012)};
   const Division first = divide(whole.mesh(), whole.fixed(), cuts);
   const Solid once = after(whole, first);
@@ -283,8 +275,7 @@ TEST(Factor, SplitsAreSolvedAsByANewFactorOrRefused) {
   const Solid twice = after(once, second);
   SymmetricMatrix matrix = stiffness(twice);
   ASSERT_TRUE(kept.split(matrix, twins(twice, second)));
-  Factor fresh(matrix);
-  ASSERT_TRUE(fresh.factorize(matrix));
+  const Factor fresh = factor_of(matrix);
   MatrixXd right(twice.free_count(), 2);
   for (Eigen::Index i = 0; i < right.size(); ++i) right(i) = std::sin(1.0 + 7.0 * static_cast<double>(i));
   const MatrixXd expected = fresh.solve(right);
@@ -295,8 +286,7 @@ TEST(Factor, SplitsAreSolvedAsByANewFactorOrRefused) {
   loose.values.push_back(0);
   loose.column_starts.push_back(static_cast<int>(loose.rows.size()));
   ++loose.size;
-  Factor again(before);
-  ASSERT_TRUE(again.factorize(before));
+  Factor again = factor_of(before);
   EXPECT_FALSE(again.split(loose, {0}));
   EXPECT_FALSE(again.split(matrix, std::vector<int>(static_cast<std::size_t>(matrix.size), 0)));
   const MatrixXd back = again.solve(right.topRows(before.size));
@@ -345,8 +335,7 @@ TEST(PreparedCut, AnswersGoOnUncutAndFlaggedAndThenAreThoseOfTheCutBody) {
     // near_cut_test.cc tests the near model, whose answers differ until a near field of the cut body exists.
     if (!model.may.has(EffectKind::kCutting) || model.kind == ModelKind::kNear) continue;
     BodyConfig config = pressed_body(model.kind, Element::kHex8Sri, 4);
-    config.tolerance = 1e-9;
-    config.max_iterations = 100;
+    if (Newton* newton = newton_of(config.model)) *newton = {.max_iterations = 100, .tolerance = 1e-9};
     config.friction = 0.3;
     Body whole(config);
     config.stiffening = StiffnessOverTime{.at = {0, 1}, .factor = {1, 1}};
@@ -440,7 +429,7 @@ TEST(Cutting, APlanThatGoesWrongIsRefusedBeforeAnythingIsTouched) {
   swinging.effects = {.density = 1000, .step = 1e-3, .inertia = true};
   EXPECT_THROW(Body{swinging}, std::invalid_argument);
   swinging.effects = {};
-  swinging.model = ModelKind::kCondensed;
+  swinging.model = CondensedConfig{};
   EXPECT_THROW(Body{swinging}, std::invalid_argument);
 }
 

@@ -250,5 +250,31 @@ TEST(Friction, IsBoundedByTheForceAlongTheNormalWhereverTheToolGoes) {
   EXPECT_GT(largest, 0.3);
 }
 
+TEST(Models, EachGivesTheSameStiffnessWhetherDepthOrForceIsGiven) {
+  for (const ModelInfo& model : models()) {
+    const BodyConfig config = pressed_body(model.kind, Element::kTet4, 4);
+    const Reaction by_force = Body(config).settle(Prescribed::kForce, 0.3);
+    const Reaction by_depth = Body(config).settle(Prescribed::kDepth, by_force.depth);
+    EXPECT_NEAR(by_depth.force, 0.3, 5e-4) << model.name;
+    EXPECT_LT((by_depth.slope - by_force.slope).norm(), 1e-3) << model.name;
+    const Reaction pulled = Body(config).settle(Prescribed::kDepth, -by_force.depth);
+    EXPECT_LT(pulled.force, -0.2) << model.name;
+    const Reaction left = Body(config).settle(Prescribed::kLeastDepth, -by_force.depth);
+    EXPECT_EQ(left.force, 0) << model.name;
+    EXPECT_NEAR(left.depth, 0, 1e-8) << model.name;
+  }
+}
+
+TEST(Models, EachRefusesWhatItDoesNotSimulate) {
+  for (const ModelInfo& model : models()) {
+    BodyConfig config = pressed_body(model.kind, Element::kTet4, 2);
+    config.effects = {.step = 1e-3, .viscosity = 0.01};
+    EXPECT_EQ(thrown_by([&] { Body{config}; }),
+              model.may.has(EffectKind::kViscosity)
+                  ? ""
+                  : "the model \"" + std::string(model.name) + "\" does not simulate viscosity");
+  }
+}
+
 }  // namespace
 }  // namespace tendon::softbody::effects_test

@@ -47,7 +47,7 @@ std::size_t SelfCollision::bytes() const noexcept { return 0; }
 double StiffnessOverTime::factor_at(double) const { std::abort(); }
 void check(const StiffnessOverTime&) {}
 // NOLINTNEXTLINE(performance-unnecessary-value-param): as it is declared
-StiffeningModel::StiffeningModel(std::unique_ptr<Model>, StiffnessOverTime) { abort_with(factor_); }
+StiffeningModel::StiffeningModel(Model& model, StiffnessOverTime) : model_(model) { abort_with(factor_); }
 void StiffeningModel::go_on_from(const Model&, std::span<const int>) { std::abort(); }
 Reaction StiffeningModel::press(const Patch&, Prescribed, double) { std::abort(); }
 std::size_t StiffeningModel::bytes() const noexcept { return 0; }

@@ -27,10 +27,7 @@ Mesh crooked_block(Shape shape) {
 
 /// The free displacements, given the prescribed ones in `u` and the loads on the free nodes.
 VectorXd at_rest(const Solid& solid, VectorXd u, const VectorXd& loads) {
-  SymmetricMatrix k = solid.pattern();
-  solid.stiffness(u, Solid::Curvature::kExact, k);
-  Factor factor(k);
-  EXPECT_TRUE(factor.factorize(k));
+  const Factor factor = factor_of(solid.exact_stiffness(u));
   solid.add_free(factor.solve(solid.to_free(loads - solid.forces(u).force)), u);
   return u;
 }
@@ -137,8 +134,7 @@ TEST(Solid, ForcesAreTheSlopeOfTheEnergyAndTheStiffnessThatOfTheForces) {
       solid.add_free(-h * along, minus);
       const VectorXd force = solid.to_free(solid.forces(u).force);
       EXPECT_NEAR((solid.energy(plus) - solid.energy(minus)) / (2 * h), force.dot(along), 1e-6 * force.norm());
-      SymmetricMatrix k = solid.pattern();
-      solid.stiffness(u, Solid::Curvature::kExact, k);
+      const SymmetricMatrix k = solid.exact_stiffness(u);
       const VectorXd measured = solid.to_free(solid.forces(plus).force - solid.forces(minus).force) / (2 * h);
       EXPECT_LT((k.times(along) - measured).norm(), 1e-6 * measured.norm())
           << info(element).name << static_cast<int>(law);

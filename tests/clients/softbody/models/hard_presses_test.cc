@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Presses that are difficult for such solvers. touch/hard_tools_test.cc has those with rigid tools.
+// Presses that are difficult for such solvers. touch/rigid_contact_test.cc has those with rigid tools.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -11,6 +11,7 @@
 #include "clients/softbody/near/near_model.h"
 #include "clients/softbody/touch/contact.h"
 #include "tests/clients/softbody/pressed_block.h"
+#include "tests/clients/softbody/touch/ways.h"
 
 namespace tendon::softbody::hard_presses_test {
 namespace {
@@ -30,17 +31,6 @@ struct Side {
   NearModel near;
 };
 
-/// −∂force/∂place by central differences.
-Mat3 slope(PatchContact& contact, const Vec3& place) {
-  constexpr double kStep = 2e-6;  // m
-  Mat3 all;
-  for (int axis = 0; axis < 3; ++axis) {
-    const Vec3 way = kStep * Vec3::Unit(axis);
-    all.col(axis) = (contact.at(place - way).force - contact.at(place + way).force) / (2 * kStep);
-  }
-  return all;
-}
-
 TEST(HardPress, InACornerAndAtTheRimStiffnessIsTheSlopeAndNearIsWhole) {
   struct Place {
     Vec3 towards_tool;
@@ -54,7 +44,7 @@ TEST(HardPress, InACornerAndAtTheRimStiffnessIsTheSlopeAndNearIsWhole) {
       const Feel feel = contact.at(place.tool);
       EXPECT_GT(feel.force.dot(place.towards_tool), 0.1);
       EXPECT_LT(feel.error, 1e-6 * feel.force.norm());
-      const Mat3 expected = slope(contact, place.tool);
+      const Mat3 expected = testing::force_slope(place.tool, 2e-6, [&](const Vec3& at) { return contact.at(at); });
       EXPECT_LT((feel.stiffness - expected).norm(), 0.01 * expected.norm()) << place.tool.transpose();
       PatchContact by_near(side.near, side.surface, 0, PatchContact::Side::kUnilateral, nullptr);
       const Feel near = by_near.at(place.tool);

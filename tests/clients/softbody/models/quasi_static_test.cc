@@ -12,6 +12,7 @@
 #include "clients/softbody/touch/contact.h"
 #include "tests/clients/softbody/drawn_answers.h"
 #include "tests/clients/softbody/pressed_block.h"
+#include "tests/clients/softbody/touch/ways.h"
 
 namespace tendon::softbody::quasi_static_test {
 namespace {
@@ -137,16 +138,11 @@ TEST(QuasiStatic, AnswersWithoutAStepHaveTheStiffnessSentAsTheirSlope) {
     for (double above = 4.5e-3; above > 0; above -= 2.5e-4) contact.at(tool + above * Vec3::UnitZ());
     Feel feel = contact.at(tool);
     while (model.iterations() > 0) feel = contact.at(tool);
-    Mat3 measured;
-    constexpr double kStep = 1e-6;
-    for (int axis = 0; axis < 3; ++axis) {
-      const auto force_at = [&](double way) {
-        const Vec3 force = contact.at(tool + way * Vec3::Unit(axis)).force;
-        EXPECT_EQ(model.iterations(), 0);
-        return force;
-      };
-      measured.col(axis) = (force_at(-kStep) - force_at(kStep)) / (2 * kStep);
-    }
+    const Mat3 measured = testing::force_slope(tool, 1e-6, [&](const Vec3& at) {
+      const Feel there = contact.at(at);
+      EXPECT_EQ(model.iterations(), 0);
+      return there;
+    });
     EXPECT_LT((measured - feel.stiffness).norm(), 0.05 * feel.stiffness.norm()) << feel.stiffness << "\n" << measured;
     EXPECT_LT((measured - measured.transpose()).norm(), 0.01 * feel.stiffness.norm()) << measured;
   }

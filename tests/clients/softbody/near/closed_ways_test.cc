@@ -15,8 +15,8 @@
 #include "clients/softbody/near/fallback_model.h"
 #include "clients/softbody/touch/contact.h"
 #include "core/ledger/energy_ledger.h"
-#include "tests/clients/softbody/elsewhere.h"
 #include "tests/clients/softbody/near/pressed_before.h"
+#include "tests/clients/softbody/pressed_block.h"
 #include "tests/support/dice.h"
 #include "tests/support/property_cases.h"
 

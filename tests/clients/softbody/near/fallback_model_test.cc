@@ -11,16 +11,17 @@
 
 #include "clients/softbody/touch/contact.h"
 #include "protocol/limits.h"
-#include "tests/clients/softbody/elsewhere.h"
+#include "tests/clients/softbody/drawn_answers.h"
 #include "tests/clients/softbody/near/pressed_before.h"
 #include "tests/clients/softbody/pressed_block.h"
-#include "tests/clients/softbody/same_answer.h"
+#include "tests/clients/softbody/touch/ways.h"
 
 namespace tendon::softbody::fallback_model_test {
 namespace {
 
 using testing::AskedAndExact;
 using testing::Elsewhere;
+using testing::expect_right;
 using testing::kB1PatchRadius;
 using testing::pressed_block;
 using testing::PressedBefore;
@@ -37,32 +38,6 @@ std::unique_ptr<FallbackModel> fallbacks_with(const PressedBefore& block, bool t
 
 Reaction press(const PressedBefore& block, Model& model, const Vec2& place, double depth) {
   return model.press(*block.top.patch_with_curvatures(place), Prescribed::kLeastDepth, depth);
-}
-
-struct ClosedWay {
-  double work = 0;
-  double given = 0;  ///< largest amount given by the hand
-};
-
-/// Moves from corner to corner in steps of at most `step` (m). Calls `answered` after each answer.
-template <class Answered>
-ClosedWay go_around(PatchContact& contact, const std::vector<Vec3>& corners, double step, const Answered& answered) {
-  ClosedWay way;
-  Vec3 last = corners.front();
-  Vec3 force = contact.at(last).force;
-  for (std::size_t k = 1; k < corners.size(); ++k) {
-    const int steps = static_cast<int>(std::ceil((corners[k] - corners[k - 1]).norm() / step));
-    for (int i = 1; i <= steps; ++i) {
-      const Vec3 there = corners[k - 1] + (corners[k] - corners[k - 1]) * i / steps;
-      const Vec3 next = contact.at(there).force;
-      answered();
-      way.work += (force + next).dot(there - last) / 2;
-      way.given = std::max(way.given, -way.work);
-      last = there;
-      force = next;
-    }
-  }
-  return way;
 }
 
 /// A level that knows the whole body within 15 mm of the center and 4 mm of depth, and fades out like a grid. It can
@@ -106,9 +81,6 @@ struct KnownBlock : AskedAndExact {
   Reaction press(const Vec2& place, double depth) {
     return fallbacks->press(*top.patch_with_curvatures(place), Prescribed::kLeastDepth, depth);
   }
-  double truth(const Vec2& place, double depth) {
-    return exact.press(*top.patch(place), Prescribed::kDepth, depth).force;
-  }
   std::unique_ptr<FallbackModel> fallbacks;
   NearModel* near = nullptr;
 };
@@ -150,8 +122,7 @@ TEST(Levels, WhereAnotherLevelTakesOverNothingJumps) {
       const Vec2 place(1e-4 * i, 5e-5 * i);
       const Reaction found = press(block, *fallbacks, place, 4e-3);
       const double truth = block.truth(place, 4e-3);
-      EXPECT_NEAR(found.force, truth, 0.02 * truth) << i;
-      EXPECT_GE(found.error, std::abs(found.force - truth)) << i;
+      expect_right(found, truth, 0.02, i);
       if (i > 0) {
         EXPECT_NEAR(found.force, last, 3e-3 * truth) << i;
       }
@@ -159,10 +130,7 @@ TEST(Levels, WhereAnotherLevelTakesOverNothingJumps) {
     }
     for (int i = 0; i <= 60; ++i) {
       const double depth = 3e-3 + 1e-4 * i;
-      const double truth = block.truth(Vec2::Zero(), depth);
-      const Reaction found = press(block, *fallbacks, Vec2::Zero(), depth);
-      EXPECT_NEAR(found.force, truth, 0.02 * truth) << i;
-      EXPECT_GE(found.error, std::abs(found.force - truth)) << i;
+      expect_right(press(block, *fallbacks, Vec2::Zero(), depth), block.truth(Vec2::Zero(), depth), 0.02, i);
     }
     const int answers = fallbacks->steps()[0].answers;
     EXPECT_GT(answers, 50);
@@ -198,59 +166,10 @@ TEST(Levels, TheStiffnessSentIsTheForcesOwnSlope) {
       for (const Vec3& tool :
            {Vec3(0.003, 0.0021, 0.0452), Vec3(-0.0017, 0.0003, 0.0473), Vec3(0.004, -0.004, 0.0465)}) {
         const Mat3 given = contact.at(tool).stiffness;
-        Mat3 measured;
-        constexpr double kStep = 2e-5;
-        for (int c = 0; c < 3; ++c) {
-          const Vec3 step = kStep * Vec3::Unit(c);
-          measured.col(c) = -(contact.at(tool + step).force - contact.at(tool - step).force) / (2 * kStep);
-        }
+        const Mat3 measured = testing::force_slope(tool, 2e-5, [&](const Vec3& at) { return contact.at(at); });
         EXPECT_LT((given - measured).norm(), 0.01 * given.norm()) << tabulated << '\n' << given - measured;
         EXPECT_LT((given - given.transpose()).norm(), 1e-9 * given.norm());
       }
-    }
-  }
-}
-
-TEST(Levels, ClosedWaysAcrossLevelsGiveNoMoreThanAHundredthOfWhatTheyTook) {
-  for (const Law law : kBothLaws) {
-    PressedBefore& block = small_block(law);
-    const auto fallbacks = fallbacks_with(block, true, 0.02);
-    PatchContact contact(*fallbacks, block.top, 0, PatchContact::Side::kUnilateral);
-    for (const double aside : {0.0, 0.004}) {
-      for (const bool back : {false, true}) {
-        std::vector<Vec3> corners{Vec3(0, 0, 0.0505),          Vec3(0, 0, 0.046),  Vec3(0.012, aside, 0.0455),
-                                  Vec3(0.012, -aside, 0.0475), Vec3(0, 0, 0.0475), Vec3(-0.003, 0.009, 0.0425),
-                                  Vec3(0, 0, 0.0505)};
-        if (back) std::ranges::reverse(corners);
-        const ClosedWay way = go_around(contact, corners, 1e-4, [] {});
-        EXPECT_LT(way.work, 0.01 * way.given) << aside << back;
-        EXPECT_GT(way.given, 1e-3);
-      }
-    }
-    EXPECT_GT(fallbacks->steps()[0].answers, 100);
-  }
-}
-
-TEST(Levels, ClosedWaysOnWhichFieldsTakeOverUnderALevelGiveNoMoreEither) {
-  for (const Law law : kBothLaws) {
-    for (const bool beside : {false, true}) {
-      KnownBlock block(law);
-      Elsewhere thread;
-      if (beside) block.near->make_fields_by(thread.background());
-      PatchContact contact(*block.fallbacks, block.top, 0, PatchContact::Side::kUnilateral);
-      const std::vector<Vec3> corners{Vec3(0, 0, 0.0505),         Vec3(0, 0, 0.047),  Vec3(0.019, 0.004, 0.0465),
-                                      Vec3(0.021, 0, 0.0478),     Vec3(0, 0, 0.0478), Vec3(-0.004, 0.01, 0.0475),
-                                      Vec3(-0.004, 0.01, 0.0455), Vec3(0, 0, 0.0505)};
-      int answers = 0;
-      const ClosedWay way = go_around(contact, corners, 2e-4, [&] {
-        if (++answers % 10 == 0) thread.work();
-      });
-      EXPECT_LT(way.work, 0.01 * way.given) << beside;
-      EXPECT_GT(way.given, 1e-3);
-      EXPECT_GE(block.near->size().made, 3) << beside;
-      EXPECT_EQ(block.near->size().linear, 0);
-      const int by_level = block.fallbacks->steps()[0].answers;
-      EXPECT_GT(by_level, 100);
     }
   }
 }
@@ -364,9 +283,7 @@ TEST(Levels, WhereNoFieldIsThereYetTheLinearBodyGoesOnFromTheForceOfTheLevel) {
   block.near->make_fields_by(thread.background());
   const auto press = [&](const Vec2& place, double depth) {
     const double truth = block.truth(place, depth);
-    const Reaction found = block.press(place, depth);
-    EXPECT_NEAR(found.force, truth, 0.02 * truth) << place.transpose() << ' ' << depth;
-    EXPECT_GE(found.error, std::abs(found.force - truth)) << place.transpose() << ' ' << depth;
+    expect_right(block.press(place, depth), truth, 0.02, place.transpose(), depth);
   };
   for (int i = 0; i < 110; ++i) press(Vec2(2e-4 * i, 0), 1e-3);
   EXPECT_GE(block.near->size().linear, 30);
@@ -382,10 +299,7 @@ TEST(Levels, WithoutAnotherThreadTheSameWayHasTheSameAnswersBitByBit) {
   for (int i = 0; i < 100; ++i) {
     const Vec2 place(2.5e-4 * i, 1e-4 * i);
     const Reaction expected = one.press(place, 3e-3);
-    const Reaction found = other.press(place, 3e-3);
-    EXPECT_EQ(found.force, expected.force) << i;
-    EXPECT_EQ(found.stiffness, expected.stiffness) << i;
-    EXPECT_EQ(found.error, expected.error) << i;
+    testing::expect_same_bits(other.press(place, 3e-3), expected, i);
   }
   EXPECT_GE(one.near->size().made, 3);
 }
@@ -474,9 +388,8 @@ TEST(Levels, EachWayHasANameThatTheWireTakes) {
 TEST(Levels, ABodyThatListsNothingHasNoFallbacks) {
   BodyConfig config = testing::pressed_body(ModelKind::kNear, Element::kHex8Sri, 6);
   EXPECT_TRUE(Body(config).fallbacks().empty());
-  config.near.learn = true;
+  config.model = NearConfig{.newton = {.tolerance = 0.02}, .learn = true};
   config.reach = 0.005;
-  config.tolerance = 0.02;
   const Body learned(config);
   ASSERT_EQ(learned.fallbacks().size(), 1U);
   EXPECT_EQ(learned.fallbacks()[0].size.name, "learned");
@@ -485,16 +398,12 @@ TEST(Levels, ABodyThatListsNothingHasNoFallbacks) {
 
 TEST(Levels, WhatCannotBeLearnedIsRefused) {
   BodyConfig config = testing::pressed_body(ModelKind::kNear, Element::kHex8Sri, 6);
-  config.near.tabulate = true;
+  config.model = NearConfig{.tabulate = true};
   EXPECT_THROW(Body{config}, std::invalid_argument);
   config.reach = 0.031;
   EXPECT_THROW(Body{config}, std::invalid_argument);
   config.reach = 0.005;
   config.middle = Vec3(0.2, 0, 0);
-  EXPECT_THROW(Body{config}, std::invalid_argument);
-  config = testing::pressed_body(ModelKind::kNeoHookean, Element::kHex8Sri, 6);
-  config.near.learn = true;
-  config.reach = 0.005;
   EXPECT_THROW(Body{config}, std::invalid_argument);
 }
 

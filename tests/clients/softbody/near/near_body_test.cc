@@ -24,12 +24,8 @@ struct AtRest {
   AtRest(int n, double poisson, Law law)
       : solid(pressed_block(Element::kHex8Sri, n, poisson, law)),
         top(solid.mesh(), Vec3::UnitZ(), kB1PatchRadius),
-        stiffness(solid.pattern()),
-        factor(stiffness),
-        load(patch_load(solid, Vec3::UnitZ(), *top.patch(Vec2::Zero()))) {
-    solid.stiffness(VectorXd::Zero(solid.size()), Elastic::Curvature::kExact, stiffness);
-    if (!factor.factorize(stiffness)) throw std::runtime_error("not held");
-  }
+        factor(factor_of(solid.exact_stiffness(VectorXd::Zero(solid.size())))),
+        load(patch_load(solid, Vec3::UnitZ(), *top.patch(Vec2::Zero()))) {}
   std::unique_ptr<NearBody> near(double radius, int modes = NearBody::Config{}.modes,
                                  const std::vector<int>& pressed = {}) const {
     return made({Vec3(0, 0, 0.05), radius, modes, pressed, solid.to_free(load)}, factor);
@@ -42,7 +38,6 @@ struct AtRest {
   }
   Solid solid;
   TouchSurface top;
-  SymmetricMatrix stiffness;
   Factor factor;
   VectorXd load;
 };
@@ -87,8 +82,7 @@ TEST(NearBody, ForcesAreTheSlopeOfTheEnergyAndTheStiffnessThatOfTheForces) {
     const int inner = body->free_count() - body->modes();
     for (int i = 0; i < body->free_count(); ++i) way[i] = (i < inner ? 1e-3 : 3e-3) * std::sin(3.0 * i);
     body->add_free(way, u);
-    SymmetricMatrix stiffness = body->pattern();
-    body->stiffness(u, Elastic::Curvature::kExact, stiffness);
+    const SymmetricMatrix stiffness = body->exact_stiffness(u);
     const double h = 1e-7;
     for (int i = 0; i < body->free_count(); i += 7) {
       VectorXd low = u;
@@ -109,12 +103,8 @@ TEST(NearBody, WithItsExactInterfaceItIsTheWholeBodyAtFirstTouch) {
   const double whole = block.solid.to_free(block.load).dot(block.factor.solve(block.solid.to_free(block.load)).col(0));
   const auto compliance = [&](int modes) {
     const auto body = block.near(0.045, modes);
-    SymmetricMatrix stiffness = body->pattern();
-    body->stiffness(VectorXd::Zero(body->size()), Elastic::Curvature::kExact, stiffness);
-    Factor factor(stiffness);
-    EXPECT_TRUE(factor.factorize(stiffness));
     const VectorXd load = own_load(*body, block.load);
-    return load.dot(factor.solve(load).col(0));
+    return load.dot(factor_of(body->exact_stiffness(VectorXd::Zero(body->size()))).solve(load).col(0));
   };
   EXPECT_NEAR(compliance(100'000) / whole, 1, 1e-7);
   EXPECT_LT(compliance(60), whole);
@@ -129,10 +119,7 @@ TEST(NearBody, AboutAPressedShapeItBeginsThereAtRestAsStiffAsTheWholeBody) {
     const VectorXd load = own_load(body, exact.load);
     const VectorXd left = body.to_free(body.forces(body.beginning()).force) - exact.force * load;
     EXPECT_LT(left.norm(), 1e-8 * exact.force);
-    SymmetricMatrix stiffness = body.pattern();
-    body.stiffness(body.beginning(), Elastic::Curvature::kExact, stiffness);
-    Factor factor(stiffness);
-    ASSERT_TRUE(factor.factorize(stiffness));
+    const Factor factor = factor_of(body.exact_stiffness(body.beginning()));
     const VectorXd whole_load = exact.solid.to_free(exact.load);
     const double whole = whole_load.dot(exact.whole.factor().solve(whole_load).col(0));
     EXPECT_NEAR(load.dot(factor.solve(load).col(0)) / whole, 1, 1e-7);

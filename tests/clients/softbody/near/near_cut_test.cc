@@ -17,7 +17,6 @@
 #include "clients/softbody/effects/cutting.h"
 #include "clients/softbody/near/near_model.h"
 #include "tests/clients/softbody/drawn_answers.h"
-#include "tests/clients/softbody/elsewhere.h"
 #include "tests/clients/softbody/pressed_block.h"
 
 namespace tendon::softbody::near_cut_test {
@@ -36,8 +35,7 @@ Cut slit(double x, double depth) { return {Vec3(x, -0.06, 0.05 - depth), Vec3(0,
 
 BodyConfig cut_body(Law law, const std::vector<Cut>& cuts) {
   BodyConfig config = pressed_body(ModelKind::kNear, Element::kHex8Sri, 8);
-  config.near.law = law;
-  config.tolerance = 5e-3;
+  config.model = NearConfig{.newton = {.tolerance = 5e-3}, .law = law};
   double at = 0;
   for (const Cut& cut : cuts) config.cuts.push_back({cut, PlannedCut::When::kTime, ++at});
   return config;
@@ -243,10 +241,10 @@ TEST(NearCut, ABodyThatIsAllNearIsCutAsTheWholeModel) {
   BodyConfig config = cut_body(Law::kNeoHookean, {slit(0, 0.0125)});
   config.shape = BlockShape{Vec3(0.04, 0.04, 0.02), {4, 4, 2}};
   config.cuts[0].cut = {Vec3(0, -0.03, 0.01), Vec3(0, 0.06, 0), Vec3(0, 0, 0.02)};
-  config.tolerance = 1e-9;
-  config.max_iterations = 100;
+  const Newton exact{.max_iterations = 100, .tolerance = 1e-9};
+  *newton_of(config.model) = exact;
   BodyConfig whole = config;
-  whole.model = ModelKind::kNeoHookean;
+  whole.model = NeoHookeanConfig{.newton = exact};
   const Vec3 tool(0.001, 0, 0.018);
   for (const bool beside : {false, true}) {
     Body near(config);
@@ -271,11 +269,11 @@ TEST(NearCut, ABodyThatIsAllNearIsCutAsTheWholeModel) {
 TEST(NearCut, WhatWasLearnedOfTheUncutBodyAnswersNoCutOne) {
   BodyConfig config = cut_body(Law::kNeoHookean, {slit(0, 0.025)});
   config.shape = BlockShape{Vec3(0.1, 0.1, 0.05), {6, 6, 3}};
-  config.near.learn = true;
-  config.near.tabulate = true;
+  NearConfig near{.newton = {.tolerance = 0.02}, .law = Law::kNeoHookean, .learn = true, .tabulate = true};
+  config.model = near;
   config.reach = 0.005;
-  config.tolerance = 0.02;
-  config.near.learned = learn(config, {});
+  near.learned = learn(config, {});
+  config.model = near;
   const Solid solid = with_cuts(pressed_block(Element::kHex8Sri, 6, 0.45, Law::kNeoHookean), {config.cuts.front().cut});
   AskedAndExact truth(solid);
   const Vec3 tool(0.001, 0.001, 0.047);
@@ -316,10 +314,7 @@ class CutMeanwhile : public Model {
   Reaction press(const Patch& patch, Prescribed given, double value) override {
     Reaction reaction;
     if (answers_ < at_) {
-      Vec3 place = Vec3::Zero();
-      for (Eigen::Index i = 0; i < patch.weights.size(); ++i)
-        place += patch.weights[i] * cut_.solid.mesh().nodes[at(patch.nodes[static_cast<std::size_t>(i)])];
-      reaction = before_.press(*top_.patch(top_.across(place)), given, value);
+      reaction = before_.press(*top_.patch(top_.across(place_of(cut_.solid.mesh(), patch))), given, value);
       reaction.error = std::max(reaction.error, std::abs(reaction.force));
     } else {
       if (answers_ == at_) after_->go_on_from(before_, {});

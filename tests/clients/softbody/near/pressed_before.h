@@ -31,9 +31,6 @@ struct PressedBefore : AskedAndExact {
   std::unique_ptr<FallbackLevel> tabulated(double tolerance) const {
     return std::make_unique<TabulatedLevel>(answers, tolerance);
   }
-  double truth(const Vec2& place, double depth) {
-    return exact.press(*top.patch(place), Prescribed::kDepth, depth).force;
-  }
 
   SolvedPresses presses;
   LearnedShapes shapes;

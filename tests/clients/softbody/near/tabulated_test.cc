@@ -80,37 +80,6 @@ TEST(TabulatedAnswers, PressesBetweenAreWithinTheErrorSaidAndTwoPercent) {
   }
 }
 
-/// On closed paths through many cells, a contact returns all energy, up to the error of the numerical integration.
-TEST(TabulatedAnswers, AClosedWayGivesNothing) {
-  PressedBefore& block = small_block(Law::kNeoHookean);
-  std::vector<std::unique_ptr<FallbackLevel>> levels;
-  levels.push_back(block.tabulated(0.1));
-  FallbackModel fallbacks(std::move(levels), block.near(0.02));
-  PatchContact contact(fallbacks, block.top, 0, PatchContact::Side::kUnilateral);
-  constexpr int kSteps = 2000;
-  for (const double tilt : {0.0, 0.7}) {
-    double work = 0;
-    double most = 0;
-    const auto at = [&](int i) {
-      const double turn = 2 * M_PI * i / kSteps;
-      return Vec3(0.004 * std::cos(turn), 0.003 * std::sin(turn),
-                  0.047 + 0.0015 * std::sin(turn + tilt) + 0.0005 * std::cos(3 * turn));
-    };
-    Vec3 last = at(0);
-    Vec3 force = contact.at(last).force;
-    for (int i = 1; i <= kSteps; ++i) {
-      const Vec3 there = at(i);
-      const Vec3 next = contact.at(there).force;
-      work += (force + next).dot(there - last) / 2;
-      most = std::max(most, std::abs(work));
-      last = there;
-      force = next;
-    }
-    EXPECT_LT(std::abs(work), 1e-5 * most);
-  }
-  EXPECT_EQ(fallbacks.steps().front().answers, 2 * (kSteps + 1));
-}
-
 TEST(TabulatedAnswers, AKnotThatWasNotSolvedIsNotTabulated) {
   PressedBefore& block = small_block(Law::kNeoHookean);
   SolvedPresses presses = block.presses;

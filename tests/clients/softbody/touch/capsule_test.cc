@@ -14,6 +14,7 @@
 #include "clients/softbody/models/linear.h"
 #include "clients/softbody/touch/sphere.h"
 #include "tests/clients/softbody/touch/contact_integral.h"
+#include "tests/clients/softbody/touch/ways.h"
 
 namespace tendon::softbody::capsule_test {
 namespace {
@@ -115,36 +116,21 @@ TEST(Capsule, AMirroredPressGivesTheMirroredForceAndTorque) {
 }
 
 TEST(Capsule, AClosedWayOfPlacesAndTurnsGivesBackExactlyWhatItTook) {
-  const auto turn = [](double t) {
-    const double angle = 2 * std::numbers::pi * t;
-    return (Eigen::AngleAxisd(0.1 * std::sin(angle), Vec3::UnitZ()) *
-            Eigen::AngleAxisd(-0.3 - 0.05 * std::cos(angle), Vec3::UnitY()))
-        .toRotationMatrix();
-  };
   const auto handle = [](double t) {
     const double angle = 2 * std::numbers::pi * t;
-    return Vec3(0.002 * std::cos(angle) - 0.023, 0.002 * std::sin(angle), 0.0986 + 0.0005 * std::sin(2 * angle));
+    return Pose{.position = Vec3(0.002 * std::cos(angle) - 0.023, 0.002 * std::sin(angle),
+                                 0.0986 + 0.0005 * std::sin(2 * angle)),
+                .turn = (Eigen::AngleAxisd(0.1 * std::sin(angle), Vec3::UnitZ()) *
+                         Eigen::AngleAxisd(-0.3 - 0.05 * std::cos(angle), Vec3::UnitY()))
+                            .toRotationMatrix()};
   };
   const Vec3 to_middle(0.02, 0, -0.045);  // m, handle frame
-  double work = 0;
-  double most = 0;
-  double turning = 0;
-  constexpr int kSteps = 400;
-  for (int i = 0; i < kSteps; ++i) {
-    const double from = static_cast<double>(i) / kSteps;
-    const double to = (i + 1.0) / kSteps;
-    const Mat3 mid = turn((from + to) / 2);
-    const Vec3 about = handle((from + to) / 2);
-    const Feel feel = coarse().capsule.at(about + mid * to_middle, mid * Vec3::UnitX(), about);
-    const Eigen::AngleAxisd turned(Mat3(turn(to) * turn(from).transpose()));
-    const double by_turning = feel.torque->torque.dot(turned.angle() * turned.axis());
-    work -= feel.force.dot(handle(to) - handle(from)) + by_turning;
-    turning += by_turning;
-    most = std::max(most, std::abs(work));
-  }
-  EXPECT_GT(most, 1e-4);
-  EXPECT_GT(std::abs(turning), 0.05 * most);
-  EXPECT_LT(std::abs(work), 2e-3 * most);
+  const testing::ClosedWay way = testing::closed_way(handle, 400, [&](const Pose& at) {
+    return coarse().capsule.at(at.position + at.turn * to_middle, at.turn * Vec3::UnitX(), at.position);
+  });
+  EXPECT_GT(way.most, 1e-4);
+  EXPECT_GT(way.turning, 0.05 * way.most);
+  EXPECT_LT(std::abs(way.work), 2e-3 * way.most);
 }
 
 /// −∂force/∂position and −∂torque/∂θ about `about`.

@@ -100,8 +100,7 @@ class ContactIntegral {
         }
       }
     }
-    stiffness_ = solid_.pattern();
-    solid_.stiffness(VectorXd::Zero(solid_.size()), Solid::Curvature::kExact, stiffness_);
+    stiffness_ = solid_.exact_stiffness(VectorXd::Zero(solid_.size()));
   }
 
   Sum press(const Tool& tool, const Vec3& about) const {

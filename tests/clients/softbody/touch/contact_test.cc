@@ -14,11 +14,13 @@
 #include "clients/softbody/models/linear.h"
 #include "clients/softbody/scene.h"
 #include "tests/clients/softbody/pressed_block.h"
+#include "tests/clients/softbody/touch/ways.h"
 #include "tests/support/dice.h"
 
 namespace tendon::softbody::contact_test {
 namespace {
 
+using testing::force_slope;
 using testing::kB1PatchRadius;
 using testing::pressed_block;
 
@@ -60,25 +62,16 @@ TEST_F(Contacts, OnlyABilateralToolPullsAndOnlyOnceItHasTouched) {
   EXPECT_EQ(loose.at(Vec3(0, 0, 0.052)).force, Vec3::Zero());
 }
 
-/// Work of the hand on a closed path by the midpoint rule, J.
-double work_around(PatchContact& contact, int steps) {
-  const auto place = [](double turn) {
-    const double angle = 2 * std::numbers::pi * turn;
-    return Vec3(0.02 + 0.012 * std::cos(angle), -0.015 + 0.012 * std::sin(angle), 0.048 + 0.0015 * std::sin(2 * angle));
-  };
-  double work = 0;
-  for (int i = 0; i < steps; ++i) {
-    const Vec3 from = place(static_cast<double>(i) / steps);
-    const Vec3 to = place((i + 1.0) / steps);
-    work -= contact.at(0.5 * (from + to)).force.dot(to - from);
-  }
-  return work;
-}
-
 TEST_F(Contacts, AClosedWayThroughTheBodyGivesBackExactlyWhatItTook) {
   PatchContact contact(model_, top_, 0, PatchContact::Side::kUnilateral);
+  const auto place = [](double turn) {
+    const double angle = 2 * std::numbers::pi * turn;
+    return Pose{.position = Vec3(0.02 + 0.012 * std::cos(angle), -0.015 + 0.012 * std::sin(angle),
+                                 0.048 + 0.0015 * std::sin(2 * angle))};
+  };
+  const auto felt = [&](const Pose& tool) { return contact.at(tool.position); };
   // About 5 mJ are exchanged. Without the tangential force, 0.1 mJ would remain.
-  EXPECT_LT(std::abs(work_around(contact, 2000)), 2e-8);
+  EXPECT_LT(std::abs(testing::closed_way(place, 2000, felt).work), 2e-8);
 }
 
 TEST_F(Contacts, StiffnessIsTheForcesOwnSlopeAlongTheNormal) {
@@ -92,26 +85,12 @@ TEST_F(Contacts, StiffnessIsTheForcesOwnSlopeAlongTheNormal) {
         -(contact.at(tool + h * Vec3::UnitZ()).force - contact.at(tool - h * Vec3::UnitZ()).force) / (2 * h);
     EXPECT_LT((slope - k.col(2)).norm(), 1e-4 * k.norm());
     EXPECT_LT((k - k.transpose()).norm(), 1e-9);
-    Mat3 measured;
-    for (int c = 0; c < 3; ++c) {
-      measured.col(c) =
-          -(contact.at(tool + 1e-5 * Vec3::Unit(c)).force - contact.at(tool - 1e-5 * Vec3::Unit(c)).force) / 2e-5;
-    }
+    const Mat3 measured = force_slope(tool, 1e-5, [&](const Vec3& there) { return contact.at(there); });
     EXPECT_LT((k - measured).norm(), 0.05 * k.norm());  // the neglected part is ∂²/∂c²
   }
 }
 
-/// −∂force/∂position by central differences.
-template <class Touched>
-Mat3 by_differences(Touched& touched, const Vec3& tool) {
-  constexpr double kStep = 2e-5;
-  Mat3 all;
-  for (int c = 0; c < 3; ++c) {
-    const Vec3 step = kStep * Vec3::Unit(c);
-    all.col(c) = -(touched(tool + step).force - touched(tool - step).force) / (2 * kStep);
-  }
-  return all;
-}
+constexpr double kStep = 2e-5;  // m
 
 TEST(ExactStiffness, OfABodyThatBendsAndStretchesIsTheForcesOwnSlope) {
   for (const Law law : {Law::kNeoHookean, Law::kCorotational, Law::kStVenantKirchhoff}) {
@@ -124,7 +103,7 @@ TEST(ExactStiffness, OfABodyThatBendsAndStretchesIsTheForcesOwnSlope) {
       for (double depth = 1e-3; depth < 0.05 - tool.z(); depth += 1e-3)
         contact.at(Vec3(tool.x(), tool.y(), 0.05 - depth));
       const Mat3 given = contact.at(tool).stiffness;
-      EXPECT_LT((given - by_differences(touched, tool)).norm(), 0.01 * given.norm())
+      EXPECT_LT((given - force_slope(tool, kStep, touched)).norm(), 0.01 * given.norm())
           << static_cast<int>(law) << ' ' << tool.transpose();
       EXPECT_LT((given - given.transpose()).norm(), 1e-9 * given.norm());
     }
@@ -133,8 +112,7 @@ TEST(ExactStiffness, OfABodyThatBendsAndStretchesIsTheForcesOwnSlope) {
 
 TEST(ExactStiffness, OfTheLiverIsRightToTwoNewtonsAMetreAlsoBelowZero) {
   BodyConfig config = read_scene(TENDON_SCENES "/liver.toml").body;
-  config.tolerance = 1e-9;
-  config.max_iterations = 100;
+  *newton_of(config.model) = {.max_iterations = 100, .tolerance = 1e-9};
   Body body(config);
   const auto touched = [&](const Vec3& tool) { return body.touch(tool); };
   double lowest = 0;
@@ -143,7 +121,7 @@ TEST(ExactStiffness, OfTheLiverIsRightToTwoNewtonsAMetreAlsoBelowZero) {
     for (double depth = 5e-4; depth < 3e-3; depth += 5e-4) body.touch(above - depth * Vec3::UnitZ());
     const Vec3 tool = above - 3e-3 * Vec3::UnitZ();
     const Mat3 given = body.touch(tool).stiffness;
-    EXPECT_LT((given - by_differences(touched, tool)).cwiseAbs().maxCoeff(), 2) << given;
+    EXPECT_LT((given - force_slope(tool, kStep, touched)).cwiseAbs().maxCoeff(), 2) << given;
     lowest = std::min(lowest, Eigen::SelfAdjointEigenSolver<Mat3>(given).eigenvalues()[0]);
   }
   EXPECT_LT(lowest, -20);  // N/m: the patch tends to slip away
@@ -151,19 +129,16 @@ TEST(ExactStiffness, OfTheLiverIsRightToTwoNewtonsAMetreAlsoBelowZero) {
 
 std::vector<BodyConfig> linear_ones(BodyConfig config) {
   std::vector<BodyConfig> all;
-  config.max_iterations = 100;
-  config.tolerance = 1e-9;
-  for (const ModelKind kind : {ModelKind::kLinear, ModelKind::kCondensed}) {
-    config.model = kind;
+  for (const ModelKind kind : {ModelKind::kCondensed, ModelKind::kLinear}) {
+    config.model = model_config(kind);
     all.push_back(config);
   }
-  config.model = ModelKind::kLinear;
   config.effects = {.density = 1000, .gravity = Vec3(0.5, 0, -1)};
   all.push_back(config);
   config.effects = {};
-  config.plasticity = Yield{.stress = 1e5, .hardening = 1e4};
+  config.model = LinearConfig{.plasticity = Yield{.stress = 1e5, .hardening = 1e4}, .newton = {100, 1e-9}};
   all.push_back(config);
-  config.plasticity.reset();
+  config.model = LinearConfig{};
   config.stiffening = StiffnessOverTime{.at = {0}, .factor = {3}};
   all.push_back(config);
   return all;
@@ -176,7 +151,7 @@ void expect_slope_of_its_force(const BodyConfig& config, const Vec2& aside, doub
   const Vec3 above = body.touch_point() + Vec3(aside.x(), aside.y(), 0);
   body.touch(above + Vec3(1e-3, 1e-3, -depth));  // the state from another place must be ignored
   const Mat3 given = body.touch(above - depth * Vec3::UnitZ()).stiffness;
-  EXPECT_LT((given - by_differences(touched, above - depth * Vec3::UnitZ())).norm(), share * given.norm())
+  EXPECT_LT((given - force_slope(above - depth * Vec3::UnitZ(), kStep, touched)).norm(), share * given.norm())
       << info(config.model).name << '\n'
       << given;
 }

@@ -10,6 +10,7 @@
 
 #include "clients/softbody/touch/rigid_contact.h"
 #include "tests/clients/softbody/pressed_block.h"
+#include "tests/clients/softbody/touch/ways.h"
 
 namespace tendon::softbody::testing {
 
@@ -68,30 +69,21 @@ inline Vec3 support(const PressedByTools& pressed) {
   return sum;
 }
 
-struct ClosedWay {
-  double work = 0;     ///< total work of the hand on the body
-  double most = 0;     ///< largest intermediate value
-  double turning = 0;  ///< sum of the absolute values for rotations
+struct RubbedWay : ClosedWay {
   double lost = 0;
   double least = 0;  ///< smallest loss of a friction point in one answer
 };
-/// `handle` maps [0, 1] to poses. Each answer is at the middle of its step.
-template <class Way>
-ClosedWay closed_way(PressedByTools& pressed, const Way& handle, int steps) {
-  ClosedWay sum;
-  for (int i = 0; i < steps; ++i) {
-    const Pose from = handle(static_cast<double>(i) / steps);
-    const Pose to = handle((i + 1.0) / steps);
-    const Feel feel = pressed.at(handle((i + 0.5) / steps));
-    const Eigen::AngleAxisd turned(Mat3(to.turn * from.turn.transpose()));
-    const double by_turning = feel.torque->torque.dot(turned.angle() * turned.axis());
-    sum.work -= feel.force.dot(to.position - from.position) + by_turning;
-    sum.turning += std::abs(by_turning);
-    sum.most = std::max(sum.most, std::abs(sum.work));
-    sum.lost += pressed.contact.dissipated().sum;
-    sum.least = std::min(sum.least, pressed.contact.dissipated().least);
-  }
-  return sum;
+template <class Handle>
+RubbedWay closed_way(PressedByTools& pressed, const Handle& handle, int steps) {
+  double lost = 0;
+  double least = 0;
+  const ClosedWay way = closed_way(handle, steps, [&](const Pose& pose) {
+    Feel feel = pressed.at(pose);
+    lost += pressed.contact.dissipated().sum;
+    least = std::min(least, pressed.contact.dissipated().least);
+    return feel;
+  });
+  return {way, lost, least};
 }
 
 }  // namespace tendon::softbody::testing

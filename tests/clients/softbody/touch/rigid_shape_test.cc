@@ -175,13 +175,12 @@ std::string refusal_of(const Triangles& surface, double cell) {
 TEST(RigidShape, AMeshWithoutInsideOrTooThinForItsGridIsRefusedByItsPlace) {
   Triangles open = testing::ball(10, 12);
   open.facets.erase(open.facets.begin() + 20);
-  EXPECT_NE(refusal_of(open, 0.001).find("tool.stl: facet "), std::string::npos) << refusal_of(open, 0.001);
-  EXPECT_NE(refusal_of(open, 0.001).find("the surface is not closed"), std::string::npos);
-  EXPECT_NE(refusal_of(testing::turned_inside_out(testing::ball(10, 12)), 0.001).find("inside out"), std::string::npos);
+  EXPECT_PRED2(says, refusal_of(open, 0.001), "tool.stl: facet ");
+  EXPECT_PRED2(says, refusal_of(open, 0.001), "the surface is not closed");
+  EXPECT_PRED2(says, refusal_of(testing::turned_inside_out(testing::ball(10, 12)), 0.001), "inside out");
   const std::string nested = refusal_of(testing::together(testing::ball(10, 12), testing::ball(4, 12)), 0.001);
-  EXPECT_NE(nested.find("tool.stl: the closed part of 120 facets that starts with facet 121 at "), std::string::npos)
-      << nested;
-  EXPECT_NE(nested.find("is inside the one that starts with facet 1 at "), std::string::npos) << nested;
+  EXPECT_PRED2(says, nested, "tool.stl: the closed part of 120 facets that starts with facet 121 at ");
+  EXPECT_PRED2(says, nested, "is inside the one that starts with facet 1 at ");
   const Triangles hollow =
       testing::together(testing::ball(10, 12), testing::turned_inside_out(testing::ball(4, 12)));  // mm
   EXPECT_EQ(refusal_of(hollow, 0.001), "");
@@ -190,9 +189,8 @@ TEST(RigidShape, AMeshWithoutInsideOrTooThinForItsGridIsRefusedByItsPlace) {
   const Triangles plate = testing::box_surface(Vec3(30, 30, 1.9));  // mm
   EXPECT_EQ(refusal_of(plate, 0.0009), "");
   const std::string thin = refusal_of(plate, 0.001);
-  EXPECT_NE(thin.find("tool.stl: facet 1 at (-5, 5, -0.95) mm: the surface is thinner than "), std::string::npos)
-      << thin;
-  EXPECT_NE(refusal_of(plate, 1e-6).find("grid points, expected at most"), std::string::npos);
+  EXPECT_PRED2(says, thin, "tool.stl: facet 1 at (-5, 5, -0.95) mm: the surface is thinner than ");
+  EXPECT_PRED2(says, refusal_of(plate, 1e-6), "grid points, expected at most");
 }
 
 TEST(RigidShape, RefusesWhatIsNoShape) {

@@ -14,6 +14,7 @@
 #include "tests/clients/softbody/pressed_block.h"
 #include "tests/clients/softbody/scene_text.h"
 #include "tests/clients/softbody/touch/half_space.h"
+#include "tests/clients/softbody/touch/ways.h"
 #include "tests/support/refusal.h"
 
 namespace tendon::softbody::sphere_test {
@@ -76,19 +77,13 @@ TEST_F(Spheres, AClosedWayThroughTheBodyGivesBackExactlyWhatItTook) {
   const auto place = [](double turn) {
     const double angle = 2 * std::numbers::pi * turn;
     // Off center, where the energy is only conserved with the tangential force.
-    return Vec3(0.018 + 0.008 * std::cos(angle), -0.012 + 0.008 * std::sin(angle), 0.067 + 0.001 * std::sin(2 * angle));
+    return Pose{.position = Vec3(0.018 + 0.008 * std::cos(angle), -0.012 + 0.008 * std::sin(angle),
+                                 0.067 + 0.001 * std::sin(2 * angle))};
   };
-  double work = 0;
-  double most = 0;
-  constexpr int kSteps = 1000;
-  for (int i = 0; i < kSteps; ++i) {
-    const Vec3 from = place(static_cast<double>(i) / kSteps);
-    const Vec3 to = place((i + 1.0) / kSteps);
-    work -= sphere_.at(0.5 * (from + to)).force.dot(to - from);
-    most = std::max(most, std::abs(work));
-  }
-  EXPECT_GT(most, 1e-4);
-  EXPECT_LT(std::abs(work), 1e-3 * most);
+  const auto felt = [&](const Pose& tool) { return sphere_.at(tool.position); };
+  const testing::ClosedWay way = testing::closed_way(place, 1000, felt);
+  EXPECT_GT(way.most, 1e-4);
+  EXPECT_LT(std::abs(way.work), 1e-3 * way.most);
 }
 
 TEST_F(Spheres, OutsideOrNowhereNothingIsFeltAndBeyondTheTableItSaysSo) {
@@ -112,7 +107,7 @@ TEST(SphereScene, ASceneChoosesItWhereItCanBe) {
   EXPECT_GT(shallow, 0);
   EXPECT_GT(deep, 1.2 * shallow);
   BodyConfig other = scene.body;
-  other.model = ModelKind::kLinear;
+  other.model = LinearConfig{};
   EXPECT_THROW(Body{other}, std::invalid_argument);
   EXPECT_THROW(parse_scene(with("patch_radius_mm = 20", "patch_radius_mm = 20\ntool = \"cube\""), "s.toml", "."),
                SceneError);
@@ -140,7 +135,7 @@ TEST(CapsuleScene, ItsKeysAreItsOwnAndItRefusesWhatItCannotDo) {
   }
   expect_refusals(config, Makes<Body>(),
                   {
-                      {"a capsule requires the model", [](auto& c) { c.model = ModelKind::kLinear; }},
+                      {"a capsule requires the model", [](auto& c) { c.model = LinearConfig{}; }},
                       {"a capsule has no friction on the model", [](auto& c) { c.friction = 0.3; }},
                       {"norm of tool_axis = 2", [](auto& c) { std::get<CapsuleTool>(c.tool).axis = Vec3(0, 0, 2); }},
                       {"radius", [](auto& c) { std::get<CapsuleTool>(c.tool).radius = 0; }},

@@ -57,7 +57,7 @@ TEST(AccuracyTruth, ChangesUnderAHardPressAsANeoHookeanSolidOfAnotherElement) {
     config.shape = softbody::BlockShape{truth().block().size, {8, 8, 4}};
     config.element = Element::kHex8Sri;
     config.material = truth().block().material;
-    config.model = model;
+    config.model = softbody::model_config(model);
     config.patch_radius = truth().block().patch_radius;
     const double load = truth().block().loads[1];
     return load / softbody::Body(config).press(softbody::Prescribed::kForce, load).depth;

@@ -30,14 +30,16 @@ BodyConfig body_of(const PressedBlock& block, const Candidate& candidate, ModelK
   config.shape = BlockShape{block.size, cells_of(block, candidate.n)};
   config.element = candidate.element;
   config.material = block.material;
-  config.model = model;
-  config.near.law = law_of(model);
+  config.model = model_config(model);
+  if (auto* near = std::get_if<NearConfig>(&config.model)) {
+    near->law = law_of(model);
+    near->learn = candidate.by == Candidate::By::kLearned;
+    near->tabulate = candidate.by == Candidate::By::kTable;
+    if (near->learns()) near->newton.tolerance = NearConfig::kErrorOfLearned;
+  }
   config.patch_radius = block.patch_radius;
   config.reach = kReach * block.patch_radius;
   config.middle = block.touch_point();
-  config.near.learn = candidate.by == Candidate::By::kLearned;
-  config.near.tabulate = candidate.by == Candidate::By::kTable;
-  if (config.near.learns()) config.tolerance = NearConfig::kErrorOfLearned;
   return config;
 }
 

@@ -33,7 +33,7 @@ Reaction pressed(AnyBody& body, double load) {
 
 class OwnEngine final : public PressedEngine {
  public:
-  explicit OwnEngine(const BodyConfig& config) : learned_(config.near.learns()), body_(config) {}
+  explicit OwnEngine(const BodyConfig& config) : learned_(learns(config)), body_(config) {}
 
   Feel touch(const Vec3& tool) override { return body_.touch(tool); }
   Reaction under(double load) override {
