@@ -16,6 +16,7 @@
 #include <limits>
 #include <map>
 #include <numbers>
+#include <span>
 #include <sstream>
 #include <stdexcept>
 #include <system_error>
@@ -24,6 +25,7 @@
 #include "clients/softbody/fem/file_text.h"
 #include "clients/softbody/fem/gmsh.h"
 #include "clients/softbody/surface/shells.h"
+#include "clients/softbody/touch/surface_distance.h"
 #include "protocol/expect.h"
 
 namespace tendon::softbody {
@@ -100,8 +102,14 @@ double scaled(const Vec3& a, const Vec3& b, const Vec3& c) {
 }
 
 /// The three neighbors of each corner, right-handed.
-constexpr std::array<std::array<int, 3>, 8> kJoined{
+constexpr std::array<std::array<int, 3>, 4> kJoinedOfTet{{{1, 2, 3}, {2, 0, 3}, {0, 1, 3}, {0, 2, 1}}};
+constexpr std::array<std::array<int, 3>, 8> kJoinedOfHex{
     {{1, 3, 4}, {2, 0, 5}, {3, 1, 6}, {0, 2, 7}, {7, 5, 0}, {4, 6, 1}, {5, 7, 2}, {6, 4, 3}}};
+
+std::span<const std::array<int, 3>> joined_of(Shape shape) {
+  if (shape == Shape::kTet4) return kJoinedOfTet;
+  return kJoinedOfHex;
+}
 
 std::string hundredths(double value) {
   std::array<char, 32> text{};
@@ -112,23 +120,12 @@ std::string hundredths(double value) {
 double quality(const Mesh& mesh, int element) {
   const auto nodes = mesh.element(element);
   const auto corner = [&](int i) -> const Vec3& { return mesh.nodes[at(nodes[at(i)])]; };
-  if (mesh.shape == Shape::kTet4) {
-    double least = std::numeric_limits<double>::infinity();
-    constexpr std::array<std::array<int, 3>, 4> kOthers{{{1, 2, 3}, {2, 0, 3}, {0, 1, 3}, {0, 2, 1}}};
-    for (int i = 0; i < 4; ++i) {
-      const auto& others = kOthers[at(i)];
-      least = std::min(
-          least, scaled(corner(others[0]) - corner(i), corner(others[1]) - corner(i), corner(others[2]) - corner(i)));
-    }
-    return std::sqrt(2.0) * least;
-  }
   double least = std::numeric_limits<double>::infinity();
-  for (int i = 0; i < 8; ++i) {
-    const auto& others = kJoined[at(i)];
-    least = std::min(
-        least, scaled(corner(others[0]) - corner(i), corner(others[1]) - corner(i), corner(others[2]) - corner(i)));
+  for (int i = 0; const auto& [a, b, c] : joined_of(mesh.shape)) {
+    least = std::min(least, scaled(corner(a) - corner(i), corner(b) - corner(i), corner(c) - corner(i)));
+    ++i;
   }
-  return least;
+  return (mesh.shape == Shape::kTet4 ? std::sqrt(2.0) : 1) * least;
 }
 
 Mesh read_made(const std::string& text) {
@@ -186,45 +183,6 @@ Mesh made_by_gmsh(const Triangles& body, const VolumeConfig& config, std::string
   return read_made(read_file(made, kMaxMeshBytes));
 }
 
-/// Ericson, Real-Time Collision Detection, 5.1.5.
-Vec3 nearest_on(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& point) {
-  const Vec3 ab = b - a;
-  const Vec3 ac = c - a;
-  const double d1 = ab.dot(point - a);
-  const double d2 = ac.dot(point - a);
-  if (d1 <= 0 && d2 <= 0) return a;
-  const double d3 = ab.dot(point - b);
-  const double d4 = ac.dot(point - b);
-  if (d3 >= 0 && d4 <= d3) return b;
-  const double vc = d1 * d4 - d3 * d2;
-  if (vc <= 0 && d1 >= 0 && d3 <= 0) return a + d1 / (d1 - d3) * ab;
-  const double d5 = ab.dot(point - c);
-  const double d6 = ac.dot(point - c);
-  if (d6 >= 0 && d5 <= d6) return c;
-  const double vb = d5 * d2 - d1 * d6;
-  if (vb <= 0 && d2 >= 0 && d6 <= 0) return a + d2 / (d2 - d6) * ac;
-  const double va = d3 * d6 - d5 * d4;
-  if (va <= 0 && d4 - d3 >= 0 && d5 - d6 >= 0) return b + (d4 - d3) / (d4 - d3 + d5 - d6) * (c - b);
-  return a + (vb * ab + vc * ac) / (va + vb + vc);
-}
-
-/// Returns `point` if the surface is farther than `most`.
-Vec3 nearest_on(const Triangles& surface, const Vec3& point, double most) {
-  Vec3 nearest = point;
-  for (const auto& facet : surface.facets) {
-    const Vec3& a = surface.points[at(facet[0])];
-    const Vec3& b = surface.points[at(facet[1])];
-    const Vec3& c = surface.points[at(facet[2])];
-    const Vec3 outside = (a.cwiseMin(b).cwiseMin(c) - point).cwiseMax(point - a.cwiseMax(b).cwiseMax(c));
-    if (outside.maxCoeff() > most) continue;
-    const Vec3 here = nearest_on(a, b, c, point);
-    if ((here - point).norm() > most) continue;
-    most = (here - point).norm();
-    nearest = here;
-  }
-  return nearest;
-}
-
 /// `places` are the positions of the boundary nodes on the surface.
 Mesh in_hexahedra(const Mesh& tetrahedra, const Triangles& surface, std::vector<Vec3>& places) {
   Mesh mesh{.shape = Shape::kHex8, .nodes = tetrahedra.nodes, .elements = {}};
@@ -253,13 +211,14 @@ Mesh in_hexahedra(const Mesh& tetrahedra, const Triangles& surface, std::vector<
     }
   }
   places = mesh.nodes;
+  const SurfaceDistance distance(surface);
   for (const Facet& facet : tendon::softbody::surface(tetrahedra)) {
     const std::vector<int> corners = nodes_on(tetrahedra, facet);
     for (std::size_t i = 0; i < 3; ++i) {
       const std::vector<int> edge{corners[i], corners[(i + 1) % 3]};
       const double most = (tetrahedra.nodes[at(edge[0])] - tetrahedra.nodes[at(edge[1])]).norm() / 2;
       for (const int node : {middle(edge), middle(corners)}) {
-        places[at(node)] = nearest_on(surface, mesh.nodes[at(node)], most);
+        places[at(node)] = distance.nearest_point(mesh.nodes[at(node)], most);
       }
     }
   }
@@ -346,14 +305,13 @@ MeshReport report_on(const Mesh& mesh, const Triangles& surface) {
       report.worst_at = Vec3::Zero();
       for (const int node : nodes) report.worst_at += mesh.nodes[at(node)] / static_cast<double>(nodes.size());
     }
-    const int corners = mesh.shape == Shape::kTet4 ? 4 : 8;
-    for (int i = 0; i < corners; ++i) {
-      for (int j = i + 1; j < corners; ++j) {
-        if (corners == 8 && std::ranges::find(kJoined[at(i)], j) == kJoined[at(i)].end()) continue;
+    for (int i = 0; const auto& joined : joined_of(mesh.shape)) {
+      for (const int j : joined) {
         const double length = (mesh.nodes[at(nodes[at(i)])] - mesh.nodes[at(nodes[at(j)])]).norm();
         report.shortest_edge = std::min(report.shortest_edge, length);
         report.longest_edge = std::max(report.longest_edge, length);
       }
+      ++i;
     }
   }
   const auto quantile = [&](double share) {

@@ -122,4 +122,10 @@ double SurfaceDistance::at(const Vec3& x, double at_most) const {
   return std::copysign(std::sqrt(found.squared), found.away.dot(found.normal));
 }
 
+Vec3 SurfaceDistance::nearest_point(const Vec3& x, double at_most) const {
+  NearestPoint found{at_most * at_most, Vec3::Zero(), Vec3::Zero()};
+  look(0, x, found);
+  return x - found.away;
+}
+
 }  // namespace tendon::softbody

@@ -21,6 +21,9 @@ class SurfaceDistance {
   /// The distance of `x` must not be larger than `at_most`, which limits the search.
   double at(const Vec3& x, double at_most = std::numeric_limits<double>::infinity()) const;
 
+  /// Returns `x` if the surface is farther than `at_most`.
+  Vec3 nearest_point(const Vec3& x, double at_most) const;
+
  private:
   struct FlatFacet {
     std::array<Vec3, 3> corners;

@@ -8,7 +8,6 @@
 #include <cstring>
 #include <fstream>
 #include <nlohmann/json.hpp>
-#include <numbers>
 #include <sstream>
 #include <string>
 
@@ -24,21 +23,7 @@ namespace tendon::softbody::mesher_test {
 namespace {
 
 /// A block of 100 × 100 × 50 mm, whose bottom is centered at the origin.
-Triangles block_surface() {
-  Triangles surface;
-  for (const double z : {0.0, 50.0}) {
-    for (const double y : {-50.0, 50.0}) {
-      for (const double x : {-50.0, 50.0}) surface.points.emplace_back(x, y, z);
-    }
-  }
-  constexpr std::array<std::array<int, 4>, 6> kSides{
-      {{0, 2, 3, 1}, {4, 5, 7, 6}, {0, 1, 5, 4}, {2, 6, 7, 3}, {0, 4, 6, 2}, {1, 3, 7, 5}}};
-  for (const auto& side : kSides) {
-    surface.facets.push_back({side[0], side[1], side[2]});
-    surface.facets.push_back({side[0], side[2], side[3]});
-  }
-  return surface;
-}
+Triangles block_surface() { return testing::moved(testing::box_surface(Vec3(100, 100, 50)), 1, Vec3(0, 0, 25)); }
 
 std::string off_of(const Triangles& surface) {
   std::ostringstream text;
@@ -48,56 +33,11 @@ std::string off_of(const Triangles& surface) {
   return text.str();
 }
 
-std::string obj_of(const Triangles& surface) {
-  std::ostringstream text;
-  text << "# by hand\no thing\n";
-  for (const Vec3& point : surface.points) text << "v " << point.x() << " " << point.y() << " " << point.z() << "\n";
-  for (const auto& facet : surface.facets) {
-    // index relative to the end
-    text << "f " << facet[0] + 1 << "/1/1 " << facet[1] + 1 << "//2 " << facet[2] - 8 << "\n";
-  }
-  return text.str();
-}
-
-std::string ascii_stl_of(const Triangles& surface) {
-  std::ostringstream text;
-  text << "solid thing\n";
-  for (const auto& facet : surface.facets) {
-    text << "facet normal 0 0 0\nouter loop\n";
-    for (const int corner : facet) {
-      const Vec3& point = surface.points[at(corner)];
-      text << "vertex " << point.x() << " " << point.y() << " " << point.z() << "\n";
-    }
-    text << "endloop\nendfacet\n";
-  }
-  text << "endsolid thing\n";
-  return text.str();
-}
-
 std::string binary_stl_of(const Triangles& surface) {
   const tendon::testing::ScratchFolder scratch;
   write_stl(scratch.path() / "a.stl", surface);
   std::ifstream file(scratch.path() / "a.stl", std::ios::binary);
   return {std::istreambuf_iterator<char>(file), {}};
-}
-
-TEST(Triangles, EveryFormatGivesTheSameClosedBlock) {
-  const Triangles block = block_surface();
-  const std::pair<const char*, std::string> files[] = {
-      {".off", off_of(block)}, {".obj", obj_of(block)}, {".STL", ascii_stl_of(block)}, {".stl", binary_stl_of(block)}};
-  for (const auto& [ending, text] : files) {
-    const Triangles read = parse_surface(text, ending, "a");
-    EXPECT_EQ(read.points.size(), 8U) << ending << ": corners that lie on each other are one";
-    EXPECT_EQ(read.facets.size(), 12U) << ending;
-    EXPECT_NEAR(read.volume(), 500'000, 1e-6) << ending;
-    EXPECT_EQ(thrown_by([&] { check(read, "a"); }), "") << ending;
-  }
-}
-
-TEST(Triangles, APolygonBecomesTrianglesAroundItsFirstCorner) {
-  const std::string text = "OFF 5 1 0\n0 0 0\n2 0 0\n3 1 0\n2 2 0\n0 2 0\n5 0 1 2 3 4\n";
-  EXPECT_EQ(parse_surface(text, ".off", "a").facets,
-            (std::vector<std::array<int, 3>>{{0, 1, 2}, {0, 2, 3}, {0, 3, 4}}));
 }
 
 TEST(Triangles, WhatIsNoFileOfItsKindIsRefusedWithItsPlace) {
@@ -125,34 +65,26 @@ TEST(Triangles, WhatIsNoFileOfItsKindIsRefusedWithItsPlace) {
 TEST(Triangles, ASurfaceWithoutAnInsideIsRefusedByTheFacet) {
   Triangles open = block_surface();
   open.facets.pop_back();
-  EXPECT_NE(thrown_by([&] { check(open, "a"); }).find("has an edge without a second facet: the surface is not closed"),
-            std::string::npos);
+  EXPECT_PRED2(says, thrown_by([&] { check(open, "a"); }),
+               "has an edge without a second facet: the surface is not closed");
 
   Triangles turned = block_surface();
   std::swap(turned.facets[4][0], turned.facets[4][1]);
   const std::string sentence = thrown_by([&] { check(turned, "a"); });
-  EXPECT_NE(sentence.find("turned inside out, or more than two facets share the edge"), std::string::npos) << sentence;
+  EXPECT_PRED2(says, sentence, "turned inside out, or more than two facets share the edge");
 
-  Triangles inside_out = block_surface();
-  for (auto& facet : inside_out.facets) std::swap(facet[0], facet[1]);
-  EXPECT_EQ(thrown_by([&] { check(inside_out, "a"); }),
+  EXPECT_EQ(thrown_by([] { check(testing::turned_inside_out(block_surface()), "a"); }),
             "a: the surface is turned inside out: expected facets anticlockwise, seen from outside");
 
-  Triangles crossing = block_surface();  // with a copy that is shifted by half its size in each direction
-  const int first = 8;
-  for (int i = 0; i < first; ++i) crossing.points.emplace_back(crossing.points[at(i)] + Vec3(50, 43, 25));
-  for (const auto& facet : block_surface().facets) {
-    crossing.facets.push_back({facet[0] + first, facet[1] + first, facet[2] + first});
-  }
+  const Triangles crossing = testing::together(block_surface(), testing::moved(block_surface(), 1, Vec3(50, 43, 25)));
   const std::string cut = thrown_by([&] { check(crossing, "a"); });
-  EXPECT_NE(cut.find(" intersect"), std::string::npos) << cut;
-  EXPECT_NE(cut.find("facet "), std::string::npos) << cut;
+  EXPECT_PRED2(says, cut, " intersect");
+  EXPECT_PRED2(says, cut, "facet ");
 }
 
 TEST(MeshReport, KnowsACubeARegularTetrahedronAndASkewedCell) {
   const Mesh cube = block(Shape::kHex8, Vec3(1, 1, 1), {1, 1, 1});
-  Triangles surface = block_surface();
-  for (Vec3& point : surface.points) point = Vec3(point.x() / 100, point.y() / 100, point.z() / 50);
+  const Triangles surface = testing::box_surface(Vec3(1, 1, 1));
   const MeshReport of_cube = report_on(cube, surface);
   EXPECT_NEAR(of_cube.worst, 1, 1e-12);
   EXPECT_NEAR(of_cube.volume_error, 0, 1e-12);
@@ -164,7 +96,7 @@ TEST(MeshReport, KnowsACubeARegularTetrahedronAndASkewedCell) {
   const MeshReport of_skewed = report_on(skewed, surface);
   EXPECT_NEAR(of_skewed.worst, 1 / std::hypot(1, 20), 1e-9);
   ASSERT_EQ(of_skewed.warnings.size(), 1U);
-  EXPECT_NE(of_skewed.warnings[0].find("scaled Jacobian"), std::string::npos);
+  EXPECT_PRED2(says, of_skewed.warnings[0], "scaled Jacobian");
 
   Mesh tetrahedron{
       .shape = Shape::kTet4,
@@ -229,56 +161,31 @@ TEST_F(Meshing, ABlockOfHexahedraIsNearlyAsStiffAsOneOfCubes) {
   EXPECT_GT(stiffness(path("t.msh"), Element::kTet4), 420.2 * 1.2) << "which is why hexahedra are made";
 }
 
-std::string prism_over_an_l(int start) {
-  std::string text =
-      "v 0 0 0\nv 30 0 0\nv 30 10 0\nv 10 10 0\nv 10 30 0\nv 0 30 0\n"
-      "v 0 0 10\nv 30 0 10\nv 30 10 10\nv 10 10 10\nv 10 30 10\nv 0 30 10\nf";
-  for (int i = 0; i < 6; ++i) text += ' ' + std::to_string(7 + (start + i) % 6);
-  return text + "\nf 2 1 6 5 4 3\nf 1 2 8 7\nf 2 3 9 8\nf 3 4 10 9\nf 4 5 11 10\nf 5 6 12 11\nf 6 1 7 12\n";
-}
-
-TEST_F(Meshing, APrismWhoseCapsAreConcaveIsFilledFromEveryCorner) {
-  for (const int start : {0, 1, 3}) {
-    const std::string name = "L" + std::to_string(start);
-    std::ofstream(path((name + ".obj").c_str())) << prism_over_an_l(start);
-    ASSERT_EQ(
-        run(path((name + ".obj").c_str()) + " --size 4 --tetrahedra --json --out " + path((name + ".msh").c_str())), 0)
-        << said();
-    EXPECT_NEAR(nlohmann::json::parse(said())["volume"].get<double>(), 5000, 0.1) << start;
-  }
-}
-
-Triangles moved(Triangles surface, double scale, const Vec3& way) {
-  for (Vec3& point : surface.points) point = scale * point + way;
-  return surface;
-}
-
 TEST_F(Meshing, PartsOfASurfaceAreBodiesCavitiesOrRefusedAsByTheToolMesh) {
   const Triangles block = block_surface();
-  const Triangles small = moved(block, 0.25, Vec3(0, 0, 20));
+  const Triangles small = testing::moved(block, 0.25, Vec3(0, 0, 20));
   std::ofstream(path("nested.off")) << off_of(testing::together(block, small));
   EXPECT_EQ(run(path("nested.off") + " --size 20 --out " + path("nested.msh")), 1);
-  EXPECT_NE(said().find("nested.off: the closed part of 12 facets that starts with facet 13 at "), std::string::npos)
-      << said();
-  EXPECT_NE(said().find("and has the same orientation"), std::string::npos) << said();
+  EXPECT_PRED2(says, said(), "nested.off: the closed part of 12 facets that starts with facet 13 at ");
+  EXPECT_PRED2(says, said(), "and has the same orientation");
   EXPECT_FALSE(std::filesystem::exists(path("nested.msh")));
 
   std::ofstream(path("hollow.off")) << off_of(testing::together(block, testing::turned_inside_out(small)));
   ASSERT_EQ(run(path("hollow.off") + " --size 20 --json --out " + path("hollow.msh")), 0) << said();
   auto report = nlohmann::json::parse(said());
   EXPECT_NEAR(report["volume"].get<double>(), 500'000 * (1 - 1 / 64.0), 1);
-  EXPECT_NE(report["warnings"][0].get<std::string>().find("the surface has 1 cavity"), std::string::npos);
+  EXPECT_PRED2(says, report["warnings"][0].get<std::string>(), "the surface has 1 cavity");
 
-  std::ofstream(path("apart.off")) << off_of(testing::together(block, moved(block, 0.25, Vec3(100, 0, 0))));
+  std::ofstream(path("apart.off")) << off_of(testing::together(block, testing::moved(block, 0.25, Vec3(100, 0, 0))));
   ASSERT_EQ(run(path("apart.off") + " --size 20 --json --out " + path("apart.msh")), 0) << said();
   report = nlohmann::json::parse(said());
   EXPECT_NEAR(report["volume"].get<double>(), 500'000 * (1 + 1 / 64.0), 1);
-  EXPECT_NE(report["warnings"][0].get<std::string>().find("the surface has 2 separate bodies"), std::string::npos);
+  EXPECT_PRED2(says, report["warnings"][0].get<std::string>(), "the surface has 2 separate bodies");
   EXPECT_EQ(std::ranges::max(read_gmsh(path("apart.msh"), 1e-3).parts), 1);
 
-  std::ofstream(path("stands.off")) << off_of(testing::together(block, moved(block, 0.25, Vec3(0, 0, 50))));
+  std::ofstream(path("stands.off")) << off_of(testing::together(block, testing::moved(block, 0.25, Vec3(0, 0, 50))));
   EXPECT_EQ(run(path("stands.off") + " --size 20 --out " + path("stands.msh")), 1);
-  EXPECT_NE(said().find("overlap: parts that touch must be one surface"), std::string::npos) << said();
+  EXPECT_PRED2(says, said(), "overlap: parts that touch must be one surface");
 }
 
 TEST_F(Meshing, ElementsAreSmallWhereTheBodyIsTouchedAndLargeElsewhere) {
@@ -296,12 +203,12 @@ TEST_F(Meshing, NothingThatIsThereIsOverwrittenAndABadSurfaceMakesNothing) {
   std::ofstream(path("kept.msh")) << "mine";
   std::ofstream(path("block.off")) << off_of(block_surface());
   EXPECT_EQ(run(path("block.off") + " --size 10 --out " + path("kept.msh")), 1);
-  EXPECT_NE(said().find("the file exists and is not overwritten"), std::string::npos) << said();
+  EXPECT_PRED2(says, said(), "the file exists and is not overwritten");
   Triangles open = block_surface();
   open.facets.pop_back();
   std::ofstream(path("open.off")) << off_of(open);
   EXPECT_EQ(run(path("open.off") + " --size 10 --out " + path("new.msh")), 1);
-  EXPECT_NE(said().find("open.off: facet"), std::string::npos) << said();
+  EXPECT_PRED2(says, said(), "open.off: facet");
   EXPECT_FALSE(std::filesystem::exists(path("new.msh")));
   EXPECT_EQ(run(path("block.off") + " --size -1 --out " + path("new.msh")), 2);
   EXPECT_EQ(run(path("block.off") + " --size 10 --at 0,0,50 --out " + path("new.msh")), 2) << "how far from there?";
@@ -309,30 +216,13 @@ TEST_F(Meshing, NothingThatIsThereIsOverwrittenAndABadSurfaceMakesNothing) {
 
 /// mm, an ellipsoid of 110 × 58 × 44 with an indentation in its side; roughly a kidney.
 Triangles bean_surface() {
-  constexpr int kRound = 36;
-  constexpr int kUp = 18;
-  constexpr double kPi = std::numbers::pi;
-  const auto place = [](double longitude, double latitude) {
-    const double x = 55 * std::cos(longitude) * std::cos(latitude);
-    const double below = std::max(0.0, -std::sin(longitude) * std::cos(latitude));
+  Triangles surface = testing::ball(1, 36);
+  for (Vec3& point : surface.points) {
+    point.normalize();
+    const double x = 55 * point.x();
+    const double below = std::max(0.0, -point.y());
     const double hollow = 15 * below * below * std::exp(-x * x / 625) - 9 * x * x / 3025;
-    return Vec3(x, 29 * std::sin(longitude) * std::cos(latitude) + hollow, 22 * std::sin(latitude));
-  };
-  Triangles surface;
-  surface.points.push_back(place(0, -kPi / 2));
-  for (int j = 1; j < kUp; ++j) {
-    for (int i = 0; i < kRound; ++i) surface.points.push_back(place(2 * kPi * i / kRound, kPi * (1.0 * j / kUp - 0.5)));
-  }
-  surface.points.push_back(place(0, kPi / 2));
-  const auto number = [](int i, int j) { return 1 + (j - 1) * kRound + i % kRound; };
-  const int top = static_cast<int>(surface.points.size()) - 1;
-  for (int i = 0; i < kRound; ++i) {
-    surface.facets.push_back({0, number(i + 1, 1), number(i, 1)});
-    surface.facets.push_back({top, number(i, kUp - 1), number(i + 1, kUp - 1)});
-    for (int j = 1; j < kUp - 1; ++j) {
-      surface.facets.push_back({number(i, j), number(i + 1, j), number(i + 1, j + 1)});
-      surface.facets.push_back({number(i, j), number(i + 1, j + 1), number(i, j + 1)});
-    }
+    point = Vec3(x, 29 * point.y() + hollow, 22 * point.z());
   }
   return surface;
 }

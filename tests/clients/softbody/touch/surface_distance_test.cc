@@ -27,7 +27,11 @@ TEST(SurfaceDistance, OfABoxItIsThatOnPaperAlsoAtEdgesAndCorners) {
     EXPECT_NEAR(distance.at(x), paper, 1e-12);
     EXPECT_NEAR(distance.at(x, std::abs(paper)), paper, 1e-12);
     EXPECT_NEAR(distance.at(x, 10), paper, 1e-12);
+    const Vec3 nearest = distance.nearest_point(x, 10);
+    EXPECT_NEAR(distance.at(nearest), 0, 1e-12);
+    EXPECT_NEAR((x - nearest).norm(), std::abs(paper), 1e-12);
   }
+  EXPECT_EQ(distance.nearest_point(Vec3(0, 0, 5), 1), Vec3(0, 0, 5));
 }
 
 TEST(SurfaceDistance, OfManyFacetsItIsTheLeastOfAllAndACavityIsOutside) {
@@ -42,7 +46,6 @@ TEST(SurfaceDistance, OfManyFacetsItIsTheLeastOfAllAndACavityIsOutside) {
   }
 }
 
-/// The facet normals disagree about the side of a point.
 TEST(SurfaceDistance, AtASharpCornerTheSideIsRightWhereSingleFacetsAreWrong) {
   Triangles needle;
   needle.points = {Vec3(0, 0, 0), Vec3(0.1, 0, -4), Vec3(-0.1, 0.15, -4), Vec3(-0.3, -0.1, -4)};

@@ -55,6 +55,11 @@ inline Triangles box_surface(const Vec3& size) {
   return made;
 }
 
+inline Triangles moved(Triangles surface, double scale, const Vec3& way) {
+  for (Vec3& point : surface.points) point = scale * point + way;
+  return surface;
+}
+
 inline Triangles together(const Triangles& first, const Triangles& second) {
   Triangles made = first;
   const int shift = static_cast<int>(first.points.size());
