@@ -2,6 +2,8 @@
 #include "server/clients/lateness.h"
 
 #include <algorithm>
+#include <array>
+#include <cstddef>
 #include <utility>
 
 namespace tendon {
@@ -21,62 +23,57 @@ std::string milliseconds_text(Duration d) {
   return std::to_string(tenths / 10) + "." + std::to_string(tenths % 10) + " ms";
 }
 
-const char* refusal(Lateness::Cause cause) {
-  switch (cause) {
-    case Lateness::Cause::kNotFinite:
-      return "its forces are not finite";
-    case Lateness::Cause::kOutOfBounds:
-      return "its forces exceed the bounds in WIRE.md";
-    case Lateness::Cause::kUnknownTick:
-      return "its forces answer unknown or old ticks";
-    case Lateness::Cause::kOldSequence:
-      return "its sequence numbers do not increase";
-    default:
-      return nullptr;
-  }
-}
+struct CauseRow {
+  Lateness::Part part;
+  const char* words;  ///< may be continued by durations
+};
+
+/// In the order of Lateness::Cause.
+constexpr std::array kCauses = {
+    CauseRow{Lateness::Part::kNone, "the cause is unknown"},
+    CauseRow{Lateness::Part::kOurs, "the server's threads (a state waited "},
+    CauseRow{Lateness::Part::kOurs, "the server (its threads were stopped for "},
+    CauseRow{Lateness::Part::kNetwork, "the network (round trip "},
+    CauseRow{Lateness::Part::kNetwork, "the network (datagrams were lost)"},
+    CauseRow{Lateness::Part::kUnknown, "the engine has stopped, or the network is down (no datagrams arrive)"},
+    CauseRow{Lateness::Part::kEngine, "the engine (it took "},
+    CauseRow{Lateness::Part::kEngine, "the engine (its datagrams arrive, but without a usable force)"},
+    CauseRow{Lateness::Part::kEngine, "the engine (its program was stopped for "},
+    CauseRow{Lateness::Part::kEngine, "the engine (no datagrams arrive from its program on this machine)"},
+    CauseRow{Lateness::Part::kEngine, "the engine (its forces are not finite)"},
+    CauseRow{Lateness::Part::kEngine, "the engine (its forces exceed the bounds in WIRE.md)"},
+    CauseRow{Lateness::Part::kEngine, "the engine (its forces answer unknown or old ticks)"},
+    CauseRow{Lateness::Part::kEngine, "the engine (its sequence numbers do not increase)"},
+};
+static_assert(kCauses.size() == static_cast<std::size_t>(Lateness::Cause::kOldSequence) + 1);
+
+const CauseRow& cause_row(Lateness::Cause cause) noexcept { return kCauses[static_cast<std::size_t>(cause)]; }
 
 std::string times(std::uint64_t count) { return count == 1 ? "once" : std::to_string(count) + " times"; }
 
 std::string describe(const Lateness::Report& report) {
   if (report.late() == 0) {
     if (report.refused == 0) return {};
-    const char* const why = refusal(report.refused_for);
-    return "forces were refused " + times(report.refused) + ": the engine (" + (why != nullptr ? why : "") + ")";
+    return "forces were refused " + times(report.refused) + ": " + cause_row(report.refused_for).words;
   }
-  std::string text =
-      "forces were late " + times(report.late()) + ", by up to " + milliseconds_text(report.worst) + ": ";
+  const std::string text = "forces were late " + times(report.late()) + ", by up to " +
+                           milliseconds_text(report.worst) + ": " + cause_row(report.cause).words;
   const auto part = [](Duration now, Duration usual) {
     return milliseconds_text(now) + ", usually " + milliseconds_text(usual) + ")";
   };
   switch (report.cause) {
     case Lateness::Cause::kStateWaited:
-      return text + "the server's threads (a state waited " + part(report.ours, report.usual_ours);
-    case Lateness::Cause::kServerStood:
-      return text + "the server (its threads were stopped for " + milliseconds_text(report.stood_still) + ")";
+      return text + part(report.ours, report.usual_ours);
     case Lateness::Cause::kRoundTrip:
-      return text + "the network (round trip " + part(report.network, report.usual_network);
-    case Lateness::Cause::kLost:
-      return text + "the network (datagrams were lost)";
-    case Lateness::Cause::kUnheard:
-      return text + "the engine has stopped, or the network is down (no datagrams arrive)";
+      return text + part(report.network, report.usual_network);
     case Lateness::Cause::kEngineTook:
-      return text + "the engine (it took " + part(report.engine, report.usual_engine);
-    case Lateness::Cause::kEngineMissing:
-      return text + "the engine (its datagrams arrive, but without a usable force)";
+      return text + part(report.engine, report.usual_engine);
+    case Lateness::Cause::kServerStood:
     case Lateness::Cause::kEngineStood:
-      return text + "the engine (its program was stopped for " + milliseconds_text(report.stood_still) + ")";
-    case Lateness::Cause::kEngineSilent:
-      return text + "the engine (no datagrams arrive from its program on this machine)";
-    case Lateness::Cause::kNotFinite:
-    case Lateness::Cause::kOutOfBounds:
-    case Lateness::Cause::kUnknownTick:
-    case Lateness::Cause::kOldSequence:
-      return text + "the engine (" + refusal(report.cause) + ")";
-    case Lateness::Cause::kNone:
-      break;
+      return text + milliseconds_text(report.stood_still) + ")";
+    default:
+      return text;
   }
-  return text + "the cause is unknown";
 }
 
 std::string advise(const Lateness::Report& report) {
@@ -101,30 +98,7 @@ void Lateness::begin(LocalTime now, bool same_machine) noexcept {
   refused_for_ = Cause::kNone;
 }
 
-Lateness::Part Lateness::part(Cause cause) noexcept {
-  switch (cause) {
-    case Cause::kStateWaited:
-    case Cause::kServerStood:
-      return Part::kOurs;
-    case Cause::kRoundTrip:
-    case Cause::kLost:
-      return Part::kNetwork;
-    case Cause::kUnheard:
-      return Part::kUnknown;
-    case Cause::kEngineTook:
-    case Cause::kEngineMissing:
-    case Cause::kEngineStood:
-    case Cause::kEngineSilent:
-    case Cause::kNotFinite:
-    case Cause::kOutOfBounds:
-    case Cause::kUnknownTick:
-    case Cause::kOldSequence:
-      return Part::kEngine;
-    case Cause::kNone:
-      break;
-  }
-  return Part::kNone;
-}
+Lateness::Part Lateness::part(Cause cause) noexcept { return cause_row(cause).part; }
 
 void Lateness::heard(LocalTime now, std::optional<PeerTime> sent, std::uint64_t lost) noexcept {
   heard_ = now;
