@@ -111,7 +111,7 @@ void add_devices(Exposition& out, const Board& board) {
   newest([&](const Label& label, const DeviceState& state) { out.add({label}, seconds(state.force_age)); });
   out.begin("tendon_device_mode", MetricType::Gauge, "1 for the current mode of the force, 0 for the others.");
   newest([&](const Label& label, const DeviceState& state) {
-    for (const Mode mode : kModes) out.add({label, {"mode", std::string(name(mode))}}, state.mode == mode ? 1.0 : 0.0);
+    for (const Mode mode : kModes) out.add({label, {"mode", name(mode)}}, state.mode == mode ? 1.0 : 0.0);
   });
   out.begin("tendon_device_states_total", MetricType::Counter, "Received states.");
   each(board, [&](const Label& label, const Device& device) { out.add({label}, device.states); });
@@ -135,7 +135,7 @@ void add_devices(Exposition& out, const Board& board) {
             "1 for the current safety state of the device, 0 for the others.");
   reported([&](const Label& label, const Device&, const Report& report) {
     for (const Safety safety : kSafeties)
-      out.add({label, {"state", std::string(name(safety))}}, report.safety == safety ? 1.0 : 0.0);
+      out.add({label, {"state", name(safety)}}, report.safety == safety ? 1.0 : 0.0);
   });
   out.begin("tendon_device_fault", MetricType::Gauge, "1 while the force is zero because of a fault.");
   reported([&](const Label& label, const Device&, const Report& r) { out.add({label}, r.fault.empty() ? 0.0 : 1.0); });
@@ -170,7 +170,7 @@ void add_ports(Exposition& out, const Board& board) {
   ends([&](const Labels& labels, const PortFrame& port) {
     for (const PortPhase phase : kPhases) {
       Labels with_phase = labels;
-      with_phase.push_back({"phase", std::string(name(phase))});
+      with_phase.push_back({"phase", name(phase)});
       out.add(std::move(with_phase), port.phase == phase ? 1.0 : 0.0);
     }
   });

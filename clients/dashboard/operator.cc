@@ -95,7 +95,7 @@ std::string Operator::press(LocalTime now, std::uint32_t device, Order order) {
   under_way_ = true;
   asked_ = false;
   give_up_ = now + config_.patience;
-  tell(Press::State::kUnderWay, "Requesting the server to " + std::string(name(order)) + " …");
+  tell(Press::State::kUnderWay, "Requesting the server to " + name(order) + " …");
   return {};
 }
 
@@ -228,7 +228,7 @@ void Operator::look_at_safety(LocalTime now, const Board::Device* device) {
   } else if (ready && report->safety == Safety::kUnguarded) {
     finish(now, true, "The device exerts forces again; it has no safety layer, so it does not have to be armed.");
   } else if (now >= give_up_) {
-    const std::string is = report != nullptr ? " It is " + std::string(name(report->safety)) + "." : "";
+    const std::string is = report != nullptr ? " It is " + name(report->safety) + "." : "";
     finish(now, false,
            "Not armed." + is +
                " The handle must be at rest, the requested force must be almost zero, and the dead man's button must "

@@ -5,6 +5,7 @@
 #include <array>
 #include <charconv>
 #include <chrono>
+#include <initializer_list>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <utility>
@@ -26,36 +27,19 @@ Json delays(const std::optional<Delays>& delays) {
   return {{"median", milliseconds(delays->median)}, {"p99", milliseconds(delays->p99)}};
 }
 
-std::string_view state_name(Press::State state) noexcept {
-  switch (state) {
-    case Press::State::kUnderWay:
-      return "under_way";
-    case Press::State::kDone:
-      return "done";
-    case Press::State::kFailed:
-      return "failed";
-  }
-  return "unknown";
+/// `names` are those of the enumerators 0, 1, 2 …
+template <class Enum>
+std::string one_of(std::initializer_list<const char*> names, Enum value) {
+  const auto number = static_cast<std::size_t>(value);
+  return number < names.size() ? names.begin()[number] : "unknown";
 }
 
 Json in_json(const std::optional<Press>& press) {
   if (!press) return nullptr;
   return {{"device", press->device},
           {"order", name(press->order)},
-          {"state", state_name(press->state)},
+          {"state", one_of({"under_way", "done", "failed"}, press->state)},
           {"words", press->words}};
-}
-
-std::string_view hand_name(Hand hand) {
-  switch (hand) {
-    case Hand::kAny:
-      return "any";
-    case Hand::kLeft:
-      return "left";
-    case Hand::kRight:
-      return "right";
-  }
-  return "unknown";
 }
 
 Json in_json(const std::optional<HandleDescription>& handle) {
@@ -69,7 +53,7 @@ Json in_json(const std::optional<HandleDescription>& handle) {
           {"gripper_open_rad", handle->gripper_open ? Json(*handle->gripper_open) : Json()},
           {"max_gripper_force_n", handle->max_gripper_force},
           {"group", handle->group},
-          {"hand", hand_name(handle->hand)}};
+          {"hand", one_of({"any", "left", "right"}, handle->hand)}};
 }
 
 Json in_json(const DeviceDescription& about, const std::optional<HandleDescription>& handle,
@@ -220,101 +204,24 @@ std::string text_of(const Json& json) { return json.dump(-1, ' ', false, Json::e
 
 }  // namespace
 
-std::string_view name(Mode mode) noexcept {
-  switch (mode) {
-    case Mode::kIdle:
-      return "idle";
-    case Mode::kActive:
-      return "active";
-    case Mode::kHolding:
-      return "holding";
-    case Mode::kDecaying:
-      return "decaying";
-    case Mode::kSafeStop:
-      return "safe_stop";
-    case Mode::kFault:
-      return "fault";
-  }
-  return "unknown";
+std::string name(Mode mode) {
+  return one_of({"unknown", "idle", "active", "holding", "decaying", "safe_stop", "fault"}, mode);
 }
-
-std::string_view name(Safety safety) noexcept {
-  switch (safety) {
-    case Safety::kAbsent:
-      return "absent";
-    case Safety::kOpening:
-      return "opening";
-    case Safety::kFirmware:
-      return "firmware";
-    case Safety::kUnhomed:
-      return "unhomed";
-    case Safety::kHomed:
-      return "homed";
-    case Safety::kArmed:
-      return "armed";
-    case Safety::kFault:
-      return "fault";
-    case Safety::kUnguarded:
-      return "unguarded";
-  }
-  return "unknown";
+std::string name(Safety safety) {
+  return one_of({"unknown", "absent", "opening", "firmware", "unhomed", "homed", "armed", "fault", "unguarded"},
+                safety);
 }
-
-std::string_view name(PortPhase phase) noexcept {
-  switch (phase) {
-    case PortPhase::kAlone:
-      return "alone";
-    case PortPhase::kCoupled:
-      return "coupled";
-    case PortPhase::kAligning:
-      return "aligning";
-    case PortPhase::kEngaged:
-      return "engaged";
-    case PortPhase::kClutched:
-      return "clutched";
-    case PortPhase::kLost:
-      return "lost";
-    case PortPhase::kFault:
-      return "fault";
-  }
-  return "unknown";
+std::string name(PortPhase phase) {
+  return one_of({"unknown", "alone", "coupled", "aligning", "engaged", "clutched", "lost", "fault"}, phase);
 }
-
-std::string_view name(Order order) noexcept {
-  switch (order) {
-    case Order::kArm:
-      return "arm";
-    case Order::kDisarm:
-      return "disarm";
-    case Order::kEngage:
-      return "engage";
-    case Order::kDisengage:
-      return "disengage";
-  }
-  return "unknown";
-}
-
-std::string_view name(Contact contact) noexcept {
-  switch (contact) {
-    case Contact::kGreeting:
-      return "greeting";
-    case Contact::kOpen:
-      return "open";
-    case Contact::kUnanswered:
-      return "unanswered";
-    case Contact::kRefused:
-      return "refused";
-    case Contact::kLost:
-      return "lost";
-  }
-  return "unknown";
-}
+std::string name(Order order) { return one_of({"arm", "disarm", "engage", "disengage"}, order); }
+std::string name(Contact contact) { return one_of({"greeting", "open", "unanswered", "refused", "lost"}, contact); }
 
 std::string reason_name(std::size_t bit) {
-  static constexpr std::array<std::string_view, 16> kNames = {
-      "energy", "max_force",    "slew",    "ramp_in",  "held",   "decaying", "safe_stop", "not_finite",
-      "fault",  "device_clamp", "overrun", "watchdog", "unseen", "disarmed", "damped",    "acceleration"};
-  return bit < kNames.size() ? std::string(kNames[bit]) : "bit_" + std::to_string(bit);
+  std::string name = to_string(Reasons::from_bits(1U << bit));
+  std::ranges::replace_if(
+      name, [](char c) { return c == ' ' || c == '-'; }, '_');
+  return name.empty() ? "bit_" + std::to_string(bit) : name;
 }
 
 std::string server_json(const Board& board, const Abilities& abilities) {
