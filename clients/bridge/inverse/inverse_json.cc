@@ -17,27 +17,6 @@ constexpr std::string_view kLetters = "XYZ";
 constexpr std::string_view kDigits = "0123456789ABCDEF";
 constexpr std::array<const char*, 3> kAxes = {"x", "y", "z"};
 
-/// Returns the nesting depth of objects and arrays. Checked before parsing.
-int depth_of(std::string_view text) {
-  int depth = 0;
-  int deepest = 0;
-  bool quoted = false;
-  for (std::size_t i = 0; i < text.size(); ++i) {
-    const char c = text[i];
-    if (quoted) {
-      if (c == '\\') ++i;
-      quoted = c != '"';
-    } else if (c == '"') {
-      quoted = true;
-    } else if (c == '{' || c == '[') {
-      deepest = std::max(deepest, ++depth);
-    } else if (c == '}' || c == ']') {
-      --depth;
-    }
-  }
-  return deepest;
-}
-
 const json* member(const json& object, const char* name) {
   if (!object.is_object()) return nullptr;
   const auto found = object.find(name);
@@ -255,8 +234,14 @@ Wish read_wish(std::string_view text) {
     return wish;
   };
   if (text.size() > kLongestMessage) return unread("longer than " + std::to_string(kLongestMessage) + " bytes");
-  if (depth_of(text) > kDeepest) return unread("nested deeper than " + std::to_string(kDeepest) + " objects");
-  const json message = json::parse(text, nullptr, false);
+  bool deep = false;
+  const auto see_depth = [&](int depth, json::parse_event_t event, const json&) {
+    const bool opens = event == json::parse_event_t::object_start || event == json::parse_event_t::array_start;
+    deep = deep || (opens && depth >= kDeepest);
+    return !deep;
+  };
+  const json message = json::parse(text, see_depth, false);
+  if (deep) return unread("nested deeper than " + std::to_string(kDeepest) + " objects");
   if (message.is_discarded()) return unread("not JSON, or a number out of range");
   if (!message.is_object()) return unread("expected an object");
   wish.read = true;
