@@ -6,6 +6,7 @@
 #include <iterator>
 #include <type_traits>
 
+#include "clients/cpp/web/origin.h"
 #include "clients/dashboard/page_json.h"
 #include "protocol/secrets/crypto.h"
 
@@ -28,88 +29,24 @@ constexpr OrderPath kOrders[] = {{"/api/arm", Order::kArm},
 
 constexpr std::string_view kMetricsType = "text/plain; version=0.0.4; charset=utf-8";
 
-std::string_view status_words(unsigned status) {
-  switch (status) {
-    case 200:
-      return "OK";
-    case 202:
-      return "Accepted";
-    case 206:
-      return "Partial Content";
-    case 400:
-      return "Bad Request";
-    case 403:
-      return "Forbidden";
-    case 404:
-      return "Not Found";
-    case 405:
-      return "Method Not Allowed";
-    case 409:
-      return "Conflict";
-    case 413:
-      return "Content Too Large";
-    case 416:
-      return "Range Not Satisfiable";
-    case 421:
-      return "Misdirected Request";
-    case 426:
-      return "Upgrade Required";
-    case 431:
-      return "Request Header Fields Too Large";
-    case 503:
-      return "Service Unavailable";
-    default:
-      return "Status";
-  }
-}
-
-bool equal_but_for_case(std::string_view a, std::string_view b) {
-  const auto lower = [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; };
-  return std::ranges::equal(a, b, {}, lower, lower);
-}
-
-/// Returns "localhost" for "localhost:8080", "[::1]" for "[::1]:8080", or an empty string if the port is invalid.
-std::string_view host_name(std::string_view host) {
-  const auto end = host.starts_with('[') ? host.find(']') + 1 : std::min(host.find(':'), host.size());
-  if (host.starts_with('[') && end == 0) return {};
-  const std::string_view port = host.substr(end);
-  const bool digits = port.size() > 1 && port.size() <= 6 &&
-                      std::ranges::all_of(port.substr(1), [](char c) { return c >= '0' && c <= '9'; });
-  return port.empty() || (port[0] == ':' && digits) ? host.substr(0, end) : std::string_view();
-}
-
-/// Matches 127.0.0.0/8 in dotted decimal, the form to which browsers normalize addresses.
-bool is_ipv4_loopback(std::string_view name) {
-  int parts = 0;
-  for (std::string_view rest = name; !rest.empty() || parts == 0; ++parts) {
-    const auto dot = rest.find('.');
-    const std::string_view part = rest.substr(0, dot);
-    unsigned value = 256;
-    const auto [end, error] = std::from_chars(part.data(), part.data() + part.size(), value);
-    if (error != std::errc{} || end != part.data() + part.size() || value > 255) return false;
-    if (parts == 0 && value != 127) return false;
-    rest = dot == std::string_view::npos ? std::string_view() : rest.substr(dot + 1);
-    if (dot != std::string_view::npos && rest.empty()) return false;
-  }
-  return parts == 4;
-}
-
-bool is_loopback_name(std::string_view name) {
-  constexpr std::string_view kLocal = "localhost";
-  constexpr std::string_view kBelow = ".localhost";
-  return equal_but_for_case(name, kLocal) || name == "[::1]" || is_ipv4_loopback(name) ||
-         (name.size() > kBelow.size() && equal_but_for_case(name.substr(name.size() - kBelow.size()), kBelow));
-}
-
-/// Returns "localhost:8000" for "http://localhost:8000", or an empty string for other origins such as "null".
-std::string_view origin_host(std::string_view origin) {
-  for (const std::string_view scheme : {"http://", "https://"}) {
-    if (!origin.starts_with(scheme)) continue;
-    const std::string_view host = origin.substr(scheme.size());
-    return host.find_first_of("/?#@\\ ") == std::string_view::npos ? host : std::string_view();
-  }
-  return {};
-}
+struct StatusWords {
+  unsigned status;
+  std::string_view words;
+};
+constexpr StatusWords kStatusWords[] = {{200, "OK"},
+                                        {202, "Accepted"},
+                                        {206, "Partial Content"},
+                                        {400, "Bad Request"},
+                                        {403, "Forbidden"},
+                                        {404, "Not Found"},
+                                        {405, "Method Not Allowed"},
+                                        {409, "Conflict"},
+                                        {413, "Content Too Large"},
+                                        {416, "Range Not Satisfiable"},
+                                        {421, "Misdirected Request"},
+                                        {426, "Upgrade Required"},
+                                        {431, "Request Header Fields Too Large"},
+                                        {503, "Service Unavailable"}};
 
 /// Returns the first supported subprotocol in the list, or an empty string. Case-sensitive.
 std::string foxglove_protocol(std::string_view list) {
@@ -154,7 +91,9 @@ std::uint64_t Reply::size() const {
 }
 
 std::string Reply::head(bool keep_alive) const {
-  std::string text = "HTTP/1.1 " + std::to_string(status) + " " + std::string(status_words(status)) + "\r\n";
+  const auto* const words = std::ranges::find(kStatusWords, status, &StatusWords::status);
+  std::string text = "HTTP/1.1 " + std::to_string(status) + " " +
+                     std::string(words != std::end(kStatusWords) ? words->words : "Status") + "\r\n";
   for (const auto& [name, value] : headers) text += name + ": " + value + "\r\n";
   text += "Content-Length: " + std::to_string(size()) + "\r\n";
   text += keep_alive ? "Connection: keep-alive\r\n\r\n" : "Connection: close\r\n\r\n";
@@ -188,22 +127,18 @@ Reply Routes::plain(unsigned status, std::string words, std::string_view allowed
 }
 
 bool Routes::is_our_host(std::string_view host) const {
-  const std::string_view name = host_name(host);
+  const std::string_view name = web::host_name(host);
   if (name.empty()) return false;
-  return is_loopback_name(name) || std::ranges::any_of(config_.hosts, [&](const std::string& ours) {
-           return equal_but_for_case(ours, host) || equal_but_for_case(ours, name);
+  return web::is_loopback_name(name) || std::ranges::any_of(config_.hosts, [&](const std::string& ours) {
+           return web::equal_but_for_case(ours, host) || web::equal_but_for_case(ours, name);
          });
-}
-
-bool Routes::is_our_origin(std::string_view origin) const {
-  return std::ranges::find(config_.origins, origin) != config_.origins.end();
 }
 
 bool Routes::is_foreign(const Request& request, std::string_view path) const {
   if (!request.origin) return false;
-  if (path != "/live" && is_our_origin(*request.origin)) return false;
-  const std::string_view host = origin_host(*request.origin);
-  return path == "/bridge" ? !is_loopback_name(host_name(host)) : !equal_but_for_case(host, *request.host);
+  if (path == "/bridge") return !web::may_come_from(*request.origin, config_.origins);
+  if (path == "/foxglove" && std::ranges::find(config_.origins, *request.origin) != config_.origins.end()) return false;
+  return !web::equal_but_for_case(web::origin_host(*request.origin), *request.host);
 }
 
 Reply Routes::order(const Request& request, std::string_view path, Order order) const {
@@ -213,7 +148,7 @@ Reply Routes::order(const Request& request, std::string_view path, Order order) 
   }
   if (!request.local || request.proxied)
     return plain(403, "Only accepted from the machine on which tendon-dash is running.");
-  if (!request.origin || !equal_but_for_case(origin_host(*request.origin), *request.host)) {
+  if (!request.origin || !web::equal_but_for_case(web::origin_host(*request.origin), *request.host)) {
     return plain(403, "Only accepted from the page of tendon-dash.");
   }
   if (!sources_.press) return plain(403, std::string(kArmingNeeds));

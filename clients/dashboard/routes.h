@@ -108,7 +108,6 @@ class Routes {
 
  private:
   bool is_our_host(std::string_view host) const;
-  bool is_our_origin(std::string_view origin) const;
   bool is_foreign(const Request& request, std::string_view path) const;
   Reply order(const Request& request, std::string_view path, Order order) const;
   Reply file(const Request& request, std::string_view path) const;

@@ -31,7 +31,7 @@
 #include <utility>
 #include <vector>
 
-#include "clients/bridge/inverse/origin.h"
+#include "clients/cpp/web/origin.h"
 
 namespace tendon::bridge {
 namespace {
@@ -198,7 +198,7 @@ class InverseConnection {
     const auto origin = message.find(http::field::origin);
     if (origin != message.end() &&
         (message.count(http::field::origin) > 1 ||
-         !may_come_from({origin->value().data(), origin->value().size()}, shared_.config.origins))) {
+         !web::may_come_from({origin->value().data(), origin->value().size()}, shared_.config.origins))) {
       return refuse("403 Forbidden", "pages from this origin are not accepted; see --origin of tendon-bridge inverse");
     }
     if (shared_.clients >= shared_.config.max_clients) {

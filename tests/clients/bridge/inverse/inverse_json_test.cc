@@ -10,8 +10,8 @@
 #include <string>
 #include <vector>
 
-#include "clients/bridge/inverse/origin.h"
 #include "clients/bridge/view.h"
+#include "clients/cpp/web/origin.h"
 
 namespace tendon::bridge::inverse_json_test {
 namespace {
@@ -217,16 +217,16 @@ TEST(InverseOrigin, PagesOfThisMachineAndAllowedOnesComeIn) {
   for (const char* origin :
        {"http://localhost", "http://localhost:8000", "https://page.localhost:1", "http://127.0.0.1:80",
         "http://127.3.2.1", "http://[::1]:8000", "https://lab.example", "null"}) {
-    EXPECT_TRUE(may_come_from(origin, allowed)) << origin;
+    EXPECT_TRUE(web::may_come_from(origin, allowed)) << origin;
   }
   for (const char* origin :
        {"", "http://", "https://evil.example", "http://localhost.evil.example", "http://127.0.0.1.evil.example",
         "http://evil.example:80@localhost", "http://localhost:80@evil.example", "http://evil.example/.localhost",
         "https://lab.example:8443", "https://LAB.example", "file://", "ftp://localhost", "http://[::2]", "http://[::1",
         "http://10.0.0.1", "localhost"}) {
-    EXPECT_FALSE(may_come_from(origin, allowed)) << origin;
+    EXPECT_FALSE(web::may_come_from(origin, allowed)) << origin;
   }
-  EXPECT_FALSE(may_come_from("null", {}));
+  EXPECT_FALSE(web::may_come_from("null", {}));
 }
 
 }  // namespace
