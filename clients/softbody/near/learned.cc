@@ -500,7 +500,7 @@ std::optional<FallbackLevel::Answer> LearnedLevel::press(const Patch& patch, dou
   if (!(share > 0)) return std::nullopt;
   auto reaction = body_.press(patch, depth, *point, kForNewton * tolerance_);
   if (!reaction) return std::nullopt;
-  reaction->error += trust_.errors()[at(point->cell)] * std::abs(reaction->force);
+  reaction->error += trust_.error(*point) * std::abs(reaction->force);
   return Answer{*reaction, share};
 }
 

@@ -16,7 +16,10 @@ constexpr double kLeft = 1e-3;    ///< part of the motion of Γ (RMS) that may b
 
 constexpr Eigen::Index kLoadsAtOnce = 8;
 
-constexpr std::size_t kWatched = 96;  ///< maximum number of elements that left_out() evaluates
+/// left_out() evaluates this number of elements, and all others at the distance of the last one, so that rounding does
+/// not choose among them.
+constexpr std::size_t kWatched = 96;
+constexpr double kAsFar = 1 + 1e-9;
 
 Vec3 middle_of(const Mesh& mesh, int element) {
   Vec3 sum = Vec3::Zero();
@@ -84,7 +87,7 @@ Pieces NearBody::make(const Solid& whole, const Factor& factor, Config config, s
   for (const int node : config.pressed) reached[at(node)] = true;
   for (int e = 0; e < mesh.element_count(); ++e) {
     const double distance = (middle_of(mesh, e) - config.middle).norm();
-    if (distance <= config.radius ||
+    if (distance <= kAsFar * config.radius ||
         std::ranges::any_of(mesh.element(e), [&](int node) { return reached[at(node)]; })) {
       near.push_back(e);
     } else {
@@ -95,7 +98,10 @@ Pieces NearBody::make(const Solid& whole, const Factor& factor, Config config, s
   if (far.empty()) co_return;
   std::ranges::sort(far);
   std::vector<int> watched;
-  for (std::size_t i = 0; i < std::min(far.size(), kWatched); ++i) watched.push_back(far[i].second);
+  const double farthest = kAsFar * far[std::min(far.size(), kWatched) - 1].first;
+  for (const auto& [distance, e] : far) {
+    if (distance <= farthest) watched.push_back(e);
+  }
   std::vector<int> nodes;
   std::vector<int> watched_nodes;
   Solid near_part = Solid::part_of(whole, near, nodes);

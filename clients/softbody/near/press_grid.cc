@@ -32,6 +32,8 @@ constexpr double kGoesOn = 0.05;
 
 constexpr double kUnseenBetween = 2;  ///< safety factor for points between knots and centers
 
+constexpr double kOnBorder = 1e-9;  ///< maximum distance from a border of a cell, relative to its size
+
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
 
 class Presser {
@@ -324,6 +326,24 @@ Trust::Trust(const PressGrid& grid, const std::vector<double>& at_knots, const s
       }
     }
   }
+}
+
+double Trust::error(const PressGrid::Point& point) const {
+  double most = errors_[at(point.cell)];
+  for (int c = 0; c < 27; ++c) {
+    const std::array<int, 3> by{c / 9 - 1, c / 3 % 3 - 1, c % 3 - 1};
+    const std::array<int, 3> cell{point.i + by[0], point.j + by[1], point.level + by[2]};
+    bool contains = true;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const double in = by[axis] < 0 ? point.in[axis] : 1 - point.in[axis];
+      const int cells = axis < 2 ? 2 * grid_.around : PressGrid::kLevels;
+      contains = contains && (by[axis] == 0 || in <= kOnBorder) && cell[axis] >= 0 && cell[axis] < cells;
+    }
+    if (!contains) continue;
+    const double error = errors_[at(grid_.cell(cell[0], cell[1], cell[2]))];
+    if (error < kInfinite) most = std::max(most, error);
+  }
+  return most;
 }
 
 Trust::Allowed::Allowed(const Trust& trust, double tolerance)

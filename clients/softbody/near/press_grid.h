@@ -96,6 +96,9 @@ class Trust {
   const PressGrid& grid() const noexcept { return grid_; }
   /// The maximum error around each cell, with a safety factor. Infinite if it is unknown.
   const std::vector<double>& errors() const noexcept { return errors_; }
+  /// The largest finite error of the cells that contain a point. Several do at a border, where rounding decides in which
+  /// cell PressGrid::find() puts the point.
+  double error(const PressGrid::Point& point) const;
 
   /// The answers with a relative error of at most `tolerance`. share() is 1 if all cells around a point are accurate
   /// and 0 at inaccurate cells, and is continuous.

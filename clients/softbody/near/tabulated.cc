@@ -216,7 +216,7 @@ std::optional<FallbackLevel::Answer> TabulatedLevel::press(const Patch& patch, d
   reaction.force = e.force;
   reaction.depth = depth;
   reaction.stiffness = e.stiffness;
-  reaction.error = trust_.errors()[at(point->cell)] * std::abs(e.force);
+  reaction.error = trust_.error(*point) * std::abs(e.force);
   if (!(e.force > 0)) return Answer{reaction, share};
   // The components of PatchContact's K. `giving` is 0.
   const Vec2 slope = -e.across / e.force;

@@ -145,6 +145,30 @@ TEST(LearnedShapes, WhereTheForcesAreNotThoseThatWereSolvedNothingIsAnswered) {
   EXPECT_EQ(fallback_level.size().cells, fallback_level.size().of_cells - 8);
 }
 
+// Regression: in a rotated frame, a tool on the border of two cells had the error of the other cell.
+TEST(LearnedShapes, TheErrorOnABorderOfCellsDoesNotDependOnRounding) {
+  PressedBefore& block = small_block(Law::kNeoHookean);
+  const PressGrid& grid = block.presses.grid;
+  for (const auto& fallback_level : {block.learned(0.1), block.tabulated(0.1)}) {
+    const auto said = [&](const Vec2& place, double depth) {
+      const auto answer = fallback_level->press(*block.top.patch(place), depth);
+      return answer ? answer->reaction.error / answer->reaction.force : -1;
+    };
+    for (int i = 1; i < grid.side() - 1; ++i) {
+      for (const double level : {1.0, 2.5}) {
+        const Vec2 place = grid.place(i, 1.3);
+        const double depth = level * grid.step;
+        const double rounding = 1e-14;
+        const double here = said(place, depth);
+        for (const double by : {-rounding, rounding}) {
+          EXPECT_NEAR(said(place + by * Vec2::UnitX(), depth), here, 1e-6 * here) << i << ' ' << level;
+          EXPECT_NEAR(said(place, depth + by), here, 1e-6 * here) << i << ' ' << level;
+        }
+      }
+    }
+  }
+}
+
 TEST(LearnedShapes, ASmallerErrorIsAskedForInFewerCells) {
   PressedBefore& block = small_block(Law::kCorotational);
   const int all = block.learned(0.02)->size().cells;

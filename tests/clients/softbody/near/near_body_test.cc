@@ -98,6 +98,26 @@ TEST(NearBody, ForcesAreTheSlopeOfTheEnergyAndTheStiffnessThatOfTheForces) {
   }
 }
 
+// Regression: in a rotated frame, other elements at the same distance were evaluated for the error.
+TEST(NearBody, WhatItLeavesOutDoesNotDependOnRounding) {
+  const AtRest block(8, 0.45, Law::kNeoHookean);
+  const Patch pressed = *block.top.patch(Vec2(0.004, 0.002));
+  const auto left_out = [&](const Vec3& middle) {
+    const auto body = block.made(
+        {.middle = middle, .radius = 0.035, .pressed = pressed.nodes, .press = block.solid.to_free(block.load)},
+        block.factor);
+    QuasiStaticModel model(*body, block.top, {.max_iterations = 100, .tolerance = 1e-8, .glides = false});
+    Patch own = pressed;
+    for (int& node : own.nodes) node = body->own_node(node);
+    model.press(own, Prescribed::kDepth, 4e-3);
+    return body->left_out(model.displacements(), 4e-3);
+  };
+  const double expected = left_out(Vec3(0, 0, 0.05));
+  for (const double by : {-1e-15, 1e-15}) {
+    EXPECT_NEAR(left_out(Vec3(by, -by / 2, 0.05)), expected, 1e-6 * std::abs(expected)) << by;
+  }
+}
+
 TEST(NearBody, WithItsExactInterfaceItIsTheWholeBodyAtFirstTouch) {
   const AtRest block(8, 0.45, Law::kNeoHookean);
   const double whole = block.solid.to_free(block.load).dot(block.factor.solve(block.solid.to_free(block.load)).col(0));
