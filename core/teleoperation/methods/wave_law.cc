@@ -45,10 +45,13 @@ void WaveLaw::receive(const PortState& peer, const PortState& /*before*/, bool a
 }
 
 std::optional<EnergyTank::Settlement> WaveLaw::observe(const LawInterval& ended) noexcept {
-  Interval<3> end{.applied = force_, .dx = Vec3::Zero(), .held = ended.interval.held};
+  Interval<3> end{.applied = force_, .dx = -takes_back_, .held = ended.interval.held};
+  takes_back_.setZero();
+  last_dx_.setZero();
   if (moves_) {
-    end.dx = ended.interval.dx;
-    // The end of the line becomes softer because of the limiter and the motors, but not because of the ramp.
+    last_dx_ = ended.interval.dx;
+    end.dx += last_dx_;
+    // The limiter and the motors make the end of the line softer. The ramp does not.
     end.applied = ended.interval.applied + force_ - ended.wanted;
   }
   sent_ = port_.observe(end, {.payable = ended.payable, .reserve = ended.reserve, .wanted = force_});
@@ -56,6 +59,7 @@ std::optional<EnergyTank::Settlement> WaveLaw::observe(const LawInterval& ended)
 }
 
 Demand<3> WaveLaw::command(const LawPeriod& period, const Vec3& speed, const Demand<3>& /*spring*/) noexcept {
+  if (moves_ && period.clutched) takes_back_ += last_dx_;
   moves_ = period.live;
   if (!moves_ && !period.clutched) port_.rest();
   Demand<3> demand = port_.command(moves_ ? speed : Vec3(Vec3::Zero()));
@@ -65,7 +69,8 @@ Demand<3> WaveLaw::command(const LawPeriod& period, const Vec3& speed, const Dem
 }
 
 void WaveLaw::skip(const LawPeriod& period, Duration elapsed) noexcept {
-  // The motion is unknown in this interval and in the next one, so the account is not used for the line.
+  last_dx_.setZero();
+  // The motion is not known in this interval and in the next one, so the account does not pay for the line.
   port_.observe({.applied = force_, .dx = Vec3::Zero(), .held = elapsed},
                 {.payable = -std::numeric_limits<double>::max(), .wanted = force_});
   command(period, Vec3::Zero(), {});
