@@ -39,9 +39,9 @@ const std::vector<Room>& rooms() {
   return kRooms;
 }
 
-const Names kAtTheRoot = {".ci",          ".dockerignore",  ".clang-format",     ".clang-tidy",     ".gitignore",
-                          "CHANGELOG.md", "CMakeLists.txt", "CMakePresets.json", "CONTRIBUTING.md", "LICENSE",
-                          "README.md"};
+const Names kAtTheRoot = {".ci",          ".dockerignore", ".clang-format",  ".clang-tidy",       ".gitignore",
+                          "CHANGELOG.md", "CITATION.cff",  "CMakeLists.txt", "CMakePresets.json", "CONTRIBUTING.md",
+                          "LICENSE",      "README.md"};
 
 /// Every room may use these headers: control the floating point unit, pass the newest value between threads, find
 /// misspelled words, format the errors of a command line, print without waiting for a reader, and declare the keys of a

@@ -131,10 +131,9 @@ constexpr std::array kChecks = {
     Check{"observer-only-looks", kServer, kWire, kHello, "Observers receive states, and controllers also send forces."},
     Check{"rearm-by-controller", kServer, kWire, kData,
           "Clears a latched fault and revokes a Disarm. Can only be used by controllers of the device."},
-    Check{
-        "disarm-by-controller", kServer, kWire, kData,
-        "Sets the force to zero from the next haptic step on, without a ramp, until a Rearm; only from a controller of "
-        "the device"},
+    Check{"disarm-by-controller", kServer, kWire, kData,
+          "Sets the force to zero without a ramp, from the next haptic step until a Rearm. Can be used by any "
+          "controller of the device"},
     Check{"forces", kClient, kWire, kData, "1, 2, 3 … per session, device and channel"},
     Check{"force-bounds", kClient, kWire, kData, "the time after its arrival during which the force is fresh"},
     Check{"force-answers", kClient, kWire, kData,

@@ -4,8 +4,10 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <memory>
 #include <stdexcept>
 #include <utility>
 #include <variant>
@@ -128,7 +130,7 @@ std::string GridBench::parts_of(const std::string& law) {
 void GridBench::add_network(const std::string& network) {
   Path path;
   if (network.starts_with(kTracePrefix)) {
-    path.trace = std::make_shared<const injector::Trace>(injector::read_trace(network.substr(kTracePrefix.size())));
+    path.trace = injector::read_trace(std::filesystem::path(network.substr(kTracePrefix.size())));
     if (path.trace->records.empty())
       throw std::invalid_argument(network + ": expected a trace with datagrams, found none");
   } else {

@@ -4,7 +4,6 @@
 #include <cstdint>
 #include <filesystem>
 #include <map>
-#include <memory>
 #include <optional>
 #include <string>
 
@@ -62,7 +61,7 @@ class GridBench {
  private:
   struct Path {
     simulation::Network::Weather weather{};
-    std::shared_ptr<const injector::Trace> trace{};
+    std::optional<injector::Trace> trace{};  ///< instead of the weather
   };
   std::filesystem::path file_;
   std::string text_;

@@ -2,7 +2,6 @@
 #include "tests/tools/lab/grid/grid.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cstddef>
 #include <exception>
 #include <fstream>
@@ -19,9 +18,9 @@
 #include "clients/cpp/force_client.h"
 #include "core/base/expect.h"
 #include "tests/support/json_line.h"
+#include "tests/tools/lab/experiments/meter.h"
 #include "tests/tools/lab/grid/ranges.h"
 #include "tests/tools/lab/grid/zwidth.h"
-#include "tests/tools/lab/recordings/run_summary.h"
 
 namespace tendon::lab {
 namespace {
@@ -161,14 +160,6 @@ std::string time_in_words(double s) {
                  : std::to_string(static_cast<int>(s / 60 + 1)) + " min";
 }
 
-class Stopwatch {
- public:
-  double elapsed() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
-
- private:
-  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
-};
-
 /// Throws std::invalid_argument if the file is not the table of this command.
 void expect_own_table(const std::filesystem::path& file, const std::string& command) {
   std::ifstream in(file);
@@ -260,9 +251,10 @@ void run_grid(const GridOptions& options, std::ostream& out) {
   const Origin origin = origin_of(command_of(options), bench.scene().text);
 
   if (options.dry_run) {
-    const Stopwatch watch;
+    const Meter meter;
+    const Meter::Reading before = meter.read();
     run(0);
-    const double all = watch.elapsed() * static_cast<double>(cells.size()) / options.jobs;
+    const double all = (meter.read() - before).wall * static_cast<double>(cells.size()) / options.jobs;
     out << cells.size() << (cells.size() == 1 ? " cell of " : " cells of ")
         << shortest(seconds(length_of(cells.front()))) << " s; about " << time_in_words(all) << " with --jobs "
         << options.jobs << '\n';
@@ -283,14 +275,16 @@ void run_grid(const GridOptions& options, std::ostream& out) {
       if (!results.contains(all.first + i)) missing.push_back(all.first + i);
     }
     if (!results.empty()) out << "continuing: " << results.size() << " of " << cells.size() << " cells have finished\n";
-    const Stopwatch watch;
+    const Meter meter;
+    const Meter::Reading before = meter.read();
     std::size_t done = 0;
     run_units(missing, options.jobs, run, [&](std::uint64_t unit, const Measured& measured) {
       results[unit] = measured;
       if (journal) journal->add(unit, measured);
       ++done;
       if (!options.part.progress) return;
-      const double left = watch.elapsed() * static_cast<double>(missing.size() - done) / static_cast<double>(done);
+      const double left =
+          (meter.read() - before).wall * static_cast<double>(missing.size() - done) / static_cast<double>(done);
       std::cerr << "\r\x1b[K" << done << " of " << missing.size() << " cells";
       if (done < missing.size()) std::cerr << ", about " << time_in_words(left) << " left";
       std::cerr << std::flush;
