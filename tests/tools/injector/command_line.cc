@@ -132,7 +132,7 @@ Subcommands add_subcommands(CLI::App& app, Said& said) {
       ->add_option("--clock-offset-ms", said.clock_offset_ms,
                    "pcap: clock at the server minus clock at the client, ms. Default: 0, for synchronized clocks")
       ->type_name("MS")
-      ->check(between(-1e12, 1e12));
+      ->check(between(-1e11, 1e11));
   verbs.import->add_option("--out", said.import.to, "Output file")->type_name("TRACE")->required();
   verbs.import
       ->add_option("--share", said.share,

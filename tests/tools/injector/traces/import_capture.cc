@@ -18,6 +18,7 @@ namespace tendon::injector {
 namespace {
 
 constexpr double kMostRepeated = 0.01;
+constexpr Duration kLongestEcho = std::chrono::hours(24);
 
 std::string counted(std::size_t count, std::string_view what) {
   return std::to_string(count) + ' ' + std::string(what) + (count == 1 ? "" : "s");
@@ -139,6 +140,9 @@ void number(Trace& trace) {
   const Duration zero = trace.records.empty() ? Duration{} : trace.records.front().arrival.time_since_epoch();
   std::array<std::uint64_t, 2> next{};
   for (TraceRecord& record : trace.records) {
+    if (std::max(record.arrival, record.release).time_since_epoch() - zero > kMaxTraceTime / 2) {
+      throw std::runtime_error("expected less than 36 years from the first to the last datagram of both captures");
+    }
     record.index = next[static_cast<std::size_t>(record.direction)]++;
     record.arrival -= zero;
     record.release -= zero;
@@ -214,7 +218,12 @@ Trace import_echoes(const Tap& tap, const ImportOptions& options) {
       open[key] = echoes.size();
       echoes.push_back({one.at, std::nullopt, one.size});
     } else if (const auto found = open.find(key); found != open.end()) {
-      echoes[found->second].round_trip = one.at - echoes[found->second].at;
+      const Duration round_trip = one.at - echoes[found->second].at;
+      if (round_trip < Duration::zero()) {
+        throw std::runtime_error(tap.name + ": a reply is " + duration_text(-round_trip) +
+                                 " earlier than its request; expected a clock that is not set during the capture");
+      }
+      if (round_trip <= kLongestEcho) echoes[found->second].round_trip = round_trip;
       open.erase(found);  // ignores further replies
     }
   }
@@ -228,9 +237,8 @@ Trace import_echoes(const Tap& tap, const ImportOptions& options) {
                              "RTP does not contain the delay of the network");
   }
   std::vector<MeasuredRoundTrip> trips;
-  const Duration longest = std::ranges::max(echoes, {}, [](const Echo& one) {
-                             return one.round_trip.value_or(Duration{});
-                           }).round_trip.value();
+  Duration longest{};
+  for (const Echo& one : echoes) longest = std::max(longest, one.round_trip.value_or(Duration{}));
   const Duration end = tap.capture.last.value() - longest;
   for (const Echo& one : echoes) {
     if (!one.round_trip && one.at > end) continue;  // the answer can be later than the capture

@@ -300,6 +300,17 @@ TEST(OneTap, PairsEchoesByIdAndSequence) {
   EXPECT_EQ(trace.records[2].release - trace.records[2].arrival, milliseconds(30));
 }
 
+TEST(OneTap, RefusesAReplyThatIsEarlierThanItsRequest) {
+  const Tap set = tap("set", {{ms(0), echo(false, 7, 0)}, {ms(30), echo(false, 7, 1)}, {ms(29), echo(true, 7, 1)}});
+  EXPECT_EQ(thrown_by<std::runtime_error>([&] { import_echoes(set, {}); }),
+            "set: a reply is 1ms earlier than its request; expected a clock that is not set during the capture");
+}
+
+TEST(OneTap, AnAnswerWithoutDelayIsAnAnswer) {
+  const Tap equal = tap("equal", {{ms(0), echo(false, 7, 0)}, {ms(1), echo(false, 7, 1)}, {ms(1), echo(true, 7, 1)}});
+  EXPECT_EQ(import_echoes(equal, {.share = Share::kUp}).records.size(), 2U);
+}
+
 TEST(OneTap, SaysWhyOtherProtocolsHaveNoDelay) {
   const Tap rtp = tap("rtp", {up(ms(0), "audio"), {ms(1), ip4(std::string(20, 't'), 6)}});
   EXPECT_EQ(
