@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <span>
 #include <stdexcept>
 #include <utility>
@@ -213,12 +214,10 @@ class Reader {
     const std::uint64_t whole = ticks / rate;
     constexpr std::uint64_t kMostSeconds = 9'000'000'000;  // fits into 64 bits of nanoseconds
     if (whole > kMostSeconds) refuse("expected a time before the year 2255");
-    const auto rest =
-        static_cast<std::uint64_t>(static_cast<double>(ticks % rate) * 1e9 / static_cast<double>(rate) + 0.5);
+    const auto rest = std::llround(static_cast<double>(ticks % rate) * 1e9 / static_cast<double>(rate));
     const std::size_t size = field(3);
     if (size > body.size() - 20) refuse("expected " + std::to_string(size) + " bytes of a packet in its block");
-    add(std::chrono::seconds(whole) + Duration(static_cast<std::int64_t>(rest)), interfaces[index].link,
-        body.subspan(20, size), field(4));
+    add(std::chrono::seconds(whole) + Duration(rest), interfaces[index].link, body.subspan(20, size), field(4));
   }
 
   void add(Duration at, std::uint32_t link, Bytes packet, std::uint32_t on_the_wire) {

@@ -35,7 +35,7 @@ GridOptions small() {
   return options;
 }
 
-std::string table_of(GridOptions options) {
+std::string table_of(const GridOptions& options) {
   std::ostringstream out;
   run_grid(options, out);
   return out.str();
