@@ -37,7 +37,7 @@ inline Solid quarter_of_half_space(Element element, const std::vector<double>& o
     fixed[3 * i + 1] = far || node.y() < 1e-9;
     fixed[3 * i + 2] = far;
   }
-  return {std::move(mesh), element, material, Law::kLinear, std::move(fixed)};
+  return {std::move(mesh), element, material, Law::kLinear, fixed};
 }
 
 }  // namespace tendon::softbody::testing
