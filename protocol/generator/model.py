@@ -307,7 +307,7 @@ class Message:
         return 1 + next(i for i, member in enumerate(self.members(language)) if member.wire == last)
 
     def default(self, wire: str, language: str) -> str | None:
-        """Returns the default value of a member in the given language. None: the zero of its type."""
+        """Returns the default value of a member in the given language. The default is zero if this is None."""
         found = _of(self.values.get("defaults", {}).get(wire), language, None)
         return None if found is None else str(found)
 

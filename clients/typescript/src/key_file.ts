@@ -8,7 +8,9 @@ export interface ClientKey {
   readonly key: Uint8Array;
 }
 
-/** In 32 random bytes there are about 30 different values. Fewer than 18 occur once in 10¹¹ keys. */
+/**
+ * In 32 random bytes there are about 30 different values. A random key has fewer than 18 with a probability of 10⁻¹¹.
+ */
 const kFewestDifferent = 18;
 const kExpected = "expected one line, `controller` or `observer` and 64 hexadecimal digits";
 

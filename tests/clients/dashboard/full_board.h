@@ -6,7 +6,7 @@
 
 namespace tendon::dash {
 
-/// The scales are 1. The follower has received 25 of the 30 mJ that the leader has given.
+/// The scales are 1. The leader gave 30 mJ, of which the follower received 25 mJ.
 inline Board::Ports both_ends() {
   Board::Ports ports;
   PortFrame& leader = ports.own;

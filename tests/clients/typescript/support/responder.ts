@@ -3,7 +3,7 @@ import { x25519 } from "@noble/curves/ed25519";
 import { concat } from "../../../../clients/typescript/src/datagram.js";
 import { SymmetricState, type Finished } from "../../../../clients/typescript/src/noise.js";
 
-/** The responder of NNpsk0, which is not implemented in the client. */
+/** The responder of NNpsk0, for tests. The client is always the initiator. */
 export interface Answered extends Omit<Finished, "payload"> {
   readonly message2: Uint8Array;
 }

@@ -45,8 +45,8 @@ struct Capture {
 inline constexpr std::size_t kMaxCapturedPackets = 20'000'000;
 
 /// Reads a capture by tcpdump, dumpcap or Wireshark: pcap with µs or ns in both byte orders (draft-ietf-opsawg-pcap), or
-/// pcapng with Section, Interface, Enhanced and Simple Packet Blocks and the option if_tsresol
-/// (draft-ietf-opsawg-pcapng). Link types: 0 (null), 1 (Ethernet with VLAN tags), 101 (raw), 113 and 276 (Linux cooked).
+/// pcapng with the option if_tsresol (draft-ietf-opsawg-pcapng). Only Enhanced Packet Blocks have a time, so other packet
+/// blocks are skipped. Link types: 0 (null), 1 (Ethernet with VLAN tags), 101 (raw), 113 and 276 (Linux cooked).
 /// IPv4 and IPv6 with UDP or ICMP; IPv6 extension headers are not followed.
 ///
 /// Throws std::runtime_error that begins with `name` if the file is no such capture, a block is inconsistent, or a link

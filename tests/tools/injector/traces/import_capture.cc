@@ -24,14 +24,14 @@ std::string counted(std::size_t count, std::string_view what) {
   return std::to_string(count) + ' ' + std::string(what) + (count == 1 ? "" : "s");
 }
 
-/// Sent datagrams of one direction by time, with their payloads.
+/// A datagram of one direction.
 struct Sent {
   Duration at{};  ///< on the client's clock
   std::uint64_t hash = 0;
   std::uint32_t size = 0;
 };
 
-/// One direction, from its near tap to its far tap.
+/// A direction of the network: the near tap records what is sent, and the far tap what arrives.
 struct Path {
   Direction direction;
   const Tap& near;

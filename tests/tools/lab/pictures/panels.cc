@@ -95,7 +95,7 @@ std::vector<std::size_t> labels_at(const Panel& panel, const Curve& curve, bool 
   return found;
 }
 
-/// Breaks paragraphs at spaces. A longer word is broken anywhere.
+/// Breaks paragraphs at spaces, and words that are longer than a line after kLetters.
 std::vector<std::string> lines_of(const std::vector<std::string>& paragraphs) {
   std::vector<std::string> lines;
   for (std::string rest : paragraphs) {
