@@ -5,6 +5,7 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/CholmodSupport>
+#include <Eigen/Eigenvalues>
 #include <Eigen/SparseCore>
 #include <algorithm>
 #include <stdexcept>
@@ -56,6 +57,12 @@ int SymmetricMatrix::slot(int row, int column) const {
 
 std::size_t SymmetricMatrix::bytes() const noexcept {
   return (column_starts.size() + rows.size()) * sizeof(int) + values.size() * sizeof(double);
+}
+
+Eigensystem eigensystem(const MatrixXd& symmetric, bool with_vectors) {
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(
+      symmetric, with_vectors ? Eigen::ComputeEigenvectors : Eigen::EigenvaluesOnly);
+  return {solver.eigenvalues(), with_vectors ? solver.eigenvectors() : MatrixXd()};
 }
 
 struct Factor::Cholmod {

@@ -23,6 +23,14 @@ struct SymmetricMatrix {
   std::size_t bytes() const noexcept;
 };
 
+/// A = V diag(λ) Vᵀ of a symmetric A, with λ ascending. Only uses the lower triangle of A. `vectors` is empty without
+/// `with_vectors`.
+struct Eigensystem {
+  VectorXd values;
+  MatrixXd vectors;
+};
+Eigensystem eigensystem(const MatrixXd& symmetric, bool with_vectors = true);
+
 /// The Cholesky factor of a symmetric positive definite matrix (CHOLMOD, supernodal). The ordering is computed once for
 /// each pattern. factorize() limits OpenBLAS to one thread in the whole process, and OpenMP to the calling thread.
 /// Thread-safe: no, but two threads can use different factors if factors_may_work_at_once(). Realtime-safe: no.

@@ -2,7 +2,6 @@
 #include "clients/softbody/near/learned.h"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
 #include <array>
@@ -14,6 +13,7 @@
 #include <utility>
 
 #include "clients/softbody/fem/products.h"
+#include "clients/softbody/fem/sparse.h"
 #include "clients/softbody/near/least_squares.h"
 
 namespace tendon::softbody {
@@ -104,14 +104,13 @@ Basis basis_of(const std::vector<const SolvedPress*>& presses, const SymmetricMa
   }
   MatrixXd gram(count, count);
   for (Eigen::Index s = 0; s < count; ++s) gram.col(s) = all.transpose() * at_rest.times(all.col(s));
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> parts((gram + gram.transpose()) / 2);
-  const VectorXd& energies = parts.eigenvalues();
+  const Eigensystem parts = eigensystem((gram + gram.transpose()) / 2);
+  const VectorXd& energies = parts.values;
   Eigen::Index kept = std::min<Eigen::Index>(count, most);
   const double sum = energies.sum();
   const auto left = [&](Eigen::Index of) { return energies.head(count - of).cwiseMax(0.0).sum(); };
   while (kept > 1 && left(kept - 1) <= kShapesLeft * kShapesLeft * sum) --kept;
-  const MatrixXd mix =
-      parts.eigenvectors().rightCols(kept) * energies.tail(kept).cwiseSqrt().cwiseInverse().asDiagonal();
+  const MatrixXd mix = parts.vectors.rightCols(kept) * energies.tail(kept).cwiseSqrt().cwiseInverse().asDiagonal();
   return {all * mix, mix.transpose() * gram * sizes.asDiagonal()};
 }
 
@@ -220,8 +219,7 @@ bool stable_at_held_depth(const MatrixXd& curvature, const VectorXd& load) {
   const VectorXd along = load.normalized();
   const MatrixXd held = MatrixXd::Identity(load.size(), load.size()) - along * along.transpose();
   const MatrixXd across = held * curvature * held + along * along.transpose();
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> parts((across + across.transpose()) / 2, Eigen::EigenvaluesOnly);
-  return parts.eigenvalues()[0] > 0;
+  return eigensystem((across + across.transpose()) / 2, false).values[0] > 0;
 }
 
 /// The line search of Newton's method. `slope` is updated.

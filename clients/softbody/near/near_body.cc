@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "clients/softbody/near/near_body.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <random>
 #include <utility>
+
+#include "clients/softbody/fem/sparse.h"
 
 namespace tendon::softbody {
 namespace {
@@ -173,8 +174,8 @@ Pieces NearBody::make(const Solid& whole, const Factor& factor, Config config, s
     }
     co_await kPieceDone;
   }
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> parts_of_traces(traces.transpose() * traces);
-  const VectorXd& squares = parts_of_traces.eigenvalues();
+  const Eigensystem parts_of_traces = eigensystem(traces.transpose() * traces);
+  const VectorXd& squares = parts_of_traces.values;
   Eigen::Index count = loads_count;
   double left = 0;
   while (!exact && count > 1 &&
@@ -183,7 +184,7 @@ Pieces NearBody::make(const Solid& whole, const Factor& factor, Config config, s
     --count;
   }
   const MatrixXd mix =
-      parts_of_traces.eigenvectors().rightCols(count) * squares.tail(count).cwiseSqrt().cwiseInverse().asDiagonal();
+      parts_of_traces.vectors.rightCols(count) * squares.tail(count).cwiseSqrt().cwiseInverse().asDiagonal();
   parts.modes = traces * mix;
   const MatrixXd far_forces = parts.modes.transpose() * forces * mix;
   parts.far = (far_forces + far_forces.transpose()) / 2;

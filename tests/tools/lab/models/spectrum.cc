@@ -2,7 +2,6 @@
 #include "tests/tools/lab/models/spectrum.h"
 
 #include <Spectra/SymEigsSolver.h>
-#include <Eigen/Eigenvalues>
 
 #include <algorithm>
 #include <cmath>
@@ -68,9 +67,9 @@ Swings slowest_swings(const SymmetricMatrix& stiffness, const VectorXd& mass, in
   const VectorXd scale = root.cwiseInverse();
   Swings swings;
   if (2 * count >= stiffness.size) {  // Lanczos' method needs twice as many vectors
-    const Eigen::SelfAdjointEigenSolver<MatrixXd> all(scale.asDiagonal() * dense(stiffness) * scale.asDiagonal());
-    swings.squares = all.eigenvalues().head(count);
-    swings.shapes = all.eigenvectors().leftCols(count);
+    const Eigensystem all = eigensystem(scale.asDiagonal() * dense(stiffness) * scale.asDiagonal());
+    swings.squares = all.values.head(count);
+    swings.shapes = all.vectors.leftCols(count);
   } else {
     Factor factor(stiffness);
     if (!factor.factorize(stiffness)) throw std::runtime_error("the body can still move as a whole");
