@@ -22,10 +22,9 @@ const CouplingConfig& checked(const CouplingConfig& config) {
 
 PositionPosition<3>::Config spring_of(const CouplingConfig& config, const MappedEnd& frame) {
   PositionPosition<3>::Config spring = config.spring;
-  const bool both = config.method == CouplingMethod::kPositionPosition || config.method == CouplingMethod::kSetPosition;
   // The leader of a position–force coupling has no spring, so the follower's spring is not in a loop with the delay.
-  if (!both) spring.adapt_to_delay = false;
-  if (config.method == CouplingMethod::kSetPosition) spring.damping = 0;  // this method does not use velocities
+  if (!info(config.method).has_springs) spring.adapt_to_delay = false;
+  if (!info(config.method).has_velocity) spring.damping = 0;
   for (double* const value : {&spring.stiffness, &spring.damping, &spring.own_damping}) {
     *value = frame.stiffness(*value);
   }
@@ -129,6 +128,7 @@ void Coupling::receive(const PortState& peer, LocalTime now) noexcept {
     }
   }
   take_scales(peer);
+  const bool has_velocity = info(config_.method).has_velocity;
   // PositionPosition accepts every state that passed the checks above, so a state is never used only partially.
   std::visit(
       [&](auto& law) {
@@ -139,7 +139,7 @@ void Coupling::receive(const PortState& peer, LocalTime now) noexcept {
                          .time = peer.time,
                          .round_trip = peer.round_trip,
                          .position = frame_.mapped(peer.position),
-                         .velocity = law.kUsesVelocity ? frame_.mapped(peer.velocity) : Vec3(Vec3::Zero())});
+                         .velocity = has_velocity ? frame_.mapped(peer.velocity) : Vec3(Vec3::Zero())});
         law.receive(peer, newest_, anew, frame_);
       },
       law_);

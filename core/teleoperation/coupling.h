@@ -54,7 +54,7 @@ namespace tendon {
 ///
 /// **Scales that change** (set_scale, MappedEnd). The displacement of the leader is multiplied by the old s_x over the
 /// new s_x, so that its mapped position does not change. The force changes within ForceRamp::kFade. The methods waves
-/// and passivity (keeps_scales) and a coupling of grippers cannot change their scales.
+/// and passivity (`keeps_scales`) and a coupling of grippers cannot change their scales.
 ///
 /// **Loss of the peer** (LossStages). If the peer is silent, the force decreases. If the peer is gone, the phase is
 /// `lost` and the force is 0. A link whose delay exceeds max_delay is treated as lost. A robot (`holds_place`) that is

@@ -9,6 +9,18 @@ namespace {
 
 std::string in_quotation(CouplingMethod method) { return "\"" + std::string(to_string(method)) + "\""; }
 
+/// Returns `"a", "b" or "c"`.
+std::string methods_with(bool CouplingMethodInfo::*property) {
+  std::string text;
+  std::string last;
+  for (const CouplingMethod method : kCouplingMethods) {
+    if (!(info(method).*property)) continue;
+    if (!last.empty()) text += (text.empty() ? "" : ", ") + last;
+    last = in_quotation(method);
+  }
+  return text.empty() ? last : text + " or " + last;
+}
+
 struct CouplingRule {
   std::string_view key;
   bool (*broken)(const CouplingConfig&);
@@ -33,20 +45,19 @@ constexpr std::array kCouplingRules = {
                    return std::string(
                        "expected no clutch with map.absolute: a clutch changes the offset, which is always 0");
                  }},
-    CouplingRule{"absolute", [](const CouplingConfig& c) { return c.absolute && !has_places(c.method); },
+    CouplingRule{"absolute", [](const CouplingConfig& c) { return c.absolute && !info(c.method).has_places; },
                  [](const CouplingConfig&) {
-                   return std::string(
-                       "expected the method position-position, position-force, surface or set-position with "
-                       "map.absolute: the other methods have no absolute positions");
+                   return "expected the method " + methods_with(&CouplingMethodInfo::has_places) +
+                          " with map.absolute: the other methods have no absolute positions";
                  }},
     CouplingRule{"share", [](const CouplingConfig& c) { return leads(c) && c.share.has_value(); },
                  [](const CouplingConfig&) {
                    return std::string("expected no share for a leader: only a follower has shares");
                  }},
-    CouplingRule{"method", [](const CouplingConfig& c) { return c.share && !can_be_shared(c.method); },
+    CouplingRule{"method", [](const CouplingConfig& c) { return c.share && !info(c.method).can_be_shared; },
                  [](const CouplingConfig& c) {
-                   return "expected \"position-position\" or \"position-force\" with several leaders, found " +
-                          in_quotation(c.method);
+                   return "expected " + methods_with(&CouplingMethodInfo::can_be_shared) +
+                          " with several leaders, found " + in_quotation(c.method);
                  }},
     CouplingRule{"rate", [](const CouplingConfig& c) { return c.method == CouplingMethod::kRate && !c.rate; },
                  [](const CouplingConfig& c) {
@@ -63,14 +74,10 @@ constexpr std::array kCouplingRules = {
                  }},
     CouplingRule{
         "own_damping",
-        [](const CouplingConfig& c) { return c.method == CouplingMethod::kPassivity && !(c.spring.own_damping > 0); },
-        [](const CouplingConfig&) {
-          return std::string("expected a number above 0: nothing else absorbs energy, so no motion could start");
-        }},
-    CouplingRule{
-        "own_damping",
-        [](const CouplingConfig& c) { return c.method == CouplingMethod::kWaves && !(c.spring.own_damping > 0); },
-        [](const CouplingConfig&) { return std::string("expected a number above 0: it is the wave impedance"); }}};
+        [](const CouplingConfig& c) { return !info(c.method).needs_damping.empty() && !(c.spring.own_damping > 0); },
+        [](const CouplingConfig& c) {
+          return "expected a number above 0: " + std::string(info(c.method).needs_damping);
+        }}};
 
 }  // namespace
 

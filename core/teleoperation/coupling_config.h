@@ -10,6 +10,7 @@
 #include "core/teleoperation/energy_tank.h"
 #include "core/teleoperation/handle/grip_coupling.h"
 #include "core/teleoperation/handle/turn_coupling.h"
+#include "core/teleoperation/methods/coupling_method.h"
 #include "core/teleoperation/methods/model_mediated.h"
 #include "core/teleoperation/methods/position_position.h"
 #include "core/teleoperation/phases/clutch.h"
@@ -38,7 +39,7 @@ struct CouplingConfig {
   /// Used by the follower if the method is `surface`, in the scale of the follower.
   SurfaceEstimator<3>::Config surface{
       .contact_force = 0.1, .first_stiffness = 200, .max_stiffness = 5000, .least_travel = 2e-4, .memory = 300};
-  /// Requires a method with positions (has_places) and no clutch. If it is empty, the map is relative.
+  /// Requires a method with positions (`has_places`) and no clutch. If it is empty, the map is relative.
   std::optional<CouplingAbsolute> absolute{};
   std::optional<CouplingButton> clutch{};               ///< leader only
   std::optional<std::uint32_t> engage_by{};             ///< the bit of a button that calls engage(), only at the leader
@@ -46,7 +47,7 @@ struct CouplingConfig {
   Duration peer_period = std::chrono::milliseconds(1);  ///< > 0, time between two states of the peer
   double encoder_step = 0;                              ///< m, ≥ 0, or 0 if exact; used if the method is waves
   bool holds_place = false;                             ///< the device of the follower is a robot
-  std::optional<double> share{};         ///< initial α (0 to 1) if the follower has several leaders (can_be_shared)
+  std::optional<double> share{};         ///< initial α (0 to 1) if the follower has several leaders (`can_be_shared`)
   double drift_rate = 100;               ///< λ, 1/s, ≥ 0; used if the method is passivity
   std::optional<RateControl> rate{};     ///< required if the method is rate
   double centring = 0;                   ///< K_c, N/m, ≥ 0; used by the leader if the method is rate

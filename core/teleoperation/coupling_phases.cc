@@ -146,7 +146,7 @@ void Coupling::renew() noexcept {
 bool Coupling::set_scale(double position_scale, double force_scale) noexcept {
   const auto possible = [](double scale) { return within(scale, MappedEnd::kLeast, MappedEnd::kMost); };
   const bool bound =
-      phase_ == PortPhase::kEngaged || phase_ == PortPhase::kAligning || keeps_scales(config_.method) || grip_;
+      phase_ == PortPhase::kEngaged || phase_ == PortPhase::kAligning || info(config_.method).keeps_scales || grip_;
   if (!leads() || bound || !possible(position_scale) || !possible(force_scale)) return false;
   if (!config_.absolute) u_ *= frame_.map().position_scale() / position_scale;
   frame_.rescale(position_scale, force_scale, true);
@@ -167,7 +167,7 @@ void Coupling::follow_scales() noexcept {
 
 /// Sets the scales of a follower to those of the leader. Energy is only used between two states with these scales.
 void Coupling::take_scales(const PortState& peer) noexcept {
-  if (keeps_scales(config_.method) || grip_) return;
+  if (info(config_.method).keeps_scales || grip_) return;
   const bool before = !heard() || frame_.tells_ours(newest_);
   if (!leads() && !frame_.tells_ours(peer)) {
     frame_.rescale_as_told(peer);

@@ -13,26 +13,6 @@ bool is_scale(double scale) noexcept { return scale == 0 || within(scale, 0.01, 
 
 }  // namespace
 
-std::string_view to_string(CouplingMethod method) noexcept {
-  switch (method) {
-    case CouplingMethod::kPositionPosition:
-      return "position-position";
-    case CouplingMethod::kPositionForce:
-      return "position-force";
-    case CouplingMethod::kWaves:
-      return "waves";
-    case CouplingMethod::kSurface:
-      return "surface";
-    case CouplingMethod::kPassivity:
-      return "passivity";
-    case CouplingMethod::kSetPosition:
-      return "set-position";
-    case CouplingMethod::kRate:
-      return "rate";
-  }
-  return "unknown";
-}
-
 std::string_view to_string(PortPhase phase) noexcept {
   switch (phase) {
     case PortPhase::kAlone:

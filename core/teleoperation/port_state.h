@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <optional>
 #include <string_view>
@@ -27,22 +26,6 @@ std::string_view to_string(PortPhase phase) noexcept;
 
 enum class PortRole : std::uint8_t { kLeader, kFollower };
 
-enum class CouplingMethod : std::uint8_t {
-  kPositionPosition = 1,  ///< uses springs and dampers at both ends, with an energy tank (PositionPosition)
-  kPositionForce,         ///< spring at the follower; the leader feels the measured contact force
-  kWaves,                 ///< wave variables with playout (WavePort)
-  kSurface,               ///< similar to position-force, but uses a model of the surface at the leader
-  kPassivity,             ///< velocity to the follower, force to the leader, with passivity control (PassivityLeader)
-  kSetPosition,           ///< springs to delayed positions, stretched only as far as the account pays
-  kRate,                  ///< the position of the leader sets the velocity of the follower
-};
-inline constexpr std::array kCouplingMethods = {
-    CouplingMethod::kPositionPosition, CouplingMethod::kPositionForce, CouplingMethod::kWaves, CouplingMethod::kSurface,
-    CouplingMethod::kPassivity,        CouplingMethod::kSetPosition,   CouplingMethod::kRate};
-
-/// Returns the name in scenes and error messages, such as "position-position".
-std::string_view to_string(CouplingMethod method) noexcept;
-
 /// The parameters of the method rate, in the scale of the leader. A spring pulls the handle of the leader to its
 /// center, and its displacement sets the velocity of the follower.
 struct RateControl {
@@ -59,28 +42,6 @@ struct PortSurface {
   double offset = 0;            ///< m, the surface is at normal·u = offset
   double stiffness = 0;         ///< N/m, ≥ 0, or 0 if there is no surface
 };
-
-/// Returns true if positions of leader and follower correspond (Coupling::Absolute). The other methods use velocities.
-constexpr bool has_places(CouplingMethod method) noexcept {
-  return method == CouplingMethod::kPositionPosition || method == CouplingMethod::kPositionForce ||
-         method == CouplingMethod::kSurface || method == CouplingMethod::kSetPosition;
-}
-
-/// Returns true if the scales cannot be changed, because the totals of the method depend on them.
-constexpr bool keeps_scales(CouplingMethod method) noexcept {
-  return method == CouplingMethod::kWaves || method == CouplingMethod::kPassivity;
-}
-
-/// Returns true if a follower can have several leaders.
-constexpr bool can_be_shared(CouplingMethod method) noexcept {
-  return method == CouplingMethod::kPositionPosition || method == CouplingMethod::kPositionForce;
-}
-
-/// Returns true if a follower with a limiter can only move when the leader pays for it (EnergyTank).
-constexpr bool needs_tank(CouplingMethod method) noexcept {
-  return method == CouplingMethod::kPositionPosition || method == CouplingMethod::kPassivity ||
-         method == CouplingMethod::kSetPosition;
-}
 
 /// The rotation of a handle since its offset was set.
 struct PortTurn {

@@ -150,7 +150,7 @@ Outcome set_scale(LocalTime /*now*/, const Asker& asker, const SetScale& wanted)
   if (device.coupling->grip_stiffness > 0) {
     return {.code = Code::kUnsupported, .detail = "the scales of a coupling of grippers can only be set in the scene"};
   }
-  if (keeps_scales(device.coupling->method)) {
+  if (info(device.coupling->method).keeps_scales) {
     return {.code = Code::kUnsupported,
             .detail = "a coupling by " + std::string(to_string(device.coupling->method)) +
                       " can only be scaled in the scene"};

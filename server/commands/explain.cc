@@ -187,8 +187,7 @@ double operational_stiffness(const LimiterConfig& limiter) {
 void put_coupling(const Coupling::Config& coupling, const LimiterConfig& limiter, std::ostream& text) {
   const bool leads = coupling.role == PortRole::kLeader;
   const bool waves = coupling.method == CouplingMethod::kWaves;
-  const bool springs =
-      coupling.method == CouplingMethod::kPositionPosition || coupling.method == CouplingMethod::kSetPosition;
+  const bool springs = info(coupling.method).has_springs;
   const auto& spring = coupling.spring;
   text << std::right << "Teleoperation: the " << (leads ? "leader" : "follower") << " of a coupling by "
        << to_string(coupling.method) << (coupling.tank ? " with shared energy accounts" : "") << ".\n";

@@ -393,7 +393,7 @@ class SceneResolver : SceneErrors {
     resolve_leaders(coupling);
     resolve_method(coupling);
     blame_rules(coupling);
-    if (needs_tank(coupling.method) && law != Law::kNone && !coupling.tank) {
+    if (info(coupling.method).needs_tank && law != Law::kNone && !coupling.tank) {
       blame("teleoperation.energy_tank", {"teleoperation"},
             "missing, expected this table: with its own limiter, a follower can only move with energy from the leader");
     }
@@ -482,7 +482,7 @@ class SceneResolver : SceneErrors {
             "expected none with method " + named + ": only \"passivity\" corrects drift");
     }
     coupling.drift_rate = draft_.drift_rate.value_or(coupling.drift_rate);
-    if (coupling.method == CouplingMethod::kSetPosition && coupling.spring.damping > 0) {
+    if (!info(coupling.method).has_velocity && coupling.spring.damping > 0) {
       blame("teleoperation.coupling.mutual_damping_n_s_per_m", {},
             "expected 0 or no value with method " + named + ": it does not use the velocity of the other end");
     }

@@ -104,6 +104,14 @@ Names<CouplingMethod> method_names() {
   return names;
 }
 
+std::string methods_in_words() {
+  std::string text;
+  for (const CouplingMethodInfo& row : coupling_methods::kRows) {
+    text += (text.empty() ? "" : ". ") + std::string(row.name) + ": " + std::string(row.what);
+  }
+  return text;
+}
+
 }  // namespace
 
 template <class Table>
@@ -113,13 +121,7 @@ void declare_teleoperation(Table& scene, Draft& draft) {
     Coupling::Config& coupling = draft.coupling;
     keys.key("role", coupling.role, Names<PortRole>{{{"leader", PortRole::kLeader}, {"follower", PortRole::kFollower}}},
              "The leader engages the coupling and can use the clutch. The follower follows the leader", kRequired);
-    keys.key("method", coupling.method, method_names(),
-             "position-position: a spring between the handles. waves: wave variables, which are stable for long "
-             "delays. position-force: the leader feels the contact force that is measured at the follower. surface: "
-             "the leader feels a local model of the surface that the follower has found. passivity: the leader feels "
-             "the motor force of the follower, and a passivity controller at each end limits the energy. set-position: "
-             "springs to infrequent set positions, which are stretched as far as the energy account allows. rate: the "
-             "displacement of the leader sets the speed of the follower");
+    keys.key("method", coupling.method, method_names(), methods_in_words());
     keys.key("max_delay_ms", coupling.max_delay, kAboveZero,
              "Maximum one-way delay. While half of the round-trip time is longer, the connection is treated as lost",
              Absent{.text = "any"});

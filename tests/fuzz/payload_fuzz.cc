@@ -67,7 +67,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       if (const auto* couple = std::get_if<Couple>(&request->request)) {
         fuzz::require(couple->position_scale >= 0.01 && couple->force_scale >= 0.01 && couple->stiffness >= 0);
         fuzz::require(couple->axes >= 1 && couple->axes <= 7 && couple->period > Duration::zero());
-        fuzz::require(couple->method >= CouplingMethod::kPositionPosition && couple->method <= CouplingMethod::kRate);
+        fuzz::require(couple->method >= kCouplingMethods.front() && couple->method <= kCouplingMethods.back());
         fuzz::require(couple->turn_stiffness >= 0 && couple->turn_damping >= 0 && couple->grip_stiffness >= 0);
         fuzz::require(couple->grip_damping >= 0 && couple->drift_rate >= 0);
         fuzz::require(!couple->rate || (couple->rate->gain > 0 && couple->rate->max_speed > 0));

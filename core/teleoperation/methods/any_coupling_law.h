@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
+#include <utility>
 #include <variant>
 
 #include "core/teleoperation/methods/passivity_law.h"
@@ -11,28 +13,18 @@
 
 namespace tendon {
 
-/// A law with the functions of CouplingLaw. The variant does not allocate memory.
+/// A law with the functions of CouplingLaw. The variant does not allocate memory. Alternative i belongs to
+/// kCouplingMethods[i].
 using AnyCouplingLaw = std::variant<SpringLaw, ContactLaw, WaveLaw, SurfaceLaw, PassivityLaw, SetPositionLaw, RateLaw>;
+static_assert(std::variant_size_v<AnyCouplingLaw> == kCouplingMethods.size());
 
 /// Throws std::invalid_argument if the configuration is not valid.
-inline AnyCouplingLaw coupling_law_of(const CouplingConfig& config, const MappedEnd& frame) {
-  switch (config.method) {
-    case CouplingMethod::kPositionForce:
-      return AnyCouplingLaw(std::in_place_type<ContactLaw>, config, frame);
-    case CouplingMethod::kWaves:
-      return AnyCouplingLaw(std::in_place_type<WaveLaw>, config, frame);
-    case CouplingMethod::kSurface:
-      return AnyCouplingLaw(std::in_place_type<SurfaceLaw>, config, frame);
-    case CouplingMethod::kPassivity:
-      return AnyCouplingLaw(std::in_place_type<PassivityLaw>, config, frame);
-    case CouplingMethod::kSetPosition:
-      return AnyCouplingLaw(std::in_place_type<SetPositionLaw>, config, frame);
-    case CouplingMethod::kRate:
-      return AnyCouplingLaw(std::in_place_type<RateLaw>, config, frame);
-    case CouplingMethod::kPositionPosition:
-      break;
+template <std::size_t index = 0>
+AnyCouplingLaw coupling_law_of(const CouplingConfig& config, const MappedEnd& frame) {
+  if constexpr (index + 1 < kCouplingMethods.size()) {
+    if (config.method != kCouplingMethods[index]) return coupling_law_of<index + 1>(config, frame);
   }
-  return AnyCouplingLaw(std::in_place_type<SpringLaw>, config, frame);
+  return AnyCouplingLaw(std::in_place_index<index>, config, frame);
 }
 
 }  // namespace tendon

@@ -43,7 +43,6 @@ struct LawPart {
 /// needs. In each period, the caller must call `receive` for each state, `observe`, `command` (or `skip` if there is no
 /// position), and `conclude`. Thread-safe: no. Realtime-safe: yes, except the constructors.
 struct CouplingLaw {
-  static constexpr bool kUsesVelocity = true;    ///< The law uses the velocity of the peer.
   static constexpr bool kSpringPays = false;     ///< The account limits the energy of the common spring.
   static constexpr bool kHoldsSilent = true;     ///< A robot uses the law if the peer is silent.
   static constexpr bool kLeaderCentred = false;  ///< The displacement of the leader starts at 0.

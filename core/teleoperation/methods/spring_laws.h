@@ -17,7 +17,6 @@ struct SpringLaw : CouplingLaw {
 /// ContactLaw, the stiff spring of the follower would use the energy that is needed by the leader. In a test with 50
 /// ms, this reduced the force at the leader from 4.1 N to 0.17 N.
 struct SetPositionLaw : CouplingLaw {
-  static constexpr bool kUsesVelocity = false;
   static constexpr bool kSpringPays = true;
   SetPositionLaw(const CouplingConfig& /*config*/, const MappedEnd& /*frame*/) noexcept {}
 };

@@ -15,6 +15,7 @@
 #include "core/base/time.h"
 #include "core/remote/channel_rule.h"
 #include "core/remote/remote_force.h"
+#include "core/teleoperation/methods/coupling_method.h"
 #include "core/teleoperation/port_state.h"
 #include "protocol/limits.h"
 

@@ -137,8 +137,8 @@ TEST(SceneTeleoperation, AnAbsoluteMapAlignsAndHasNoClutch) {
       "s.toml:12: teleoperation.clutch: expected no clutch with map.absolute: a clutch changes the offset, which is "
       "always 0");
   EXPECT_EQ(error_of_minimal_and(coupled("leader", "[teleoperation.map]\nabsolute = true\n", "method = \"waves\"\n")),
-            "s.toml:11: teleoperation.map.absolute: expected the method position-position, position-force, surface or "
-            "set-position with map.absolute: the other methods have no absolute positions");
+            "s.toml:11: teleoperation.map.absolute: expected the method \"position-position\", \"position-force\", "
+            "\"surface\" or \"set-position\" with map.absolute: the other methods have no absolute positions");
 }
 
 TEST(SceneTeleoperation, TakesWhatPassivityRateAndSlowLinksNeed) {

@@ -19,29 +19,10 @@ namespace {
 
 constexpr int kRoundTrips[] = {0, 10, 20, 50, 100, 200, 400, 600};
 
-/// Excludes rate control, which has no force feedback to compare.
-constexpr CouplingMethod kMethods[] = {
-    CouplingMethod::kPositionPosition, CouplingMethod::kPositionForce, CouplingMethod::kWaves,
-    CouplingMethod::kSurface,          CouplingMethod::kPassivity,     CouplingMethod::kSetPosition};
-
-const char* colour_of(CouplingMethod method) {
-  switch (method) {
-    case CouplingMethod::kPositionPosition:
-      return kBlue;
-    case CouplingMethod::kPositionForce:
-      return kOrange;
-    case CouplingMethod::kWaves:
-      return kGreen;
-    case CouplingMethod::kSurface:
-      return kVermilion;
-    case CouplingMethod::kPassivity:
-      return kSky;
-    case CouplingMethod::kSetPosition:
-      return kPurple;
-    case CouplingMethod::kRate:
-      break;
-  }
-  return kInk;
+std::vector<CouplingMethod> felt_methods() {
+  std::vector<CouplingMethod> methods(kCouplingMethods.begin(), kCouplingMethods.end());
+  std::erase_if(methods, [](CouplingMethod method) { return !info(method).is_felt; });
+  return methods;
 }
 
 double median(std::vector<double>& of) {
@@ -94,8 +75,8 @@ class Trials {
     if (hands < 1 || hands > 1000) throw std::invalid_argument("hands: expected 1 to 1000");
   }
 
-  std::uint64_t count() const { return std::size(kMethods) * round_trips_.size() * hands_; }
-  CouplingMethod method(std::uint64_t i) const { return kMethods[i / hands_ / round_trips_.size()]; }
+  std::uint64_t count() const { return methods_.size() * round_trips_.size() * hands_; }
+  CouplingMethod method(std::uint64_t i) const { return methods_[i / hands_ / round_trips_.size()]; }
   int round_trip(std::uint64_t i) const { return round_trips_[i / hands_ % round_trips_.size()]; }
   std::uint64_t seed(std::uint64_t i) const { return seed_ + i % hands_; }
   Trial run(std::uint64_t i) const { return trial(method(i), round_trip(i), seed(i)); }
@@ -109,6 +90,7 @@ class Trials {
   }
 
  private:
+  std::vector<CouplingMethod> methods_ = felt_methods();
   std::size_t hands_;
   std::uint64_t seed_;
   std::span<const int> round_trips_;
@@ -168,10 +150,11 @@ void draw(const std::vector<TeleopRow>& rows, const TeleopOptions& options, std:
   Panel press[2] = {{.title = "First press: share of a rigid link's force", .x_label = "round trip, ms"},
                     {.title = "Second press", .x_label = "round trip, ms"}};
   for (Panel& panel : press) panel.y_range = {0, 1.05};
-  for (const CouplingMethod method : kMethods) {
-    Curve curve[2] = {
-        {.name = std::string(to_string(method)), .colour = colour_of(method), .style = Curve::Style::kBold},
-        {.name = std::string(to_string(method)), .colour = colour_of(method), .style = Curve::Style::kBold}};
+  const char* const colours[] = {kBlue, kOrange, kGreen, kVermilion, kSky, kPurple, kInk};
+  for (const CouplingMethod method : felt_methods()) {
+    const char* const colour = colours[press[0].curves.size() % std::size(colours)];
+    const Curve begun{.name = std::string(to_string(method)), .colour = colour, .style = Curve::Style::kBold};
+    Curve curve[2] = {begun, begun};
     for (const TeleopRow& row : rows) {
       if (row.method != method) continue;
       curve[0].points.emplace_back(row.round_trip_ms, row.first);

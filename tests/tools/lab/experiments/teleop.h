@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-#include "core/teleoperation/port_state.h"
+#include "core/teleoperation/methods/coupling_method.h"
 #include "tests/support/swept_work.h"
 
 namespace tendon::lab {

@@ -187,7 +187,7 @@ MatrixResult matrix_result(const MatrixCase& of, std::uint64_t seed, std::option
   Ports ports = ports_of(of, seed, preset);
   ports.run(1000);
   if (!ports.engage()) return {.held = kNoValue, .drift = kNoValue, .vibration = kNoValue, .energy = ports.least_sum};
-  const bool comparable = of.method != CouplingMethod::kRate;
+  const bool comparable = info(of.method).is_felt;
   Vibration vibration;
   double force = 0;
   ports.run(kLeave - 500 - ports.now, [&](int) { vibration.follow(ports); });
