@@ -54,7 +54,7 @@ std::optional<EnergyTank::Settlement> WaveLaw::observe(const LawInterval& ended)
     // The limiter and the motors make the end of the line softer. The ramp does not.
     end.applied = ended.interval.applied + force_ - ended.wanted;
   }
-  sent_ = port_.observe(end, {.payable = ended.payable, .reserve = ended.reserve, .wanted = force_});
+  sent_ = port_.observe(end, {.payable = ended.payable, .reserve = ended.reserve, .wanted = line_});
   return EnergyTank::Settlement{.credit = port_.taken(), .withdraw = port_.given()};
 }
 
@@ -63,8 +63,9 @@ Demand<3> WaveLaw::command(const LawPeriod& period, const Vec3& speed, const Dem
   moves_ = period.live;
   if (!moves_ && !period.clutched) port_.rest();
   Demand<3> demand = port_.command(moves_ ? speed : Vec3(Vec3::Zero()));
+  line_ = moves_ || period.clutched ? demand.force : Vec3(Vec3::Zero());
   demand.force = at_most(demand.force, max_force_);
-  force_ = moves_ || period.clutched ? demand.force : Vec3(Vec3::Zero());
+  force_ = at_most(line_, max_force_);
   return demand;
 }
 
@@ -72,7 +73,7 @@ void WaveLaw::skip(const LawPeriod& period, Duration elapsed) noexcept {
   last_dx_.setZero();
   // The motion is not known in this interval and in the next one, so the account does not pay for the line.
   port_.observe({.applied = force_, .dx = Vec3::Zero(), .held = elapsed},
-                {.payable = -std::numeric_limits<double>::max(), .wanted = force_});
+                {.payable = -std::numeric_limits<double>::max(), .wanted = line_});
   command(period, Vec3::Zero(), {});
 }
 

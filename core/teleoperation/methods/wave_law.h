@@ -9,12 +9,12 @@ namespace tendon {
 /// and D are only used for the position of a robot.
 ///
 /// The energy that the line sends is taken from the account of the limiter, and the energy of the peer is added to it.
-/// The pair is therefore passive even if a limiter reduces the force. The line uses the force that remains after the
-/// limiter and the motors, and sends the difference later (WavePort::SharedAccount). The ramp does not count as such a
-/// difference, so the two positions do not drift. If the leader is clutched, its end of the line does not move, and the
-/// follower stays at its position. The interval before the clutch was pressed is not part of u, so the line takes its
-/// motion back; otherwise, each press would shift the two positions. Waves are only sent by an engaged end, but are
-/// always received.
+/// The pair is therefore passive even if a limiter reduces the force. The line uses the force that remains after
+/// max_force, the limiter and the motors, and sends the difference later (WavePort::SharedAccount). The ramp does not
+/// count as such a difference, so the two positions do not drift. If the leader is clutched, its end of the line does
+/// not move, and the follower stays at its position. The interval before the clutch was pressed is not part of u, so the
+/// line takes its motion back; otherwise, each press would shift the two positions. Waves are only sent by an engaged
+/// end, but are always received.
 class WaveLaw : public CouplingLaw {
  public:
   /// The delay of the line without the network and the playout: W and a period.
@@ -38,7 +38,8 @@ class WaveLaw : public CouplingLaw {
   double max_force_;
   WavePort<3> port_;
   WaveMessage<3> sent_;
-  Vec3 force_ = Vec3::Zero();       ///< N, of the line in this period
+  Vec3 line_ = Vec3::Zero();        ///< N, that the line wants in this period
+  Vec3 force_ = Vec3::Zero();       ///< N, of the line in this period, at most max_force
   bool moves_ = false;              ///< the line moves with the handle
   Vec3 last_dx_ = Vec3::Zero();     ///< m, motion of the line in the last interval with the handle
   Vec3 takes_back_ = Vec3::Zero();  ///< m, of that motion, in the next interval
