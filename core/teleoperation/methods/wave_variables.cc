@@ -168,26 +168,16 @@ WaveMessage<N> WavePort<N>::observe(const Interval<N>& interval, const Vec<N>& c
   return sent_;
 }
 
-/// Sends `wave`, and the missing part with the energy beyond 1.5 reserves.
+/// Sends `wave` and the missing part together, with the energy of `wave` and the energy beyond 1.5 reserves.
 template <int N>
 void WavePort<N>::send(const Vec<N>& wave, double held, double reserve) noexcept {
   const double cost = held * wave.squaredNorm() / 2;
-  const double most = account_ < reserve ? kPoorShare * cost : cost;
-  const double affordable = std::clamp(account_, 0.0, most);
-  double sent = affordable < cost ? std::sqrt(affordable / cost) : 1.0;
-  unsent_ += (1 - sent) * held * wave;
-  Vec<N> whole = sent * wave;
-  const Vec<N> late = unsent_ / seconds(kLate);
-  const double square = late.squaredNorm();
-  const double spare = account_ - affordable - kReserves * reserve;
-  if (spare > 0 && square > 0) {
-    // The largest k ≤ 1 with T ‖whole + k late‖²/2 ≤ T ‖whole‖²/2 + spare.
-    const double along = whole.dot(late);
-    const double root = std::sqrt(along * along + 2 * square * spare / held);
-    const double k = std::min(1.0, (root - along) / square);
-    whole += k * late;
-    unsent_ -= k * held * late;
-  }
+  const double affordable = std::clamp(account_, 0.0, account_ < reserve ? kPoorShare * cost : cost);
+  const double most = affordable + std::max(account_ - affordable - kReserves * reserve, 0.0);
+  Vec<N> whole = wave + unsent_ / seconds(kLate);
+  const double wanted = held * whole.squaredNorm() / 2;
+  if (wanted > most) whole *= std::sqrt(most / wanted);
+  unsent_ += held * (wave - whole);
   given_ = std::min(held * whole.squaredNorm() / 2, std::max(account_, 0.0));
   account_ -= given_;
   sent_.energy += given_;

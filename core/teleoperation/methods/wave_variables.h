@@ -50,10 +50,11 @@ struct WaveMessage {
 ///
 /// **Passivity in sampled time** (core/PROOFS.md, "Wave variables"). The account A of the port (J) contains the energy
 ///     A += min(T r̂²/2, E(τ) − U) − T s²/2 − F·Δx
-/// s is reduced if A would become negative, and the missing part of its sum is sent within 200 ms when A allows it. So
-/// A + A' + (energy in transit in both directions) is exactly the energy received at both ends. No part is negative,
-/// but A can become negative if the motion in a period is not v. Nothing is then sent until A is positive. (In all
-/// cases the limiter at the device bounds the leader's port.)
+/// s is reduced if A would become negative. The missing part of its sum is sent within 200 ms when A allows it. If A
+/// does not allow both, they are reduced together, so that the sum does not drift. So A + A' + (energy in transit in
+/// both directions) is exactly the energy received at both ends. No part is negative, but A can become negative if the
+/// motion in a period is not v. Nothing is then sent until A is positive. (In all cases the limiter at the device bounds
+/// the leader's port.)
 ///
 /// **Felt dynamics.** The hand feels a spring K = B/d with the inertia B d, and a damper B in fast motion. d is the
 /// minimum delay from `observe` to the `command` that uses it, plus the playout D, averaged over both directions, plus
@@ -100,8 +101,8 @@ class WavePort {
     Vec<N> wanted = Vec<N>::Zero();  ///< N, force that the line requested in the interval
   };
   /// For a port with a limiter, which may reduce the force. Below the reserve, a fifth of the energy of each wave is
-  /// kept for the limiter. The missing part of the sum is sent if the account exceeds 1.5 reserves. The caller must
-  /// credit `taken` to the limiter and withdraw `given`.
+  /// kept for the limiter. The missing part of the sum also uses the energy beyond 1.5 reserves. The caller must credit
+  /// `taken` to the limiter and withdraw `given`.
   WaveMessage<N> observe(const Interval<N>& interval, const SharedAccount& account) noexcept;
 
   void forgive() noexcept { unsent_.setZero(); }  ///< discards the missing part of the sum
