@@ -86,6 +86,8 @@ TEST(BadInput, OfTendondIsAnsweredWithWhatIsWrong) {
 TEST(BadInput, OfTheInjectorIsAnsweredWithWhatIsWrong) {
   const ScratchFolder folder;
   const std::vector<std::string> ends = {"--listen", "127.0.0.1:0", "--to", "127.0.0.1:47100"};
+  const auto path = [&](const std::string& name) { return (folder.path() / name).string(); };
+  const std::string delays = write(path("delays.csv"), "20\n21\n");
   const auto with = [&](const std::string& option, const std::string& value) {
     std::vector<std::string> arguments = ends;
     arguments.insert(arguments.end(), {option, value});
@@ -110,6 +112,19 @@ TEST(BadInput, OfTheInjectorIsAnsweredWithWhatIsWrong) {
            }(),
            {"--replay", "--profile"}},
           {"no such trace", "tendon-inject", with("--replay", "none.csv"), {"none.csv"}, 1},
+          {"the end of no trace", "tendon-inject", with("--at-end", "stop"), {"--at-end", "--replay"}},
+          {"added to no trace", "tendon-inject", with("--add", "loss=1%"), {"--add", "--replay"}},
+          {"another end",
+           "tendon-inject",
+           {"--dry-run", "--replay", "run.csv", "--at-end", "loop"},
+           {"--at-end", "loop", "repeat, stop or pass"}},
+          {"no such capture",
+           "tendon-inject",
+           {"import", "pcap", "none.pcap", "--out", "run.csv"},
+           {"cannot read none.pcap"},
+           1},
+          {"a full disk", "tendon-inject", {"import", "csv", delays, "--out", "/dev/full"}, {"/dev/full"}, 1},
+          {"importing to a folder", "tendon-inject", {"import", "csv", delays, "--out", path("")}, {path("")}, 1},
           {"no such scenario", "tendon-inject", with("--scenario", "none.toml"), {"none.toml"}, 1},
           {"recording into a missing folder",
            "tendon-inject",

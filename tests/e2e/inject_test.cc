@@ -2,8 +2,11 @@
 // Tests tendon-inject between two programs that do not use Tendon. No times are measured.
 #include <gtest/gtest.h>
 #include <poll.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <csignal>
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -45,10 +48,10 @@ void send_through(UdpBatch& server, const std::string& proxy, int count) {
   }
 }
 
-std::string fates(const Trace& trace) {
+std::string fates(const Trace& trace, Direction direction = Direction::kUp) {
   std::string result;
   for (const TraceRecord& record : trace.records) {
-    if (record.direction != Direction::kUp) continue;
+    if (record.direction != direction) continue;
     result.resize(std::max<std::size_t>(result.size(), record.index + 1), '?');
     result[record.index] = record.verdict == Verdict::kDrop ? '-' : record.verdict == Verdict::kPass ? '+' : '2';
   }
@@ -77,6 +80,81 @@ TEST(Inject, ARecordedRunMeetsTheSameFatesOnceMore) {
   EXPECT_NE(first.find('-'), std::string::npos) << first;
   EXPECT_NE(first.find('2'), std::string::npos) << first;
   EXPECT_EQ(fates(injector::read_trace(folder.path() / "second.csv")), first);
+}
+
+TEST(Inject, ARunEndsWithItsTraceIfSoAskedAndSaysHowOftenItWasPlayed) {
+  const ScratchFolder folder;
+  UdpBatch server = UdpBatch::listening(parse_address("127.0.0.1:0"));
+  const std::vector<std::string> to = with(kAnyReleaseError, {"--to", to_string(server.local_address())});
+  {
+    Service proxy("tendon-inject", with(to, {"--profile", "delay=40ms", "--record", "first.csv"}), folder.path(),
+                  "start", "listen");
+    send_through(server, proxy.address(), 10);
+    ::poll(nullptr, 0, 200);
+    proxy.stop();
+  }
+  Service proxy("tendon-inject",
+                with(to, {"--replay", "first.csv", "--at-end", "stop", "--add", "loss=pattern(01)", "--seed", "9",
+                          "--record", "second.csv"}),
+                folder.path(), "start", "listen");
+  send_through(server, proxy.address(), 14);
+  EXPECT_EQ(proxy.process().wait(), 0) << proxy.process().err();
+  const std::string end = proxy.process().out().substr(proxy.process().out().rfind("{\"event\":\"end\""));
+  EXPECT_NE(end.find(R"("up":{"received":1)"), std::string::npos) << end;
+  EXPECT_NE(end.find(R"("played":1.0,)"), std::string::npos) << end;
+  EXPECT_NE(end.find(R"("in_flight":0,)"), std::string::npos) << end;
+  const Trace second = injector::read_trace(folder.path() / "second.csv");
+  EXPECT_EQ(fates(second), "+-+-+-+-+-");
+  EXPECT_EQ(second.up, "replay of first.csv, then loss=pattern(01)");
+  EXPECT_EQ(second.seed, 9U);
+}
+
+TEST(Inject, ACaptureOfARunMeetsTheSameFatesOnceMore) {
+  if (::geteuid() != 0 || !std::filesystem::exists("/usr/bin/tcpdump")) GTEST_SKIP() << "needs root and tcpdump";
+  const ScratchFolder folder;
+  UdpBatch server = UdpBatch::listening(parse_address("127.0.0.1:0"));
+  const std::vector<std::string> to = with(kAnyReleaseError, {"--to", to_string(server.local_address())});
+  const auto port = [](const std::string& address) { return address.substr(address.rfind(':') + 1); };
+  constexpr int kCount = 150;
+  Process tcpdump("/usr/bin/tcpdump",
+                  {"-i", "lo", "-s", "0", "-U", "-Z", "root", "--immediate-mode", "-w", "run.pcap", "udp"},
+                  folder.path());
+  tcpdump.wait_for_line("listening on lo");
+  std::string client_port;
+  {
+    Service proxy("tendon-inject",
+                  with(to, {"--up", "delay=15ms loss=30%", "--down", "delay=5ms loss=burst(20%,2)", "--seed", "7",
+                            "--record", "first.csv"}),
+                  folder.path(), "start", "listen");
+    client_port = port(proxy.address());
+    send_through(server, proxy.address(), kCount);
+    proxy.stop();
+  }
+  tcpdump.signal(SIGINT);
+  EXPECT_EQ(tcpdump.wait(), 0) << tcpdump.err();
+  // One host, so one capture has both ends.
+  Process import(program("tendon-inject"),
+                 {"import", "pcap", "run.pcap", "run.pcap", "--port", client_port, "--server-port",
+                  port(to_string(server.local_address())), "--out", "imported.csv"},
+                 folder.path());
+  ASSERT_EQ(import.wait(), 0) << import.err();
+  const Trace first = injector::read_trace(folder.path() / "first.csv");
+  const Trace imported = injector::read_trace(folder.path() / "imported.csv");
+  const std::string up = fates(imported);
+  // Without the last ones, of which the capture does not know whether they were lost.
+  ASSERT_GT(up.size(), kCount * 9U / 10) << import.err();
+  EXPECT_TRUE(fates(first).starts_with(up)) << fates(first) << "\n" << up;
+  EXPECT_TRUE(fates(first, Direction::kDown).starts_with(fates(imported, Direction::kDown)));
+  {
+    Service proxy("tendon-inject", with(to, {"--replay", "imported.csv", "--at-end", "stop", "--record", "second.csv"}),
+                  folder.path(), "start", "listen");
+    send_through(server, proxy.address(), static_cast<int>(up.size()));
+    proxy.process().signal(SIGTERM);
+    proxy.process().wait();
+  }
+  const std::string again = fates(injector::read_trace(folder.path() / "second.csv"));
+  EXPECT_GT(again.size(), kCount * 8U / 10);
+  EXPECT_TRUE(up.starts_with(again)) << up << "\n" << again;
 }
 
 TEST(Inject, AServerIsFoundByItsHostName) {

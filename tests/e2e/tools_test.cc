@@ -194,6 +194,7 @@ TEST(ExitCodes, OfTheSameMistakeAreTheSameInEveryProgram) {
         {"tendon-inject", "--dry-run", "--scenario", "none.toml"},
         {"tendon-inject", "--dry-run", "--profile", "delay=histogram(none.csv)"},
         {"tendon-inject", "import", "ping", "none.txt", "--out", "run.csv"},
+        {"tendon-inject", "import", "pcap", "none.pcap", "none.pcap", "--port", "1", "--out", "run.csv"},
         {"tendon-inject", "export", "none.csv"},
         {"tendon-softbody", "none.toml"},
         {"tendon-softbody", "explain", "none.toml"},

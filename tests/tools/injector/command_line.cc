@@ -28,6 +28,9 @@ constexpr const char* kExamples =
     "  Record a run, and repeat it\n"
     "    tendon-inject --listen 127.0.0.1:47101 --to 127.0.0.1:47100 --profile lte-driving --record run.csv\n"
     "    tendon-inject --listen 127.0.0.1:47101 --to 127.0.0.1:47100 --replay run.csv\n"
+    "  Repeat it once, with more losses\n"
+    "    tendon-inject --listen 127.0.0.1:47101 --to 127.0.0.1:47100 --replay run.csv --at-end stop \\\n"
+    "      --add 'loss=burst(1%,3)' --seed 7\n"
     "  Print what would happen to 1000 packets, without sending them\n"
     "    tendon-inject --dry-run --count 1000 --seed 7 --profile wifi-bad --json\n\n"
     "Commands during a run: type them in the terminal, or use --control PATH and `tendon-inject control PATH "
@@ -70,6 +73,7 @@ struct Said {
   NetworkOptions network;
   std::string seed;
   std::string replay_by = "index";
+  std::string at_end;
   std::string listen;
   std::string to;
   bool open_to_network = false;
@@ -239,13 +243,25 @@ void add_options(CLI::App& app, Said& said) {
   app.add_option("--replay", said.network.replay, "Recorded or imported trace to repeat, instead of a profile")
       ->type_name("TRACE")
       ->group(network)
-      ->excludes("--profile", "--up", "--down", "--seed", "--scenario");
+      ->excludes("--profile", "--up", "--down", "--scenario");
   app.add_option("--by", said.replay_by,
                  "Treat each datagram like the recorded datagram with the same index, or at the same time")
       ->check(usage::one_of({"index", "time"}))
       ->needs("--replay")
       ->group(network);
-  app.add_flag("--profiles", said.profiles, "Print the named profiles and exit")->group(network);
+  app.add_option("--at-end", said.at_end,
+                 "After the end of the trace: repeat it, stop the run, or pass all datagrams without delay. Default: "
+                 "repeat")
+      ->check(usage::one_of({"repeat", "stop", "pass"}))
+      ->needs("--replay")
+      ->group(network);
+  app.add_option("--add", said.network.add,
+                 "Profile that follows the trace, with random numbers of its own (--seed): delays add, and either can "
+                 "lose a datagram")
+      ->type_name("LINE|NAME")
+      ->needs("--replay")
+      ->group(network);
+  app.add_flag("--profiles", said.profiles, "Print the named profiles with their sources and exit")->group(network);
 
   const char* const output = "Output";
   app.add_flag("--json", said.json, "Print JSON on stdout, one object per line, each second and at the end")
@@ -364,6 +380,10 @@ Task parse_command_line(int argc, const char* const* argv) {
   if (said.profiles) return ProfilesTask{said.json};
   if (!said.seed.empty()) said.network.seed = parse_seed(said.seed);
   if (said.replay_by == "time") said.network.replay_by = TracePlayer::By::kTime;
+  using AtEnd = TracePlayer::AtEnd;
+  if (!said.at_end.empty()) {
+    said.network.at_end = said.at_end == "stop" ? AtEnd::kStop : said.at_end == "pass" ? AtEnd::kPass : AtEnd::kRepeat;
+  }
   if (said.dry) {
     said.dry_run.json = said.json;
     return DryTask{std::move(said.network), said.dry_run, said.record};

@@ -34,6 +34,7 @@ std::vector<std::pair<std::string, std::string>> profiles() {
       {"gamma", "delay=gamma(20ms,5ms)"},
       {"gamma-below-one", "delay=gamma(5ms,20ms) order=free"},
       {"histogram", "delay=histogram(1ms:3,1.5ms:40.25,2ms:10,3ms:0,4ms:0,10ms:3.5,40ms:0.25)"},
+      {"mixture", "delay=mixture(2ms,3:10ms,1:3ms,0.5:40ms)"},
       {"samples", "delay=samples(1ms:1,2ms:3.5,9ms:0,20ms:4)"},
       {"rho", "delay=gamma(20ms,9ms) rho=0.95"},
       {"memory", "delay=lognormal(20ms,9ms) memory=15ms"},
@@ -41,6 +42,7 @@ std::vector<std::pair<std::string, std::string>> profiles() {
       {"burst-loss", "loss=burst(5%,4)"},
       {"gilbert-loss", "loss=gilbert(1%,20%,80%,0.5%)"},
       {"four-state-loss", "loss=fourstate(1%,20%,10%,30%,0.5%)"},
+      {"pareto-bursts", "loss=bursts(pareto2,5%,10%,3.859:3.324,3.797:6.049)"},
       {"pattern-loss", "loss=pattern(0010000)"},
       {"drop-rules", "drop(byte=0,mask=0x0f,value=0x03,50%) drop(byte=1,value=0x41)"},
       {"regimes",
@@ -50,6 +52,7 @@ std::vector<std::pair<std::string, std::string>> profiles() {
        "base=10ms step(at=500ms,5ms) ramp(from=1s,to=2s,-7ms) spike(every=700ms,for=50ms,30ms) "
        "stall(every=1100ms,for=90ms) "
        "handover(every=900ms,for=30ms,6ms) outage(at=2500ms,for=200ms)"},
+      {"random-outages", "outage(clear=300ms,for=gamma(50ms,40ms)) outage(clear=1s,for=uniform(0ms,20ms))"},
       {"copies", "delay=uniform(0ms,30ms) duplicate=10% replay(10%,64) flip=10% truncate=10% rebind(every=300ms)"},
       {"jump", "base=5ms delay=gamma(10ms,3ms) jump(10%,5)"},
       {"rate", "rate=3Mbit/s queue=20kB overhead=28 delay=5ms"},

@@ -48,6 +48,7 @@ Injector::Network::Network(const Profile& p)
     regime_losses.emplace_back();
     if (regime.loss) regime_losses.back().emplace(*regime.loss, Purpose::kRegimeLoss, Purpose::kRegimeLossState);
   }
+  for (const RandomOutage& outage : p.random_outages) outage_lengths.push_back(delay_table(outage.length));
   for (const DropRule& rule : p.rules) rules.emplace_back(rule.probability);
 }
 
@@ -70,7 +71,9 @@ Injector Injector::for_link(std::uint32_t link, LocalTime start) const {
 
 std::uint64_t Injector::table_hash() const noexcept {
   std::uint64_t hash = network_.delay.hash();
-  for (const QuantileTable& table : network_.regime_delays) hash = hash * 0x100000001b3 ^ table.hash();
+  for (const auto* tables : {&network_.regime_delays, &network_.outage_lengths}) {
+    for (const QuantileTable& table : *tables) hash = hash * 0x100000001b3 ^ table.hash();
+  }
   return hash;
 }
 
@@ -85,6 +88,8 @@ void Injector::begin(LocalTime start) {
   }
   bottleneck_ = std::move(queue);
   if (regimes_) next_visit_ = regimes_->next_visit();
+  outages_.clear();
+  for (const RandomOutage& outage : p.random_outages) outages_.emplace_back(outage.clear, start, outages_.size());
   regimes_.reset();
   if (!p.regimes.empty()) regimes_.emplace(p.regimes, draws_, start, next_visit_);
 }
@@ -116,9 +121,13 @@ std::optional<Cause> Injector::cause_of_loss(const Packet& packet, std::uint64_t
   LossModel* const special = regime && network_.regime_losses[*regime] ? &*network_.regime_losses[*regime] : nullptr;
   const bool plain_lost = network_.loss.lost(draws_, index);
   const bool lost = special != nullptr ? special->lost(draws_, index) : plain_lost;
+  bool outage = false;
+  for (std::size_t i = 0; i < outages_.size(); ++i) {
+    outage = outages_[i].end(packet.arrival, network_.outage_lengths[i], draws_) || outage;
+  }
 
   const Duration since = packet.arrival - start_;
-  if (in_outage(p, since)) return Cause::kOutage;
+  if (outage || in_outage(p, since)) return Cause::kOutage;
   if (in_handover(p, since)) return Cause::kHandover;
   for (std::size_t i = 0; i < p.rules.size(); ++i) {
     const DropRule& rule = p.rules[i];

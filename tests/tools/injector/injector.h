@@ -128,6 +128,7 @@ class Injector final : public Decider {
     Copula regime_copula;
     LossModel loss;
     std::vector<std::optional<LossModel>> regime_losses;
+    std::vector<QuantileTable> outage_lengths;
     std::vector<Chance> rules;
     Chance duplicate;
     Chance replay;
@@ -151,7 +152,8 @@ class Injector final : public Decider {
   LocalTime start_{};
   std::optional<BottleneckQueue> bottleneck_;
   std::optional<RegimeChain> regimes_;
-  std::uint64_t next_visit_ = 0;  ///< next number of a visit to a regime, counted across profiles
+  std::vector<OutageChain> outages_;  ///< those of random length
+  std::uint64_t next_visit_ = 0;      ///< next number of a visit to a regime, counted across profiles
   std::uint64_t next_index_ = 0;
   std::uint32_t rebinds_before_ = 0;  ///< by earlier profiles
   LocalTime last_release_ = LocalTime::min();

@@ -13,6 +13,7 @@
 #include "tests/tools/injector/command_line.h"
 #include "tests/tools/injector/profile/named_profiles.h"
 #include "tests/tools/injector/proxy/control_socket.h"
+#include "tests/tools/injector/proxy/status.h"
 
 namespace tendon::injector {
 namespace {
@@ -49,13 +50,14 @@ struct Runner {
         std::cout << JsonLine()
                          .add("name", profile.name)
                          .add("what", profile.what)
+                         .add("source", profile.source)
                          .add("up", profile.up)
                          .add("down", profile.down)
                          .str()
                   << "\n";
       } else {
-        std::cout << profile.name << "\n    " << profile.what << "\n    up:   " << profile.up
-                  << "\n    down: " << profile.down << "\n";
+        std::cout << profile.name << "\n    " << profile.what << "\n    source: " << profile.source
+                  << "\n    up:   " << profile.up << "\n    down: " << profile.down << "\n";
       }
     }
     return 0;
@@ -79,7 +81,12 @@ struct Runner {
       trace.emplace(file, network.header());
     }
     if (!task.run.json) std::cout << "seed " << network.seed << "\n";
-    dry_run(network, task.run, std::cout, trace ? &*trace : nullptr);
+    const auto [up, down] = dry_run(network, task.run, std::cout, trace ? &*trace : nullptr);
+    if (network.replay && task.run.json) {
+      std::cout << JsonLine().add("event", "end").add("up_played", up).add("down_played", down).str() << "\n";
+    } else if (network.replay) {
+      std::cout << "played " << played_text(up) << " times up, " << played_text(down) << " times down\n";
+    }
     file.flush();
     if (!std::cout || (trace && !file)) throw std::runtime_error("cannot write all of the output");
     return 0;

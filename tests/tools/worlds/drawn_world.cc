@@ -91,7 +91,8 @@ injector::Window draw_window(Dice& dice, double lasts_ms) {
 injector::Profile draw_bad_weather(Dice& dice) {
   injector::Profile p;
   if (dice.chance(0.15)) {
-    const auto names = injector::named_profiles();
+    // Later names would change the worlds of the seeds that are kept.
+    const auto names = injector::named_profiles().first(8);
     const auto& named = names[dice.bits() % names.size()];
     p = injector::parse_profile(dice.chance(0.5) ? named.up : named.down);
   } else {

@@ -2,11 +2,9 @@
 #include "tests/tools/injector/models/delay_model.h"
 
 #include <algorithm>
-#include <array>
 #include <bit>
 #include <cmath>
 #include <map>
-#include <optional>
 #include <utility>
 #include <vector>
 
@@ -43,6 +41,26 @@ QuantileTable weighted(const std::vector<Weighted>& entries, Width width) {
   }
   pieces.front().from = 0;
   return QuantileTable(pieces);
+}
+
+/// The x with S(x) = Σ wᵢ exp(−x/mᵢ) = q. ln S is convex, so Newton's method approaches x from below without overshoot.
+double mixture_quantile(const std::vector<Weighted>& parts, double q) {
+  double total = 0;
+  for (const Weighted& part : parts) total += part.weight;
+  double x = 0;
+  for (int round = 0; round < 100; ++round) {
+    double above = 0;  // S(x)
+    double slope = 0;  // −S′(x)
+    for (const Weighted& part : parts) {
+      const double share = part.weight / total * exact::exp(-x / ns(part.value));
+      above += share;
+      slope += share / ns(part.value);
+    }
+    const double step = exact::log(above / q) * above / slope;
+    x += step;
+    if (!(step > 1e-3)) break;
+  }
+  return x;
 }
 
 struct Tabulate {
@@ -83,6 +101,9 @@ struct Tabulate {
   }
   QuantileTable operator()(const SampledDelay& d) const {
     return weighted(d.values, [](std::size_t) -> std::uint64_t { return 1; });
+  }
+  QuantileTable operator()(const MixtureDelay& d) const {
+    return smooth([&](double, double q) { return ns(d.least) + mixture_quantile(d.parts, q); });
   }
   template <typename Quantile>
   static QuantileTable smooth(Quantile quantile) {
@@ -153,18 +174,23 @@ std::uint64_t integer_root(std::uint64_t n) {
   }
 }
 
-/// The parameters of a smooth distribution, or nullopt for the others, whose tables are cheap to build.
-using Numbers = std::array<std::int64_t, 2>;
+/// The parameters of a smooth distribution; none for the others, whose tables are cheap to build.
+using Numbers = std::vector<std::int64_t>;
 struct NumbersOf {
-  std::optional<Numbers> operator()(const NormalDelay& d) const { return {{d.mean.count(), d.deviation.count()}}; }
-  std::optional<Numbers> operator()(const ExponentialDelay& d) const { return {{d.least.count(), d.mean.count()}}; }
-  std::optional<Numbers> operator()(const LognormalDelay& d) const { return {{d.mean.count(), d.deviation.count()}}; }
-  std::optional<Numbers> operator()(const ParetoDelay& d) const {
-    return {{d.least.count(), std::bit_cast<std::int64_t>(d.shape)}};
+  Numbers operator()(const NormalDelay& d) const { return {d.mean.count(), d.deviation.count()}; }
+  Numbers operator()(const ExponentialDelay& d) const { return {d.least.count(), d.mean.count()}; }
+  Numbers operator()(const LognormalDelay& d) const { return {d.mean.count(), d.deviation.count()}; }
+  Numbers operator()(const ParetoDelay& d) const { return {d.least.count(), std::bit_cast<std::int64_t>(d.shape)}; }
+  Numbers operator()(const GammaDelay& d) const { return {d.mean.count(), d.deviation.count()}; }
+  Numbers operator()(const MixtureDelay& d) const {
+    Numbers numbers = {d.least.count()};
+    for (const Weighted& part : d.parts) {
+      numbers.insert(numbers.end(), {part.value.count(), std::bit_cast<std::int64_t>(part.weight)});
+    }
+    return numbers;
   }
-  std::optional<Numbers> operator()(const GammaDelay& d) const { return {{d.mean.count(), d.deviation.count()}}; }
   template <typename Other>
-  std::optional<Numbers> operator()(const Other&) const {
+  Numbers operator()(const Other&) const {
     return {};
   }
 };
@@ -172,11 +198,11 @@ struct NumbersOf {
 }  // namespace
 
 QuantileTable delay_table(const Delay& delay) {
-  const auto numbers = std::visit(NumbersOf{}, delay);
-  if (!numbers) return std::visit(Tabulate{}, delay);
+  Numbers numbers = std::visit(NumbersOf{}, delay);
+  if (numbers.empty()) return std::visit(Tabulate{}, delay);
   constexpr std::size_t kMostKept = 256;  // tables of 150 kB
   thread_local std::map<std::pair<std::size_t, Numbers>, QuantileTable> kept;
-  const auto name = std::pair(delay.index(), *numbers);
+  const auto name = std::pair(delay.index(), std::move(numbers));
   const auto found = kept.find(name);
   if (found != kept.end()) return found->second;
   if (kept.size() >= kMostKept) kept.clear();

@@ -37,6 +37,8 @@ std::vector<Law> laws() {
       {"lognormal(20ms,5ms)", [=](double x) { return normal_cdf((std::log(x) - mu) / sigma); }},
       {"pareto(2ms,2.5)", [](double x) { return x < 2 ? 0 : 1 - std::pow(2 / x, 2.5); }},
       {"gamma(20ms,10ms)", [](double x) { return 1 - std::exp(-x / 5) * (1 + x / 5 * (1 + x / 10 * (1 + x / 15))); }},
+      {"mixture(2ms,3:10ms,1:0.1ms)",
+       [](double x) { return x < 2 ? 0 : 1 - 0.75 * std::exp(-(x - 2) / 10) - 0.25 * std::exp(-(x - 2) / 0.1); }},
       {"gamma(2ms,2.828427ms)", [](double x) { return std::erf(std::sqrt(std::max(x, 0.0) / 4)); }},  // shape ½
   };
 }

@@ -31,6 +31,7 @@ enum class Purpose : std::uint32_t {
   kRegimeLoss = 16,
   kRegimeLossState = 17,
   kHandover = 18,
+  kOutage = 19,
   kRule = 256,  ///< this and larger values: one for each rule
 };
 

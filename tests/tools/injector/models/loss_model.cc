@@ -1,7 +1,25 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tests/tools/injector/models/loss_model.h"
 
+#include "tests/tools/injector/models/exact_math.h"
+
 namespace tendon::injector {
+namespace {
+
+constexpr int kLengthBits = 16;
+constexpr std::int64_t kMaxBurst = 1'000'000;
+
+/// Before rounding down to whole datagrams.
+QuantileTable burst_lengths(const ParetoBurstLoss::Length& law) {
+  return tabulate(
+      [&](double, double q) {
+        return law.scale * (exact::exp(-exact::log(q) / law.shape) - 1) * (std::int64_t{1} << kLengthBits);
+      },
+      0, kMaxBurst << kLengthBits);
+}
+
+}  // namespace
+
 LossModel::LossModel(const Loss& loss, Purpose event, Purpose state) : event_(event), state_draw_(state) {
   const auto two_state = [this](double p, double r, double lost_in_bad, double lost_in_good) {
     kind_ = Kind::kTwoState;
@@ -34,6 +52,10 @@ LossModel::LossModel(const Loss& loss, Purpose event, Purpose state) : event_(ev
     const double alone = gap * p14;
     const double received = p13 > 0 ? p13 * p32 / d : 0;
     stationary_ = {Chance(gap), Chance(gap + received), alone > 0 ? Chance(1 - alone) : kSure};
+  } else if (const auto* bursts = std::get_if<ParetoBurstLoss>(&loss)) {
+    two_state(bursts->p12, bursts->p21, 0, 0);
+    kind_ = Kind::kBursts;
+    for (const auto& law : bursts->lengths) lengths_.push_back(burst_lengths(law));
   } else {
     kind_ = Kind::kPattern;
     for (const char digit : std::get<PatternLoss>(loss).pattern) pattern_.push_back(digit == '1');
@@ -50,6 +72,7 @@ bool LossModel::lost(const Draws& draws, std::uint64_t index) noexcept {
       return pattern_[index % pattern_.size()];
     case Kind::kTwoState:
     case Kind::kFourState:
+    case Kind::kBursts:
       break;
   }
   const Row& row = state_ == kUnborn ? stationary_ : rows_[state_];
@@ -57,12 +80,20 @@ bool LossModel::lost(const Draws& draws, std::uint64_t index) noexcept {
   std::uint8_t next = 0;
   while (next < 3 && !row[next].happens(draw)) ++next;
   state_ = next;
+  if (kind_ == Kind::kBursts) return in_burst(draws, index);
   const Chance& loss = loss_in_[state_];
   return loss.possible() && loss.happens(draws(event_, index));
 }
 
+bool LossModel::in_burst(const Draws& draws, std::uint64_t index) noexcept {
+  if (burst_ < 0) burst_ = lengths_[state_](draws(event_, index)) >> kLengthBits;
+  return burst_-- > 0;
+}
+
 void LossModel::continue_from(const LossModel& before) noexcept {
-  if (kind_ == before.kind_) state_ = before.state_;
+  if (kind_ != before.kind_) return;
+  state_ = before.state_;
+  burst_ = before.burst_;
 }
 
 }  // namespace tendon::injector

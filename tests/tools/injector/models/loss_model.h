@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "tests/tools/injector/models/draws.h"
+#include "tests/tools/injector/models/quantile_table.h"
 #include "tests/tools/injector/profile/profile.h"
 
 namespace tendon::injector {
@@ -25,7 +26,9 @@ class LossModel {
 
  private:
   static constexpr std::uint8_t kUnborn = 255;
-  enum class Kind : std::uint8_t { kNever, kRandom, kTwoState, kFourState, kPattern };
+  enum class Kind : std::uint8_t { kNever, kRandom, kTwoState, kFourState, kPattern, kBursts };
+
+  bool in_burst(const Draws& draws, std::uint64_t index) noexcept;
 
   Purpose event_;
   Purpose state_draw_;
@@ -40,6 +43,8 @@ class LossModel {
   Row stationary_{kNo, kNo, kNo};
   std::uint8_t state_ = kUnborn;
   std::vector<bool> pattern_;
+  std::vector<QuantileTable> lengths_;  ///< of the bursts, by state, in units of 2⁻¹⁶ datagrams
+  std::int64_t burst_ = -1;  ///< datagrams that are still to be lost; below zero: the next one begins a burst
 };
 
 }  // namespace tendon::injector

@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 #include <vector>
@@ -35,6 +36,17 @@ TEST(LossModel, AChainBeginsStationarySoShortRunsLoseAsMuchAsLongOnes) {
 
 TEST(LossModel, APatternRepeatsFromTheFirstDatagram) {
   EXPECT_EQ(losses("pattern(0010)", 8), (std::vector<bool>{false, false, true, false, false, false, true, false}));
+}
+
+TEST(LossModel, OneDatagramPassesAfterEachBurstHoweverLong) {
+  // A scale of 10 000 and a shape of 1: half of the bursts are longer than 10 000 datagrams, and none is empty.
+  const auto run = losses("bursts(pareto2,100%,100%,1:10000,100:0)", 200'000);
+  std::size_t passed = 0;
+  for (std::size_t i = 1; i < run.size(); ++i) passed += run[i] ? 0 : 1;
+  EXPECT_GT(passed, 4U);
+  EXPECT_LT(passed, 200U);
+  const auto none = losses("bursts(pareto2,5%,10%,4:0,4:0)", 1000);
+  EXPECT_EQ(std::ranges::count(none, true), 0);
 }
 
 TEST(LossModel, AnotherModelOfTheSameKindGoesOnFromTheState) {

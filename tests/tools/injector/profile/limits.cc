@@ -101,6 +101,16 @@ struct DelayCheck {
   void operator()(const GammaDelay& d) const { shaped(d.mean, d.deviation); }
   void operator()(const HistogramDelay& d) const { check_table(field + "=histogram", d.bins); }
   void operator()(const SampledDelay& d) const { check_table(field + "=samples", d.values); }
+  void operator()(const MixtureDelay& d) const {
+    const std::string name = field + "=mixture";
+    check_duration(name + ": least", d.least);
+    check_count(name, d.parts.size(), kMaxParts, "parts");
+    if (d.parts.empty()) refuse(name, "without parts", "one or more");
+    for (const Weighted& part : d.parts) {
+      check_duration(name + ": mean", part.value, Duration(1));
+      check_number(name + ": weight", part.weight, 1e-9, 1e9);
+    }
+  }
 };
 
 struct LossCheck {
@@ -132,6 +142,14 @@ struct LossCheck {
   void operator()(const PatternLoss& l) const {
     if (l.pattern.empty() || l.pattern.size() > kMaxPattern || l.pattern.find_first_not_of("01") != std::string::npos) {
       refuse(field + "=pattern", in_quotes(l.pattern), "1 to " + std::to_string(kMaxPattern) + " digits 0 and 1");
+    }
+  }
+  void operator()(const ParetoBurstLoss& l) const {
+    check_probability(field + "=bursts: P12", l.p12);
+    check_probability(field + "=bursts: P21", l.p21);
+    for (const auto& [shape, scale] : l.lengths) {
+      check_number(field + "=bursts: shape", shape, 1, 100);
+      check_number(field + "=bursts: scale", scale, 0, 1e4);
     }
   }
 };
@@ -193,8 +211,8 @@ void check(const Profile& p) {
     std::visit(DelayCheck{"regime " + r.name + ": delay"}, r.delay);
     if (r.loss) std::visit(LossCheck{"regime " + r.name + ": loss"}, *r.loss);
   }
-  for (const std::size_t count :
-       {p.steps.size(), p.ramps.size(), p.spikes.size(), p.stalls.size(), p.handovers.size(), p.outages.size()}) {
+  for (const std::size_t count : {p.steps.size(), p.ramps.size(), p.spikes.size(), p.stalls.size(), p.handovers.size(),
+                                  p.outages.size(), p.random_outages.size()}) {
     check_count("step, ramp, spike, stall, handover or outage", count, kMaxEvents, "events");
   }
   for (const Step& s : p.steps) {
@@ -219,6 +237,11 @@ void check(const Profile& p) {
     check_duration("handover", h.change);
   }
   for (const Outage& o : p.outages) check_window("outage", o.when);
+  for (const RandomOutage& o : p.random_outages) {
+    // As for the dwell time of a regime.
+    check_duration("outage: clear", o.clear, std::chrono::milliseconds(1), kLongest);
+    std::visit(DelayCheck{"outage: for"}, o.length);
+  }
 
   check_probability("duplicate", p.duplicate);
   check_probability("replay", p.replay.probability);

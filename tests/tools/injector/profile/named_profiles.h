@@ -10,12 +10,13 @@
 
 namespace tendon::injector {
 
-/// A predefined network of two profiles. named_profiles.cc gives the source of each number.
+/// A predefined network of two profiles. named_profiles.cc gives the origin of each number.
 struct NamedProfile {
   std::string_view name;
   std::string_view what;
-  std::string_view up;    ///< client to server, as a profile line
-  std::string_view down;  ///< server to client
+  std::string_view source;  ///< the citation, and what is assumed
+  std::string_view up;      ///< client to server, as a profile line
+  std::string_view down;    ///< server to client
 };
 
 std::span<const NamedProfile> named_profiles();

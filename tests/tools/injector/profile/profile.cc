@@ -86,17 +86,31 @@ SampledDelay netem(const Call& c) {
   return {netem_table(c.arguments[0], mean, deviation)};
 }
 
+MixtureDelay mixture(const Call& c) {
+  const std::string form = "mixture(LEAST,WEIGHT:MEAN,…) like mixture(70ms,0.7:37ms,0.3:12ms)";
+  if (c.arguments.size() < 2) refuse(c.field, in_quotes(c.text), form);
+  MixtureDelay result{duration(c.field + ": least", c.arguments[0]), {}};
+  for (std::size_t i = 1; i < c.arguments.size(); ++i) {
+    std::string_view mean = c.arguments[i];
+    const std::optional<double> weight = parse_number(take_until(mean, ":"));
+    const std::optional<Duration> value = parse_duration(mean);
+    if (!weight || !value) refuse(c.field, in_quotes(c.arguments[i]), form);
+    result.parts.push_back({*value, *weight});
+  }
+  return result;
+}
+
 Delay delay(const std::string& field, std::string_view text) {
   const Call c(field, text);
   if (!c.brackets) return ConstantDelay{duration(field, text)};
   if (c.name == "histogram") return HistogramDelay{table(c)};
   if (c.name == "samples") return SampledDelay{table(c)};
   if (c.name == "netem") return netem(c);
+  if (c.name == "mixture") return mixture(c);
+  constexpr const char* kLaws =
+      "uniform, normal, exponential, lognormal, pareto, gamma, mixture, histogram, samples or netem";
   constexpr std::string_view kNames = "uniform normal exponential lognormal pareto gamma";
-  if (c.name.empty() || kNames.find(c.name) == std::string_view::npos) {
-    refuse(field, in_quotes(c.name),
-           "uniform, normal, exponential, lognormal, pareto, gamma, histogram, samples or netem");
-  }
+  if (c.name.empty() || kNames.find(c.name) == std::string_view::npos) refuse(field, in_quotes(c.name), kLaws);
   if (c.name == "pareto") {
     c.expect(2, "pareto(LEAST,SHAPE)");
     return ParetoDelay{duration(field + ": least", c.arguments[0]), number(field + ": shape", c.arguments[1])};
@@ -109,8 +123,7 @@ Delay delay(const std::string& field, std::string_view text) {
   if (c.name == "exponential") return ExponentialDelay{a, b};
   if (c.name == "lognormal") return LognormalDelay{a, b};
   if (c.name == "gamma") return GammaDelay{a, b};
-  refuse(field, in_quotes(c.name),
-         "uniform, normal, exponential, lognormal, pareto, gamma, histogram, samples or netem");
+  refuse(field, in_quotes(c.name), kLaws);
 }
 
 Loss loss(const std::string& field, std::string_view text) {
@@ -133,7 +146,21 @@ Loss loss(const std::string& field, std::string_view text) {
     c.expect(1, "pattern(0001)");
     return PatternLoss{std::string(c.arguments[0])};
   }
-  refuse(field, in_quotes(c.name), "burst, gilbert, fourstate or pattern");
+  if (c.name == "bursts") {
+    const std::string form = "bursts(pareto2,P12,P21,SHAPE1:SCALE1,SHAPE2:SCALE2)";
+    c.expect(5, form);
+    if (c.arguments[0] != "pareto2") refuse(field, in_quotes(c.text), form);
+    ParetoBurstLoss bursts{p(1), p(2), {}};
+    for (std::size_t i = 0; i < 2; ++i) {
+      std::string_view scale = c.arguments[3 + i];
+      const std::optional<double> shape = parse_number(take_until(scale, ":"));
+      const std::optional<double> size = parse_number(scale);
+      if (!shape || !size) refuse(field, in_quotes(c.arguments[3 + i]), form);
+      bursts.lengths[i] = {*shape, *size};
+    }
+    return bursts;
+  }
+  refuse(field, in_quotes(c.name), "burst, bursts, gilbert, fourstate or pattern");
 }
 
 /// The arguments of an event: "key=value" pairs, and at most one without a key.
@@ -275,7 +302,7 @@ constexpr std::array<std::string_view, 8> kEvents = {"drop(byte=16,mask=0x0f,val
                                                      "spike(every=15s,for=50ms,80ms)",
                                                      "stall(every=2s,for=100ms)",
                                                      "handover(every=15s,for=60ms,10ms)",
-                                                     "outage(at=5s,for=300ms)"};
+                                                     "outage(at=5s,for=300ms) or outage(clear=5s,for=LAW)"};
 
 bool add_event(Profile& p, const Call& c) {
   const auto* const form =
@@ -306,6 +333,8 @@ bool add_event(Profile& p, const Call& c) {
     p.stalls.push_back({a.window()});
   } else if (c.name == "handover") {
     p.handovers.push_back({a.window(), a.need_duration("")});
+  } else if (const auto clear = a.take("clear")) {
+    p.random_outages.push_back({duration(a.name("clear"), *clear), delay(a.name("for"), a.need("for"))});
   } else {
     p.outages.push_back({a.window()});
   }

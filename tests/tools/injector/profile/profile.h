@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -51,6 +52,13 @@ struct GammaDelay {  ///< delay=gamma(MEAN,SD): shape (MEAN/SD)²
   Duration mean{}, deviation{};
   bool operator==(const GammaDelay&) const = default;
 };
+/// delay=mixture(LEAST,WEIGHT:MEAN,…): P(delay > LEAST + x) = Σ wᵢ exp(−x/MEANᵢ), wᵢ = WEIGHTᵢ / Σ WEIGHT. Each mean is
+/// that of one exponential, without LEAST.
+struct MixtureDelay {
+  Duration least{};
+  std::vector<Weighted> parts;  ///< the means, in any order
+  bool operator==(const MixtureDelay&) const = default;
+};
 /// delay=histogram(LOWER:WEIGHT,…) or histogram(FILE.csv). Uniform within a bin. The last bin is as wide as its
 /// predecessor; a histogram with one bin is a constant delay.
 struct HistogramDelay {
@@ -63,7 +71,7 @@ struct SampledDelay {
   bool operator==(const SampledDelay&) const = default;
 };
 using Delay = std::variant<ConstantDelay, UniformDelay, NormalDelay, ExponentialDelay, LognormalDelay, ParetoDelay,
-                           GammaDelay, HistogramDelay, SampledDelay>;
+                           GammaDelay, HistogramDelay, SampledDelay, MixtureDelay>;
 
 struct RandomLoss {  ///< loss=2%: independent losses
   double probability = 0;
@@ -94,7 +102,23 @@ struct PatternLoss {  ///< loss=pattern(0001): 1 is lost; starts with the first 
   std::string pattern;
   bool operator==(const PatternLoss&) const = default;
 };
-using Loss = std::variant<RandomLoss, BurstLoss, GilbertLoss, FourStateLoss, PatternLoss>;
+/// loss=bursts(pareto2,P12,P21,SHAPE1:SCALE1,SHAPE2:SCALE2): bursts of random length, each followed by one datagram that
+/// passes (NetFI's GE_Pareto_BLL). The length is drawn in the state i in which the burst begins, and can be 0:
+///
+///     P(length ≥ k) = (1 + k/SCALEᵢ)^(−SHAPEᵢ)        Pareto II, rounded down to whole datagrams
+///
+/// Each datagram, lost or not, first makes a transition with P12 or P21. Starts with a new burst, and with the
+/// stationary distribution of the states.
+struct ParetoBurstLoss {
+  struct Length {
+    double shape = 2, scale = 0;
+    bool operator==(const Length&) const = default;
+  };
+  double p12 = 0, p21 = 1;
+  std::array<Length, 2> lengths;
+  bool operator==(const ParetoBurstLoss&) const = default;
+};
+using Loss = std::variant<RandomLoss, BurstLoss, GilbertLoss, FourStateLoss, PatternLoss, ParetoBurstLoss>;
 
 /// drop(byte=16,mask=0xf,value=3,50%): datagrams with (payload[byte] & mask) == value are lost with this probability.
 struct DropRule {
@@ -154,6 +178,13 @@ struct Outage {  ///< outage(at=5s,for=300ms): arrivals in the window are lost
   Window when;
   bool operator==(const Outage&) const = default;
 };
+/// outage(clear=8.5s,for=uniform(0ms,3s)): a time without losses, then an outage of random length, and so on. The length
+/// follows a law of Delay.
+struct RandomOutage {
+  Duration clear{};
+  Delay length;
+  bool operator==(const RandomOutage&) const = default;
+};
 
 struct Replay {  ///< replay(1%,64): sends one of the last 64 datagrams again with this probability
   double probability = 0;
@@ -210,6 +241,7 @@ struct Profile {
   std::vector<Stall> stalls;
   std::vector<Handover> handovers;
   std::vector<Outage> outages;
+  std::vector<RandomOutage> random_outages;
   double duplicate = 0;  ///< duplicate=1%: a second copy with its own delay, never ahead of the first
   Replay replay;
   double flip = 0;      ///< flip=0.1%: flips one bit of the payload
@@ -227,6 +259,9 @@ inline constexpr Duration kMaxDelay = std::chrono::seconds(60);
 
 /// Limit for events of one kind, drop rules and regimes, which are all evaluated for each datagram.
 inline constexpr std::size_t kMaxEvents = 64;
+
+/// Finding a quantile of a mixture takes a few exponentials for each part.
+inline constexpr std::size_t kMaxParts = 16;
 
 /// Measured histograms have about 100 bins; the tables of netem 4096 values; a minute of 1 kHz 60 000 samples.
 inline constexpr std::size_t kMaxValues = 65'536;

@@ -80,7 +80,8 @@ TEST(Profile, EveryFieldReadsAsTheManualWritesIt) {
       "base=5ms delay=pareto(2ms,1.5) memory=20ms loss=gilbert(1%,20%,80%,0.1%) drop(byte=16,mask=0x0f,value=0x03,50%) "
       "regime(clear,dwell=4s) regime(busy,dwell=1s,delay=uniform(1ms,2ms),loss=pattern(01)) step(at=5s,-20ms) "
       "ramp(from=5s,to=10s,30ms) spike(at=1s,every=15s,for=50ms,80ms) stall(every=2s,for=100ms) "
-      "handover(every=15s,for=60ms,10ms) outage(at=5s,for=300ms) duplicate=1% replay(1%,64) flip=0.1% truncate=0.2% "
+      "handover(every=15s,for=60ms,10ms) outage(at=5s,for=300ms) outage(clear=8500ms,for=uniform(0ms,3s)) duplicate=1% "
+      "replay(1%,64) flip=0.1% truncate=0.2% "
       "rebind(every=10s) order=free jump(1%,3) rate=10Mbit/s queue=50packets overhead=42";
   const Profile p = parse_profile(line);
   EXPECT_EQ(to_string(p), line);
@@ -96,6 +97,7 @@ TEST(Profile, EveryFieldReadsAsTheManualWritesIt) {
   EXPECT_EQ(p.stalls, (std::vector<Stall>{{{2s, 2s, 100ms}}}));
   EXPECT_EQ(p.handovers, (std::vector<Handover>{{{15s, 15s, 60ms}, 10ms}}));
   EXPECT_EQ(p.outages, (std::vector<Outage>{{{5s, 0s, 300ms}}}));
+  EXPECT_EQ(p.random_outages, (std::vector<RandomOutage>{{8500ms, UniformDelay{0ms, 3s}}}));
   EXPECT_EQ(p.replay, (Replay{0.01, 64}));
   EXPECT_EQ(p.jump, (Jump{0.01, 3}));
   EXPECT_EQ(p.rebind, 10s);
@@ -103,6 +105,15 @@ TEST(Profile, EveryFieldReadsAsTheManualWritesIt) {
   EXPECT_EQ(p.bottleneck.bits_per_second, 10'000'000U);
   EXPECT_EQ(p.bottleneck.queue, 50U);
   EXPECT_EQ(p.bottleneck.overhead, 42U);
+}
+
+TEST(Profile, ReadsAndWritesMixturesAndBursts) {
+  const std::string line =
+      "delay=mixture(70ms,0.72645:36.886758ms,0.27355:11.724704ms) loss=bursts(pareto2,5%,10%,4.428:1.638,4.966:0.271)";
+  const Profile p = parse_profile(line);
+  EXPECT_EQ(to_string(p), line);
+  EXPECT_EQ(p.delay, Delay(MixtureDelay{70ms, {{36886758ns, 0.72645}, {11724704ns, 0.27355}}}));
+  EXPECT_EQ(p.loss, Loss(ParetoBurstLoss{0.05, 0.1, {{{4.428, 1.638}, {4.966, 0.271}}}}));
 }
 
 TEST(Profile, FieldsComeInAnyOrderWithAnyBlanks) {
@@ -133,7 +144,7 @@ std::vector<Weighted> any_table() {
 Delay any_delay() {
   const Duration mean = any_duration(1000, 1'000'000'000);
   const Duration deviation = mean / *rc::gen::inRange(1, 90);
-  switch (*rc::gen::inRange(0, 9)) {
+  switch (*rc::gen::inRange(0, 10)) {
     case 0:
       return ConstantDelay{any_duration()};
     case 1:
@@ -150,6 +161,8 @@ Delay any_delay() {
       return GammaDelay{mean, deviation};
     case 7:
       return HistogramDelay{any_table()};
+    case 8:
+      return MixtureDelay{mean, {{deviation, any_probability() + 1e-9}, {mean, 1}}};
     default:
       return SampledDelay{any_table()};
   }
@@ -157,7 +170,7 @@ Delay any_delay() {
 
 Loss any_loss() {
   const double p = any_probability();
-  switch (*rc::gen::inRange(0, 5)) {
+  switch (*rc::gen::inRange(0, 6)) {
     case 0:
       return RandomLoss{p};
     case 1:
@@ -166,6 +179,8 @@ Loss any_loss() {
       return GilbertLoss{p, any_probability(), any_probability(), any_probability()};
     case 3:
       return FourStateLoss{p / 2, any_probability() / 2, any_probability() / 2, any_probability(), p / 3};
+    case 4:
+      return ParetoBurstLoss{p, any_probability(), {{{1 + p, 9 * p}, {2, any_probability()}}}};
     default:
       return PatternLoss{coin() ? "0001" : "1"};
   }
@@ -198,6 +213,7 @@ Profile any_profile() {
   if (coin()) p.stalls.push_back({any_window()});
   if (coin()) p.handovers.push_back({any_window(), any_duration()});
   if (coin()) p.outages.push_back({any_window()});
+  if (coin()) p.random_outages.push_back({any_duration(1'000'000), any_delay()});
   p.duplicate = any_probability();
   if (coin()) p.replay = {any_probability() / 2 + 0.1, *rc::gen::inRange(1U, kMaxReplayDepth + 1)};
   p.flip = any_probability();
@@ -267,8 +283,16 @@ TEST(Profile, RefusesALineItDoesNotUnderstandAndSaysWhere) {
            {"loss=1% loss=2%", "loss is given twice, expected once"},
            {"jump(1%,1) jump(1%,1)", "jump is given twice, expected once"},
            {"delay=gauss(1ms,2ms)",
-            "delay is \"gauss\", expected uniform, normal, exponential, lognormal, pareto, gamma, histogram, samples "
-            "or netem"},
+            "delay is \"gauss\", expected uniform, normal, exponential, lognormal, pareto, gamma, mixture, histogram, "
+            "samples or netem"},
+           {"delay=mixture(70ms,36ms:1)",
+            "delay is \"36ms:1\", expected mixture(LEAST,WEIGHT:MEAN,…) like mixture(70ms,0.7:37ms,0.3:12ms)"},
+           {"delay=mixture(70ms,0:36ms)", "delay=mixture: weight is 0, expected 1e-09 to 1e+09"},
+           {"delay=mixture(70ms,1:0ms)", "delay=mixture: mean is 0ms, expected 0.000001ms to 60s"},
+           {"loss=bursts(pareto,5%,10%,4:1,4:1)",
+            "loss is \"bursts(pareto,5%,10%,4:1,4:1)\", expected bursts(pareto2,P12,P21,SHAPE1:SCALE1,SHAPE2:SCALE2)"},
+           {"loss=bursts(pareto2,5%,10%,0.9:1,4:1)", "loss=bursts: shape is 0.9, expected 1 to 100"},
+           {"outage(clear=0ms,for=1s)", "outage: clear is 0ms, expected 1ms to 86400s"},
            {"delay=normal(1ms)", "delay is \"normal(1ms)\", expected normal of two durations"},
            {"delay=normal(1ms,2ms", "delay is \"normal(1ms,2ms\", expected a closing bracket at its end"},
            {"delay=uniform(2ms,1ms)", "delay: upper end is 1ms, expected 2ms to 60s"},
@@ -287,7 +311,8 @@ TEST(Profile, RefusesALineItDoesNotUnderstandAndSaysWhere) {
            {"regime(a,dwell=1s)", "regime is one, expected two or more, or none"},
            {"stall(for=1s)", "stall is \"stall(for=1s)\", expected stall(every=2s,for=100ms)"},
            {"stall(every=1s,for=1s)", "stall: for is 1s, expected 0.000001ms to 999.999999ms"},
-           {"outage(at=1s,for=1s,twice)", "outage is \"outage(at=1s,for=1s,twice)\", expected outage(at=5s,for=300ms)"},
+           {"outage(at=1s,for=1s,twice)",
+            "outage is \"outage(at=1s,for=1s,twice)\", expected outage(at=5s,for=300ms) or outage(clear=5s,for=LAW)"},
            {"replay(1%,65)", "replay: depth is \"65\", expected a whole number from 0 to 64"},
            {"replay(1%,0)", "replay: depth is 0, expected 1 to 64 with a probability above zero"},
            {"rate=10",

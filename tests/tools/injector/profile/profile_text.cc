@@ -39,6 +39,12 @@ struct DelayText {
   std::string operator()(const GammaDelay& d) const { return two("gamma", d.mean, d.deviation); }
   std::string operator()(const HistogramDelay& d) const { return table_text("histogram", d.bins); }
   std::string operator()(const SampledDelay& d) const { return table_text("samples", d.values); }
+  std::string operator()(const MixtureDelay& d) const {
+    std::vector<std::string> arguments = {duration_text(d.least)};
+    for (const Weighted& part : d.parts)
+      arguments.push_back(number_text(part.weight) + ":" + duration_text(part.value));
+    return call("mixture", arguments);
+  }
   static std::string two(const std::string& name, Duration a, Duration b) {
     return call(name, {duration_text(a), duration_text(b)});
   }
@@ -56,6 +62,11 @@ struct LossText {
     return probabilities("fourstate", {l.p13, l.p31, l.p32, l.p23, l.p14});
   }
   std::string operator()(const PatternLoss& l) const { return "pattern(" + l.pattern + ")"; }
+  std::string operator()(const ParetoBurstLoss& l) const {
+    std::vector<std::string> arguments = {"pareto2", probability_text(l.p12), probability_text(l.p21)};
+    for (const auto& [shape, scale] : l.lengths) arguments.push_back(number_text(shape) + ":" + number_text(scale));
+    return call("bursts", arguments);
+  }
   static std::string probabilities(const std::string& name, const std::vector<double>& values) {
     std::vector<std::string> texts;
     for (const double p : values) texts.push_back(probability_text(p));
@@ -118,6 +129,9 @@ std::string to_string(const Profile& p) {
   for (const Stall& s : p.stalls) add(call("stall", window_text(s.when)));
   for (const Handover& h : p.handovers) add(call("handover", window_text(h.when, {duration_text(h.change)})));
   for (const Outage& o : p.outages) add(call("outage", window_text(o.when)));
+  for (const RandomOutage& o : p.random_outages) {
+    add(call("outage", {"clear=" + duration_text(o.clear), "for=" + std::visit(DelayText{}, o.length)}));
+  }
   if (p.duplicate != 0) add("duplicate=" + probability_text(p.duplicate));
   if (p.replay != plain.replay) {
     add(call("replay", {probability_text(p.replay.probability), std::to_string(p.replay.depth)}));

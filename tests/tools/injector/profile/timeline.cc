@@ -78,6 +78,15 @@ Duration past_stalls(const Profile& profile, Duration since) noexcept {
   return since;
 }
 
+std::optional<LocalTime> OutageChain::end(LocalTime now, const QuantileTable& length, const Draws& draws) {
+  while (now >= ends_ + clear_) {
+    begins_ = ends_ + clear_;
+    ends_ = begins_ + Duration(length(draws(Purpose::kOutage, ++begun_ * kMaxEvents + number_)));
+  }
+  if (now < begins_ || now >= ends_) return std::nullopt;
+  return ends_;
+}
+
 RegimeChain::RegimeChain(const std::vector<Regime>& regimes, const Draws& draws, LocalTime start,
                          std::uint64_t first_visit)
     : draws_(draws), visit_(first_visit) {

@@ -3,6 +3,8 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
+#include <vector>
 
 #include "core/base/time.h"
 #include "tests/tools/injector/models/draws.h"
@@ -27,6 +29,24 @@ bool in_handover(const Profile& profile, Duration since) noexcept;
 
 /// Delays a release at `since` to the end of its stall, repeatedly if that is within another one (at most 1000 times).
 Duration past_stalls(const Profile& profile, Duration since) noexcept;
+
+/// The outages of a RandomOutage. The n-th length depends only on n. Thread-safe: no.
+class OutageChain {
+ public:
+  /// `number` distinguishes the chains of a profile.
+  OutageChain(Duration clear, LocalTime start, std::size_t number)
+      : clear_(clear), number_(number), begins_(start), ends_(start) {}
+
+  /// The end of the outage in which `now` is, or nothing if there is none. `now` must not decrease. Takes about 30 ns for
+  /// each outage since the last call.
+  std::optional<LocalTime> end(LocalTime now, const QuantileTable& length, const Draws& draws);
+
+ private:
+  Duration clear_;
+  std::size_t number_;
+  std::uint64_t begun_ = 0;
+  LocalTime begins_, ends_;  ///< of the newest outage
+};
 
 /// A continuous-time Markov chain that depends only on the seed. Thread-safe: no.
 class RegimeChain {

@@ -107,6 +107,7 @@ void Driver::run() {
   if (config_.duration) end_ = start_ + *config_.duration;
   for (LocalTime now = start_; !stop_ && now < end_; now = monotonic_now()) {
     now = send_due(now);
+    if (proxy_.ended() && proxy_.in_flight() == 0) break;
     while (const auto client = proxy_.next_evicted(now)) {
       if (const auto gone = upstreams_.find(*client); gone != upstreams_.end()) {
         closed_overflowed_ += gone->second.socket.overflowed();

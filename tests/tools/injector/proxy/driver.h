@@ -47,7 +47,7 @@ class Driver {
   Driver(const Driver&) = delete;
   Driver& operator=(const Driver&) = delete;
 
-  /// Receives and releases datagrams until the duration has elapsed or stop() is called. Throws std::system_error if
+  /// Receives and releases datagrams until the duration has elapsed, the trace has ended or stop() is called. Throws std::system_error if
   /// the system refuses a priority or a descriptor.
   void run();
 

@@ -65,7 +65,13 @@ class Way {
  public:
   Way(const PreparedNetwork& network, Direction direction) : timeline_(network.timeline), direction_(direction) {
     if (network.replay) {
-      decider_ = std::make_unique<TracePlayer>(*network.replay, direction, kLink, network.replay_by);
+      auto player = std::make_unique<TracePlayer>(*network.replay, direction, kLink, network.playback.by, LocalTime{},
+                                                  network.playback.at_end);
+      if (network.playback.add) {
+        player->add(network.networks[static_cast<std::size_t>(direction)].for_link(kLink, LocalTime{}));
+      }
+      player_ = player.get();
+      decider_ = std::move(player);
       return;
     }
     auto injector =
@@ -73,6 +79,9 @@ class Way {
     injector_ = injector.get();
     decider_ = std::move(injector);
   }
+
+  bool stops(LocalTime at) const { return player_ != nullptr && player_->stops(at); }
+  double played() const { return player_ == nullptr ? 0 : player_->played(); }
 
   TraceRecord decide(const Packet& packet) {
     for (; next_ < timeline_.size() && timeline_[next_].at <= packet.arrival.time_since_epoch(); ++next_) {
@@ -96,27 +105,31 @@ class Way {
   Direction direction_;
   std::unique_ptr<Decider> decider_;
   Injector* injector_ = nullptr;
+  TracePlayer* player_ = nullptr;
   std::size_t next_ = 0;
 };
 
 }  // namespace
 
-void dry_run(const PreparedNetwork& network, const DryRun& options, std::ostream& out, TraceWriter* trace) {
+std::array<double, 2> dry_run(const PreparedNetwork& network, const DryRun& options, std::ostream& out,
+                              TraceWriter* trace) {
   std::array<Way, 2> ways = {Way(network, Direction::kUp), Way(network, Direction::kDown)};
   std::string text;
   for (std::uint64_t i = 0; i < options.count; ++i) {
     const std::uint64_t round = i / 2;
     const LocalTime at(std::chrono::seconds(round / options.rate_hz) +
                        Duration(round % options.rate_hz * 1'000'000'000 / options.rate_hz));
+    if (ways[i % 2].stops(at)) break;
     const TraceRecord record = ways[i % 2].decide({.arrival = at, .size = options.bytes, .bytes = {}});
     options.json ? append_json(text, record) : append_text(text, record);
     if (trace != nullptr) trace->write(record);
     if (text.size() < kPiece) continue;
     out << text;
     text.clear();
-    if (!out) return;  // the pipe was closed by the reader
+    if (!out) break;  // the pipe was closed by the reader
   }
   out << text << std::flush;
+  return {ways[0].played(), ways[1].played()};
 }
 
 }  // namespace tendon::injector

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <ostream>
 
@@ -18,7 +19,9 @@ struct DryRun {
 /// Writes one line per packet, in the order of sending. As JSON:
 ///     {"dir":"up","index":0,"t_in_ns":0,"verdict":"pass","cause":"delay","t_out_ns":20123456}
 /// t_out_ns is null for a dropped packet, and the time of the first copy for a duplicated one. All times are relative
-/// to the first packet. `trace` can be null.
-void dry_run(const PreparedNetwork& network, const DryRun& options, std::ostream& out, TraceWriter* trace);
+/// to the first packet. `trace` can be null. Ends earlier at the end of a trace with AtEnd::kStop. Returns how often each
+/// Direction of a trace has been played.
+std::array<double, 2> dry_run(const PreparedNetwork& network, const DryRun& options, std::ostream& out,
+                              TraceWriter* trace);
 
 }  // namespace tendon::injector

@@ -3,11 +3,16 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <optional>
 #include <sstream>
 #include <stdexcept>
 #include <string>
 
 #include "tests/support/refusal.h"
+#include "tests/tools/injector/proxy/status.h"
 #include "tests/tools/injector/traces/trace.h"
 
 namespace tendon::injector::dry_run_test {
@@ -68,6 +73,57 @@ TEST(DryRun, RecordsATraceWhoseReplayIsTheSame) {
   EXPECT_EQ(replayed.str(), decisions.str());
 }
 
+class TraceFile {
+ public:
+  TraceFile(const std::string& profile, std::uint64_t count)
+      : path_(std::filesystem::path(::testing::TempDir()) /
+              (std::string(::testing::UnitTest::GetInstance()->current_test_info()->name()) + ".csv")) {
+    const PreparedNetwork network = prepare({.profile = profile, .seed = 7});
+    std::ofstream file(path_);
+    std::ostringstream ignored;
+    TraceWriter trace(file, network.header());
+    dry_run(network, {.count = count}, ignored, &trace);
+  }
+  ~TraceFile() { std::filesystem::remove(path_); }
+  TraceFile(const TraceFile&) = delete;
+  TraceFile& operator=(const TraceFile&) = delete;
+  const std::filesystem::path& path() const { return path_; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+TEST(DryRun, RepeatsStopsOrPassesAtTheEndOfATraceAndSaysHowOftenItWasPlayed) {
+  using AtEnd = TracePlayer::AtEnd;
+  const TraceFile file("delay=20ms loss=pattern(01)", 20);
+  const auto run = [&](std::optional<AtEnd> at_end) {
+    const PreparedNetwork network = prepare({.replay = file.path(), .at_end = at_end});
+    std::ostringstream out;
+    const auto [up, down] = dry_run(network, {.count = 70}, out, nullptr);
+    const std::string text = out.str();
+    return std::to_string(std::ranges::count(text, '\n')) + " lines, played " + played_text(up) + " and " +
+           played_text(down);
+  };
+  EXPECT_EQ(run({}), "70 lines, played 3.5 and 3.5");
+  EXPECT_EQ(run(AtEnd::kRepeat), "70 lines, played 3.5 and 3.5");
+  EXPECT_EQ(run(AtEnd::kStop), "20 lines, played 1 and 1");
+  EXPECT_EQ(run(AtEnd::kPass), "70 lines, played 1 and 1");
+}
+
+TEST(Prepare, TheRecordOfAReplayWithAnAddedProfileNamesBoth) {
+  const TraceFile file("delay=20ms", 20);
+  const TraceHeader header = prepare({.replay = file.path(), .add = "loss=burst(1%,3)", .seed = 9}).header();
+  EXPECT_EQ(header.seed, 9U);
+  EXPECT_EQ(header.up, "replay of " + file.path().string() + ", then loss=burst(1%,3)");
+  EXPECT_EQ(header.up, header.down);
+  EXPECT_EQ(prepare({.replay = file.path()}).header().up, "");
+}
+
+TEST(Prepare, AProfileThatIsAddedToATraceThatReordersIsFree) {
+  const TraceFile file("delay=uniform(0ms,20ms) order=free", 200);
+  EXPECT_TRUE(prepare({.replay = file.path(), .add = "loss=1%"}).text[0].ends_with(", then loss=1% order=free"));
+}
+
 TEST(Prepare, NamesTheOptionThatIsWrong) {
   const auto refusal = [](const NetworkOptions& network) {
     return thrown_by<std::exception>([&] { prepare(network); });
@@ -75,6 +131,15 @@ TEST(Prepare, NamesTheOptionThatIsWrong) {
   EXPECT_TRUE(refusal({.profile = "loss=2"}).starts_with("--profile: ")) << refusal({.profile = "loss=2"});
   EXPECT_TRUE(refusal({.profile = "lan", .down = "loss=2"}).starts_with("--down: "));
   EXPECT_NE(refusal({.replay = "none.csv"}).find("none.csv"), std::string::npos);
+  const TraceFile file("delay=20ms", 20);
+  EXPECT_TRUE(refusal({.replay = file.path(), .seed = 7}).starts_with("--seed: expected --add"));
+  EXPECT_TRUE(refusal({.replay = file.path(), .add = "loss=2"}).starts_with("--add: loss is 200%"));
+  std::ofstream(file.path()) << "# tendon-trace 1\n# benign up 20000000\n"
+                             << "dir,link,index,t_in_ns,bytes,hash,verdict,cause,t_out_ns,t_actual_ns,duplicate_ns,"
+                                "stale_back,stale_ns,flipped_bit,truncated_to,rebinds\n";
+  EXPECT_EQ(refusal({.replay = file.path(), .at_end = TracePlayer::AtEnd::kRepeat}),
+            "--at-end: " + file.path().string() + " is sparse and has no end");
+  EXPECT_EQ(refusal({.replay = file.path()}), "");
 }
 
 }  // namespace

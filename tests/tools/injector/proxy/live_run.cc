@@ -131,7 +131,7 @@ Driver::Config driver_config(const PreparedNetwork& network, const LiveRun& opti
           .proxy = {.networks = network.networks,
                     .timeline = network.timeline,
                     .replay = network.replay.get(),
-                    .replay_by = network.replay_by,
+                    .playback = network.playback,
                     .record = !options.record.empty(),
                     .max_clients = options.max_clients},
           .spin = options.spin,

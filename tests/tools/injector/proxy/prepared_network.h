@@ -16,7 +16,8 @@
 
 namespace tendon::injector {
 
-/// The network as given by the user: a profile for both directions, one for each, a scenario, or a trace.
+/// The network as given by the user: a profile for both directions, one for each, a scenario, or a trace, to which a
+/// profile can be added.
 struct NetworkOptions {
   std::string profile = {};
   std::string up = {};
@@ -24,6 +25,8 @@ struct NetworkOptions {
   std::filesystem::path scenario = {};
   std::filesystem::path replay = {};
   TracePlayer::By replay_by = TracePlayer::By::kIndex;
+  std::optional<TracePlayer::AtEnd> at_end = {};
+  std::string add = {};  ///< the profile that follows the trace; empty: none
   std::optional<std::uint64_t> seed = {};
 };
 
@@ -34,7 +37,7 @@ struct PreparedNetwork {
   std::array<std::string, 2> text;   ///< the profiles as lines of text, or a description of the replayed trace
   std::vector<Proxy::Step> timeline;
   std::unique_ptr<const Trace> replay;
-  TracePlayer::By replay_by = TracePlayer::By::kIndex;
+  Playback playback = {};
 
   TraceHeader header() const;
 };

@@ -24,7 +24,7 @@ std::size_t Proxy::AddressHash::operator()(const Address& address) const noexcep
 
 Proxy::Proxy(Config config) : config_(std::move(config)), flight_(config_.max_bytes_in_flight) {
   // Throws if the trace is invalid.
-  if (config_.replay != nullptr) TracePlayer(*config_.replay, Direction::kUp, 0, config_.replay_by);
+  if (config_.replay != nullptr) TracePlayer(*config_.replay, Direction::kUp, 0, config_.playback.by);
 }
 
 Proxy::Client& Proxy::add_client(const Address& address) {
@@ -35,8 +35,11 @@ Proxy::Client& Proxy::add_client(const Address& address) {
     const std::size_t d = index_of(direction);
     Way& way = client->ways[d];
     if (config_.replay != nullptr) {
-      way.decider =
-          std::make_unique<TracePlayer>(*config_.replay, direction, client->index, config_.replay_by, *start_);
+      auto player = std::make_unique<TracePlayer>(*config_.replay, direction, client->index, config_.playback.by,
+                                                  *start_, config_.playback.at_end);
+      if (config_.playback.add) player->add(config_.networks[d].for_link(client->index, *start_));
+      way.player = player.get();
+      way.decider = std::move(player);
       way.history = std::make_unique<History>();
       continue;
     }
@@ -88,10 +91,19 @@ void Proxy::receive_from_server(ClientIndex index, std::span<const std::byte> da
 void Proxy::inject(Client& client, Direction direction, std::span<const std::byte> datagram, LocalTime arrival) {
   Way& way = client.ways[index_of(direction)];
   ++way.received;
+  ended_ = ended_ || (way.player != nullptr && way.player->stops(arrival));
+  if (ended_) {
+    ++count(direction).after_end;
+    return;
+  }
   Tag tag{&client, {}};
   TraceRecord& record = tag.record;
   static_cast<Decision&>(record) =
       way.decider->decide({arrival, static_cast<std::uint32_t>(datagram.size()), datagram});
+  if (way.player != nullptr) {
+    double& played = measurements_[index_of(direction)].played;
+    played = std::max(played, way.player->played());
+  }
   record.direction = direction;
   record.link = client.index;
   if (config_.record) record.payload_hash = payload_hash(datagram);

@@ -27,7 +27,7 @@ using ClientIndex = std::uint32_t;
 
 inline constexpr std::size_t kCauses = static_cast<std::size_t>(Cause::kReplay) + 1;
 
-/// Datagrams of one direction: each received one is refused, dropped, forwarded, unsent or still in flight.
+/// Datagrams of one direction: each received one is refused, ignored, dropped, forwarded, unsent or still in flight.
 struct ProxyCounters {
   std::uint64_t received = 0;
   std::uint64_t refused_clients = 0;             ///< from clients that could not be added or have been forgotten
@@ -39,6 +39,7 @@ struct ProxyCounters {
   std::uint64_t flipped = 0;    ///< forwarded with a flipped bit
   std::uint64_t truncated = 0;  ///< forwarded truncated
   std::uint64_t unsent = 0;     ///< copies of all kinds that the kernel refused
+  std::uint64_t after_end = 0;  ///< ignored, because they arrived when the trace had ended (AtEnd::kStop)
 
   std::uint64_t lost() const noexcept;
 };
@@ -47,6 +48,7 @@ struct ProxyMeasurements {
   ProxyCounters counters;
   DurationHistogram delay;          ///< first copies: departure − arrival, the actual one-way delay
   DurationHistogram release_error;  ///< all copies: departure − due time
+  double played = 0;                ///< TracePlayer::played() of the client that is furthest ahead
 };
 
 /// Simulates a bad network between multiple clients and a server. This class does not use sockets or a clock. Datagrams
@@ -78,9 +80,9 @@ class Proxy {
 
     std::vector<Step> timeline = {};
 
-    /// Replayed instead of `networks` and `timeline`. Must outlive the proxy.
+    /// Replayed instead of `timeline`, and of `networks` unless they are added. Must outlive the proxy.
     const Trace* replay = nullptr;
-    TracePlayer::By replay_by = TracePlayer::By::kIndex;
+    Playback playback = {};
 
     bool record = false;
 
@@ -125,6 +127,9 @@ class Proxy {
   /// Applies the due changes of the timeline, only for timely display: each datagram meets those due at its arrival.
   void follow_timeline(LocalTime now);
 
+  /// The replayed trace has ended (AtEnd::kStop). Further datagrams are ignored, and those in flight still leave.
+  bool ended() const noexcept { return ended_; }
+
   /// Forgets one idle client, so that the driver can close its socket.
   std::optional<ClientIndex> next_evicted(LocalTime now);
 
@@ -150,6 +155,7 @@ class Proxy {
   struct Way {
     std::unique_ptr<Decider> decider;
     Injector* injector = nullptr;      // the decider, or null if a trace is replayed
+    TracePlayer* player = nullptr;     // the decider, or null
     std::unique_ptr<History> history;  // only if the network has stale replays
     std::uint64_t received = 0;
   };
@@ -184,6 +190,7 @@ class Proxy {
   std::array<std::map<ClientIndex, Network>, 2> of_one_client_;  // networks that differ from config_.networks, by
   std::string last_change_;
   std::size_t steps_done_ = 0;
+  bool ended_ = false;
   std::unordered_map<ClientIndex, std::unique_ptr<Client>> clients_;
   std::unordered_map<Address, Client*, AddressHash> by_address_;
   ClientIndex next_index_ = 0;

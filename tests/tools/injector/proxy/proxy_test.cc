@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <set>
 #include <span>
 #include <stdexcept>
@@ -329,6 +331,40 @@ TEST(Proxy, ReplayingARecordedRunGivesTheSameFatesAndTheSameTrace) {
   const Recorded replayed = run(o, kStart + 77s);
   EXPECT_EQ(replayed.left, recorded.left);
   EXPECT_EQ(replayed.trace.records, recorded.trace.records);
+}
+
+TEST(Proxy, WhenTheTraceEndsTheRestIsIgnoredAndWhatIsInFlightStillLeaves) {
+  const Recorded recorded = run(config("delay=50ms", "delay=20ms"), kStart);
+  Proxy::Config o = config("", "");
+  o.replay = &recorded.trace;
+  o.playback.at_end = TracePlayer::AtEnd::kStop;
+  Proxy proxy(o);
+  LocalTime now = kStart;
+  for (int i = 0; i < 300; ++i, now += 1ms) proxy.receive_from_client(kA, bytes("u"), now);
+  EXPECT_FALSE(proxy.ended());
+  EXPECT_EQ(proxy.measurements(Direction::kUp).played, 1);
+  proxy.receive_from_client(kA, bytes("late"), now);
+  EXPECT_TRUE(proxy.ended());
+  proxy.receive_from_server(0, bytes("d"), now);
+  EXPECT_EQ(proxy.measurements(Direction::kUp).counters.after_end, 1U);
+  EXPECT_EQ(proxy.measurements(Direction::kDown).counters.after_end, 1U);
+  EXPECT_EQ(departures(proxy, now + 1s).size(), 300U);
+  EXPECT_EQ(proxy.in_flight(), 0U);
+}
+
+TEST(Proxy, ANetworkAddedToATraceHasOtherRandomNumbersForEachClient) {
+  const Recorded recorded = run(config("", ""), kStart);
+  Proxy::Config o = config("loss=50%", "loss=50%");
+  o.replay = &recorded.trace;
+  o.playback.add = true;
+  const Recorded added = run(o, kStart);
+  std::array<std::string, 3> fates;
+  for (const TraceRecord& record : added.trace.records) {
+    fates[record.direction == Direction::kDown ? 2 : record.link] += record.verdict == Verdict::kDrop ? '-' : '+';
+  }
+  for (const std::string& fate : fates) EXPECT_GT(std::ranges::count(fate, '-'), 20) << fate;
+  EXPECT_NE(fates[0].substr(0, 100), fates[1].substr(0, 100));
+  EXPECT_NE(fates[0].substr(0, 100), fates[2].substr(0, 100));
 }
 
 TEST(Proxy, ARecordSaysWhatWasPlannedAndWhatHappenedSinceTheFirstDatagram) {

@@ -45,13 +45,21 @@ JsonLine direction_json(const ProxyMeasurements& measured) {
       .add("truncated", n.truncated)
       .add("refused_clients", n.refused_clients)
       .add("refused_full", n.refused_full)
-      .add("unsent", n.unsent)
-      .add("delay_us", quantiles_json(measured.delay))
-      .add("release_error_us", quantiles_json(measured.release_error));
+      .add("unsent", n.unsent);
+  if (n.after_end > 0) json.add("after_end", n.after_end);
+  if (measured.played > 0) json.add("played", with_decimals(measured.played, 2));
+  json.add("delay_us", quantiles_json(measured.delay)).add("release_error_us", quantiles_json(measured.release_error));
   return json;
 }
 
 }  // namespace
+
+std::string played_text(double times) {
+  std::string text = fixed(times, 2);
+  text.erase(text.find_last_not_of('0') + 1);
+  if (text.ends_with('.')) text.pop_back();
+  return text;
+}
 
 bool is_unanswered(const Status& status) noexcept {
   return status.of(Direction::kUp).counters.forwarded > 0 && status.of(Direction::kDown).counters.received == 0;

@@ -47,6 +47,9 @@ inline constexpr Duration kMaxReleaseError = std::chrono::milliseconds(1);
 /// Sentences for the user; none for a valid run. `max_release_error` limits the 99th percentile in either direction.
 std::vector<std::string> why_invalid(const Status& status, Duration max_release_error);
 
+/// Of a trace, for example "3.5".
+std::string played_text(double times);
+
 /// Totals since the start, whether valid or not:
 /// {"t_s":12.0,"clients":1,"in_flight":40,"valid":true,"invalid_because":[],"timer_floor_us":{…},"up":{…},"down":{…}}
 JsonLine in_json(const Status& status, Duration max_release_error);

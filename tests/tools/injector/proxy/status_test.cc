@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "tests/support/refusal.h"
 #include "tests/tools/injector/proxy/terminal_view.h"
 
 namespace tendon::injector::status_test {
@@ -69,6 +70,19 @@ TEST(Status, AsJsonSaysWhyARunIsInvalid) {
   EXPECT_NE(good.find(R"("valid":true,"invalid_because":[])"), std::string::npos) << good;
   const std::string bad = in_json(status(500), 1ms).str();
   EXPECT_NE(bad.find(R"("valid":false,"invalid_because":["up: )"), std::string::npos) << bad;
+}
+
+TEST(Status, SaysHowOftenATraceWasPlayedAndWhatCameAfterIt) {
+  Status s = status(0);
+  EXPECT_EQ(in_json(s, 1ms).str().find("\"played\""), std::string::npos);
+  s.directions[0].played = 3.5;
+  s.directions[0].counters.after_end = 2;
+  EXPECT_TRUE(says(in_json(s, 1ms).str(), R"("after_end":2,"played":3.5,)"));
+  const std::string text = end_text({"127.0.0.1:1", "127.0.0.1:2", 7, {}, 1ms}, s);
+  EXPECT_TRUE(says(text, "0 lost, 2 after the end of the trace\n"));
+  EXPECT_TRUE(says(text, "         played 3.5 times\n")) << text;
+  EXPECT_EQ(played_text(1), "1");
+  EXPECT_EQ(played_text(1200.456), "1200.46");
 }
 
 TEST(TerminalView, ShowsWhatIsNewSinceBeforeAndFitsTheTerminal) {

@@ -54,6 +54,7 @@ std::string other_fates(const ProxyCounters& n) {
   add("refused: too many clients", n.refused_clients);
   add("refused: memory full", n.refused_full);
   add("refused by the kernel", n.unsent);
+  add("after the end of the trace", n.after_end);
   return text;
 }
 
@@ -163,6 +164,7 @@ std::string end_text(const Heading& heading, const Status& end) {
     };
     text += quantiles("one-way delay", measured.delay, ms, "ms");
     text += quantiles("released late by", measured.release_error, in_us, "us");
+    if (measured.played > 0) text += format("         played %s times\n", played_text(measured.played).c_str());
   }
   text += format("  the timer of this machine was late by p50 %.2f, p99 %.2f, max %.2f us (n = %llu)\n",
                  in_us(end.timer_floor.quantile(0.5)), in_us(end.timer_floor.quantile(0.99)),

@@ -51,6 +51,11 @@ std::vector<DelayLaw> delay_laws() {
                              : x < 5 * kMs ? 0.1
                              : x < 9 * kMs ? 0.7
                                            : 1.0; }, false},
+      {"delay=mixture(2ms,3:10ms,1:3ms)",
+       [](double x) {
+         const double above = std::max(x / kMs - 2, 0.0);
+         return -0.75 * std::expm1(-above / 10) - 0.25 * std::expm1(-above / 3);
+       }},
   };
 }
 

@@ -68,6 +68,28 @@ std::vector<Check> events(const SelftestOptions& options) {
     checks.push_back(none(absence.line, "losses at another time", off));
   }
 
+  // Datagrams every 20 µs, so that each outage has some.
+  const std::string random_outage = "outage(clear=20ms,for=uniform(1ms,11ms))";
+  const Duration period = std::chrono::microseconds(20);
+  std::vector<double> lengths;
+  std::size_t uneven = 0;
+  Duration begun{};
+  Duration ended{};
+  play(parse_profile(random_outage), {.period = period}, options, [&](std::size_t, const Decision& decision) {
+    const Duration now = decision.arrival - kStart;
+    if (lost(decision) && begun <= ended) {
+      begun = now;
+      uneven +=
+          ns(begun - ended - milliseconds(20)) > ns(period) || begun - ended < milliseconds(20) - period ? 1U : 0U;
+    } else if (!lost(decision) && begun > ended) {
+      ended = now;
+      lengths.push_back(ns(ended - begun));
+    }
+  });
+  checks.push_back(none(random_outage, "times between outages that differ from 20 ms", uneven));
+  checks.push_back(kolmogorov(random_outage, "lengths, Kolmogorov", lengths,
+                              [](double x) { return std::clamp((x - 1 * kMs) / (10 * kMs), 0.0, 1.0); }));
+
   const std::string handover = "base=20ms handover(every=20ms,for=2ms,5ms) order=free";
   std::vector<double> levels;
   std::size_t moved = 0;

@@ -73,6 +73,25 @@ LossChain LossChain::four_state(double p13, double p31, double p32, double p23, 
           {0, 0, 1, 1}};
 }
 
+LossChain LossChain::pareto_bursts(double p12, double p21, const std::array<double, 2>& shape,
+                                   const std::array<double, 2>& scale, std::size_t longest) {
+  const std::array<Row, 2> next = {Row{1 - p12, p12}, Row{p21, 1 - p21}};
+  LossChain chain{std::vector<Row>(2 * longest, Row(2 * longest)), Row(2 * longest, 1.0)};
+  for (std::size_t i = 0; i < 2; ++i) {
+    chain.loss[i * longest] = 0;
+    for (std::size_t j = 0; j < 2; ++j) {
+      const auto at_least = [&](std::size_t k) {
+        return k == longest ? 0 : std::pow(1 + static_cast<double>(k) / scale[j], -shape[j]);
+      };
+      for (std::size_t k = 0; k < longest; ++k) {
+        chain.step[i * longest][j * longest + k] = next[i][j] * (at_least(k) - at_least(k + 1));
+        if (k > 0) chain.step[i * longest + k][j * longest + k - 1] = next[i][j];
+      }
+    }
+  }
+  return chain;
+}
+
 LossChain LossChain::regimes(const std::vector<double>& dwell, double period, std::vector<double> loss) {
   const std::size_t n = dwell.size();
   // exp(A) = exp(A / 2ᵏ)^(2ᵏ), with A / 2ᵏ so small that eight terms of the series are exact.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <vector>
 
@@ -23,6 +24,11 @@ struct LossChain {
   /// netem's `loss state` (Salsano et al. 2012): 1 received in a gap, 2 received in a burst, 3 lost in a burst, 4 lost
   /// alone in a gap, followed by 1.
   static LossChain four_state(double p13, double p31, double p32, double p23, double p14);
+
+  /// Bursts of Pareto-II lengths, P(L ≥ k) = (1 + k/scale)^−shape, below `longest`, each followed by one datagram that
+  /// passes (ParetoBurstLoss). The state is that of the chain and the number of losses that are left.
+  static LossChain pareto_bursts(double p12, double p21, const std::array<double, 2>& shape,
+                                 const std::array<double, 2>& scale, std::size_t longest);
 
   /// A continuous-time Markov chain sampled every `period`: state i lasts for an exponential time of mean dwell[i]; all
   /// others are equally likely successors. step = exp(Q · period), exactly, including changes between two samples.

@@ -26,6 +26,9 @@ std::vector<Check> all_losses(const SelftestOptions& options) {
   append(checks, check_losses("loss=fourstate(0.01,0.3,0.2,0.4,0.005)",
                               LossChain::four_state(0.01, 0.3, 0.2, 0.4, 0.005), options));
 
+  append(checks, check_losses("loss=bursts(pareto2,5%,10%,4.4:1.6,5:0.3)",
+                              LossChain::pareto_bursts(0.05, 0.1, {4.4, 5}, {1.6, 0.3}, 40), options));
+
   const std::string pattern = "0001011";
   std::size_t off = 0;
   play(parse_profile("loss=pattern(" + pattern + ")"), {}, options, [&](std::size_t i, const Decision& decision) {

@@ -25,7 +25,7 @@ inline constexpr std::string_view kTraceBegins = "# tendon-trace 1";
 //     # tendon-trace 1
 //     # seed 7
 //     # start 0                          start of the run, on the clock of all times below (ns)
-//     # up delay=lognormal(20ms,5ms)     the initial profiles
+//     # up delay=lognormal(20ms,5ms)     the initial profiles, or "replay of FILE, then" the profile that was added
 //     # down delay=20ms
 //     # tables 3c0ffee0ddba11ad          hashes of the quantile tables in use, 16 hexadecimal digits each
 //     # build v0.1.0-12-gabc1234         the program that wrote it

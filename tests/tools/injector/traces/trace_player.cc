@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <set>
 #include <stdexcept>
+#include <utility>
 
 namespace tendon::injector {
 namespace {
@@ -29,12 +30,21 @@ std::uint32_t recorded_link(const Trace& trace, std::uint32_t link) {
 
 }  // namespace
 
+bool reorders(const Trace& trace, Direction direction) {
+  std::set<std::uint32_t> links;
+  for (const TraceRecord& record : trace.records) links.insert(record.link);
+  return std::ranges::any_of(links, [&](std::uint32_t link) {
+    return !TracePlayer(trace, direction, link, TracePlayer::By::kIndex).in_order();
+  });
+}
+
 Duration median_delay(const Trace& trace, Direction direction) {
   return median(trace.records, [direction](const TraceRecord& record) { return record.direction == direction; });
 }
 
-TracePlayer::TracePlayer(const Trace& trace, Direction direction, std::uint32_t link, By by, LocalTime start)
-    : by_(by), start_(start), recorded_start_(trace.start), wraps_(!trace.sparse()) {
+TracePlayer::TracePlayer(const Trace& trace, Direction direction, std::uint32_t link, By by, LocalTime start,
+                         AtEnd at_end)
+    : by_(by), start_(start), recorded_start_(trace.start), at_end_(at_end), wraps_(!trace.sparse()) {
   if (by == By::kTime && trace.sparse()) {
     throw std::invalid_argument("a sparse trace can only be replayed by index");
   }
@@ -62,6 +72,22 @@ TracePlayer::TracePlayer(const Trace& trace, Direction direction, std::uint32_t 
   period_ = std::max(last.arrival - recorded_start_ + (last.arrival - first.arrival) / distances, Duration(1));
 }
 
+void TracePlayer::add(Injector network) { network_.emplace(std::move(network)); }
+
+bool TracePlayer::ended(LocalTime arrival) const {
+  if (!wraps_) return false;
+  return by_ == By::kIndex ? next_index_ >= length_ : arrival - start_ >= period_;
+}
+
+bool TracePlayer::stops(LocalTime arrival) const { return at_end_ == AtEnd::kStop && ended(arrival); }
+
+double TracePlayer::played() const {
+  if (!wraps_ || next_index_ == 0) return 0;
+  const double times = by_ == By::kIndex ? static_cast<double>(next_index_) / static_cast<double>(length_)
+                                         : std::max(seconds(last_arrival_ - start_), 0.0) / seconds(period_);
+  return at_end_ == AtEnd::kRepeat ? times : std::min(times, 1.0);
+}
+
 TracePlayer::Found TracePlayer::find_by_index(std::uint64_t index) {
   if (records_.empty()) return {};
   const std::uint64_t cycle = wraps_ ? index / length_ : 0;
@@ -82,12 +108,48 @@ TracePlayer::Found TracePlayer::find_by_time(LocalTime arrival) const {
 }
 
 Decision TracePlayer::decide(const Packet& packet) {
+  const Decision first = of_trace(packet);
+  return network_ ? through_network(first, packet) : first;
+}
+
+Decision TracePlayer::through_network(Decision d, const Packet& packet) {
+  const bool lost = d.verdict == Verdict::kDrop;
+  // The recorded time of a lost datagram need not be between those of its neighbors.
+  const LocalTime entry = lost ? std::max(packet.arrival, last_entry_) : d.release;
+  last_entry_ = std::max(last_entry_, entry);
+  const Decision second = network_->decide({.arrival = entry, .size = packet.size, .bytes = packet.bytes});
+  const Duration later = second.release - entry;
+  if (!lost && (second.verdict == Verdict::kDrop || later > Duration::zero())) d.cause = second.cause;
+  if (second.verdict == Verdict::kDrop) {
+    d.verdict = Verdict::kDrop;
+    d.duplicate.reset();
+  } else if (d.duplicate) {
+    *d.duplicate += later;
+  } else if (!lost) {
+    d.verdict = second.verdict;
+    d.duplicate = second.duplicate;
+  }
+  d.release += later;
+  if (d.stale) {
+    d.stale->release += later;
+  } else {
+    d.stale = second.stale;
+  }
+  if (!d.flipped_bit) d.flipped_bit = second.flipped_bit;
+  if (second.truncated_to) d.truncated_to = std::min(*second.truncated_to, d.truncated_to.value_or(UINT32_MAX));
+  d.rebinds += second.rebinds;
+  return d;
+}
+
+Decision TracePlayer::of_trace(const Packet& packet) {
+  const bool passes = at_end_ != AtEnd::kRepeat && ended(packet.arrival);
   const std::uint64_t index = next_index_++;
-  const Found found = by_ == By::kIndex ? find_by_index(index) : find_by_time(packet.arrival);
+  last_arrival_ = packet.arrival;
+  const Found found = passes ? Found{} : by_ == By::kIndex ? find_by_index(index) : find_by_time(packet.arrival);
 
   Decision decision;
   decision.cause = Cause::kReplay;
-  decision.release = packet.arrival + benign_;
+  decision.release = packet.arrival + (passes ? Duration::zero() : benign_);
   if (found.record != nullptr) {
     decision = *found.record;
     const auto moved = [&](LocalTime at) { return packet.arrival + (at - found.record->arrival); };

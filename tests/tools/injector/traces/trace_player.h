@@ -27,21 +27,48 @@ namespace tendon::injector {
 /// * In a sparse trace, an unlisted datagram takes TraceHeader::benign (or no time if that is not given for the
 ///   direction), has the cause kReplay and does not overtake its predecessor.
 /// * In any other trace, a missing datagram (a gap in the indices) takes the median delay of those that passed.
-/// * After its end, a trace that is not sparse repeats, like Mahimahi's files: by index after the last record, by time
-///   after the last record plus the mean interval.
+/// * After its end, a trace that is not sparse repeats, like Mahimahi's files (kRepeat), or datagrams pass without delay,
+///   but not ahead of a predecessor in a trace in order (kPass), or the run ends with the first such datagram (kStop).
+///   By index, the end is the last record of the flow, by time the last record of all plus the mean interval.
 /// * Of n links in the trace, link i uses the (i modulo n)-th, so that many clients can share an imported trace.
 /// * A direction that is not in the trace passes without delay.
+///
+/// With add(), a network follows the trace:
+///
+///     trace      t₁, lost₁ as above
+///     network    t₂, lost₂ of an Injector with its own random numbers, where the datagram arrives at t₁
+///     result     release t₂, lost if lost₁ or lost₂; the cause of the first loss, or else of the last delay
+///
+/// The delays add, and the network's FIFO holds from t₁ on. It draws for each datagram, in the order of the arrivals at
+/// the trace: one that the trace loses is delayed too, from the latest t₁ on. FIFO would undo the order of a trace that
+/// reorders(); such a trace needs order=free. The copy, stale replay and flipped bit are those of the trace, or else of
+/// the network; the payload is the shorter of both, and the changes of the source port add.
 ///
 /// Thread-safe: no.
 class TracePlayer final : public Decider {
  public:
   enum class By : std::uint8_t { kIndex, kTime };
+  enum class AtEnd : std::uint8_t { kRepeat, kStop, kPass };
 
   /// `start` corresponds to the trace's start; unused by index. Throws std::invalid_argument if a sparse trace is
   /// replayed by time.
-  TracePlayer(const Trace& trace, Direction direction, std::uint32_t link, By by, LocalTime start = {});
+  TracePlayer(const Trace& trace, Direction direction, std::uint32_t link, By by, LocalTime start = {},
+              AtEnd at_end = AtEnd::kRepeat);
+
+  /// Call it before the first decision. `network` must be of the same direction and link.
+  void add(Injector network);
 
   Decision decide(const Packet& packet) override;
+
+  /// With kStop, true if the trace has no fate for the next datagram, which arrives at `arrival`.
+  bool stops(LocalTime arrival) const;
+
+  /// How often the trace has been played, for example 3.5 times: by index, the datagrams so far of those in the flow; by
+  /// time, until the last arrival; at most once if it does not repeat. 0 for a sparse trace or an unknown direction.
+  double played() const;
+
+  /// False if datagrams of this flow overtake each other.
+  bool in_order() const { return in_order_; }
 
  private:
   struct Found {
@@ -50,12 +77,16 @@ class TracePlayer final : public Decider {
   };
   Found find_by_index(std::uint64_t index);
   Found find_by_time(LocalTime arrival) const;
+  bool ended(LocalTime arrival) const;
+  Decision of_trace(const Packet& packet);
+  Decision through_network(Decision of_trace, const Packet& packet);
 
   By by_;
   LocalTime start_;
   LocalTime recorded_start_;
   std::vector<TraceRecord> records_;  ///< of this flow, by index
   Duration benign_{};
+  AtEnd at_end_;
   bool wraps_;
   bool in_order_ = true;
   std::uint64_t length_ = 0;  ///< the number of indices in the trace
@@ -64,7 +95,20 @@ class TracePlayer final : public Decider {
   std::size_t cursor_ = 0;  ///< the record at or after the last index
   LocalTime last_release_ = LocalTime::min();
   std::uint32_t rebinds_ = 0;
+  LocalTime last_arrival_{};
+  std::optional<Injector> network_;
+  LocalTime last_entry_ = LocalTime::min();  ///< the latest t₁
 };
+
+/// How a trace is replayed.
+struct Playback {
+  TracePlayer::By by = TracePlayer::By::kIndex;
+  TracePlayer::AtEnd at_end = TracePlayer::AtEnd::kRepeat;
+  bool add = false;  ///< a network follows the trace
+};
+
+/// True if datagrams overtake each other in any flow of this direction.
+bool reorders(const Trace& trace, Direction direction);
 
 /// Returns the median delay (lower of two) of the datagrams that passed, over all links; zero if none passed.
 Duration median_delay(const Trace& trace, Direction direction);

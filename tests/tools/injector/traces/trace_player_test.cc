@@ -3,11 +3,13 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cstdint>
 #include <sstream>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "tests/tools/injector/injector.h"
@@ -161,6 +163,125 @@ TEST(TracePlayer, AfterItsEndATraceBeginsAgain) {
       EXPECT_EQ(decision.release - decision.arrival, record.release - record.arrival);
       EXPECT_EQ(decision.index, static_cast<std::uint64_t>(i));
     }
+  }
+}
+
+using AtEnd = TracePlayer::AtEnd;
+
+TEST(TracePlayer, AfterItsEndATraceLetsAllPassIfSoAsked) {
+  const Trace trace = of({delayed(0, 0ms, 5ms), delayed(1, 1ms, 9ms), lost(2, 2ms)});
+  for (const By by : {By::kIndex, By::kTime}) {
+    TracePlayer player(trace, Direction::kUp, 0, by, at(7s), AtEnd::kPass);
+    std::string fates;
+    for (int i = 0; i < 13; ++i) {
+      EXPECT_FALSE(player.stops(at(7s + 1ms * i)));
+      const Decision decision = player.decide({.arrival = at(7s + 1ms * i), .size = 1, .bytes = {}});
+      fates += decision.verdict == Verdict::kDrop ? "x " : std::to_string(delay_of(decision) / 1ms) + " ";
+    }
+    // Not ahead of the second datagram, which leaves at 10 ms.
+    EXPECT_EQ(fates, "5 9 x 7 6 5 4 3 2 1 0 0 0 ");
+    EXPECT_EQ(player.played(), 1);
+  }
+}
+
+TEST(TracePlayer, SaysWhereATraceEndsAndHowOftenItWasPlayed) {
+  const Trace trace = of({delayed(0, 0ms, 5ms), delayed(1, 1ms, 5ms)});
+  for (const By by : {By::kIndex, By::kTime}) {
+    for (const AtEnd end : {AtEnd::kRepeat, AtEnd::kStop}) {
+      TracePlayer player(trace, Direction::kUp, 0, by, at(0s), end);
+      EXPECT_EQ(player.played(), 0);
+      for (int i = 0; i < 7; ++i) {
+        EXPECT_EQ(player.stops(at(1ms * i)), end == AtEnd::kStop && i >= 2) << i;
+        player.decide({.arrival = at(1ms * i), .size = 1, .bytes = {}});
+      }
+      EXPECT_EQ(player.played(), end == AtEnd::kStop ? 1 : by == By::kIndex ? 3.5 : 3);
+    }
+  }
+}
+
+TEST(TracePlayer, AnAddedNetworkDelaysAndLosesAfterTheTrace) {
+  const Trace trace = of({delayed(0, 0ms, 5ms), lost(1, 1ms), delayed(2, 2ms, 5ms), delayed(3, 3ms, 40ms)});
+  TracePlayer player(trace, Direction::kUp, 0, By::kIndex);
+  player.add(Injector(parse_profile("base=2ms loss=pattern(0010) step(at=20ms,10ms)"), 7, 0, Direction::kUp, at(0s)));
+  std::string fates;
+  for (int i = 0; i < 4; ++i) {
+    const Decision decision = player.decide({.arrival = at(1ms * i), .size = 1, .bytes = {}});
+    fates += decision.verdict == Verdict::kDrop ? "x " : std::to_string(delay_of(decision) / 1ms) + " ";
+    EXPECT_EQ(decision.arrival, at(1ms * i));
+    EXPECT_EQ(decision.index, static_cast<std::uint64_t>(i));
+  }
+  // The last one arrives at the network after its step.
+  EXPECT_EQ(fates, "7 x x 52 ");
+}
+
+TEST(TracePlayer, AnAddedNetworkKeepsTheOrderFromTheReleaseOfTheTraceOn) {
+  const Trace trace = recorded(kInOrder, 5000);
+  const std::string profile = "delay=gamma(10ms,9ms) loss=5%";
+  const auto played = [&](const std::string& added) {
+    TracePlayer player(trace, Direction::kUp, 0, By::kIndex);
+    if (!added.empty()) player.add(Injector(parse_profile(added), 11, 0, Direction::kUp, at(3s)));
+    std::vector<Decision> all;
+    for (std::uint64_t i = 0; i < 5000; ++i) all.push_back(player.decide(packet_of(i)));
+    return all;
+  };
+  const auto alone = played("");
+  const auto free = played(profile + " order=free");
+  const auto fifo = played(profile);
+  LocalTime last = LocalTime::min();
+  int both = 0;
+  for (std::size_t i = 0; i < alone.size(); ++i) {
+    const bool lost_by_trace = alone[i].verdict == Verdict::kDrop;
+    both += !lost_by_trace && fifo[i].verdict == Verdict::kDrop ? 1 : 0;
+    EXPECT_EQ(fifo[i].verdict, free[i].verdict);
+    if (lost_by_trace) {
+      EXPECT_EQ(fifo[i].verdict, Verdict::kDrop);
+      EXPECT_EQ(fifo[i].cause, alone[i].cause);
+      continue;
+    }
+    EXPECT_GE(free[i].release, alone[i].release);
+    EXPECT_GE(fifo[i].release, std::max(last, free[i].release)) << i;
+    last = fifo[i].release;
+  }
+  EXPECT_GT(both, 150);
+}
+
+TEST(TracePlayer, TheLossesOfATraceDoNotMoveThoseOfAnAddedNetwork) {
+  const auto played = [](const Trace& trace) {
+    TracePlayer player(trace, Direction::kUp, 0, By::kIndex);
+    player.add(Injector(parse_profile("delay=uniform(0ms,9ms) loss=burst(10%,3) order=free"), 11, 0, Direction::kUp));
+    std::vector<Decision> all;
+    for (std::uint64_t i = 0; i < 2000; ++i) all.push_back(player.decide(packet_of(i)));
+    return all;
+  };
+  const auto some = played(recorded("delay=5ms loss=20%", 2000));
+  const auto none = played(recorded("delay=5ms", 2000));
+  for (std::size_t i = 0; i < some.size(); ++i) {
+    if (some[i].verdict == Verdict::kPass) {
+      EXPECT_EQ(some[i], none[i]);
+    }
+    if (some[i].cause != Cause::kLoss) {
+      EXPECT_EQ(none[i].verdict, Verdict::kPass);
+    }
+  }
+}
+
+TEST(TracePlayer, TheRecordOfATraceWithAnAddedNetworkReplaysAlike) {
+  for (const auto& [first, second] : {std::pair(kEverything, "order=free delay=gamma(9ms,9ms) loss=9% flip=2%"),
+                                      std::pair(kInOrder, kEverything), std::pair(kInOrder, "duplicate=9%")}) {
+    const Trace trace = recorded(first, 3000);
+    EXPECT_EQ(reorders(trace, Direction::kUp), first == kEverything);
+    TracePlayer player(trace, Direction::kUp, 0, By::kIndex);
+    player.add(Injector(parse_profile(second), 11, 0, Direction::kUp, at(3s)));
+    std::stringstream file;
+    TraceWriter writer(file, {});
+    std::vector<Decision> decisions;
+    for (std::uint64_t i = 0; i < 3000; ++i) {
+      decisions.push_back(player.decide(packet_of(i)));
+      writer.write({decisions.back(), Direction::kUp, 0, {}, {}});
+    }
+    const Trace record = read_trace(file, "record");
+    TracePlayer again(record, Direction::kUp, 0, By::kIndex);
+    for (std::uint64_t i = 0; i < 3000; ++i) ASSERT_EQ(again.decide(packet_of(i)), decisions[i]) << second << i;
   }
 }
 
