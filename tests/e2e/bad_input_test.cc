@@ -117,7 +117,7 @@ TEST(BadInput, OfTheInjectorIsAnsweredWithWhatIsWrong) {
           {"another end",
            "tendon-inject",
            {"--dry-run", "--replay", "run.csv", "--at-end", "loop"},
-           {"--at-end", "loop", "repeat, stop or pass"}},
+           {"--at-end", "loop", "repeat, stop, pass"}},
           {"no such capture",
            "tendon-inject",
            {"import", "pcap", "none.pcap", "--out", "run.csv"},

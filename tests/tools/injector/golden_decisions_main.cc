@@ -42,7 +42,6 @@ std::vector<std::pair<std::string, std::string>> profiles() {
       {"burst-loss", "loss=burst(5%,4)"},
       {"gilbert-loss", "loss=gilbert(1%,20%,80%,0.5%)"},
       {"four-state-loss", "loss=fourstate(1%,20%,10%,30%,0.5%)"},
-      {"pareto-bursts", "loss=bursts(pareto2,5%,10%,3.859:3.324,3.797:6.049)"},
       {"pattern-loss", "loss=pattern(0010000)"},
       {"drop-rules", "drop(byte=0,mask=0x0f,value=0x03,50%) drop(byte=1,value=0x41)"},
       {"regimes",

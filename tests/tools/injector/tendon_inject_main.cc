@@ -83,7 +83,8 @@ struct Runner {
     if (!task.run.json) std::cout << "seed " << network.seed << "\n";
     const auto [up, down] = dry_run(network, task.run, std::cout, trace ? &*trace : nullptr);
     if (network.replay && task.run.json) {
-      std::cout << JsonLine().add("event", "end").add("up_played", up).add("down_played", down).str() << "\n";
+      const auto played = [](double times) { return std::move(JsonLine().add("played", with_decimals(times, 2))); };
+      std::cout << JsonLine().add("event", "end").add("up", played(up)).add("down", played(down)).str() << "\n";
     } else if (network.replay) {
       std::cout << "played " << played_text(up) << " times up, " << played_text(down) << " times down\n";
     }

@@ -155,13 +155,13 @@ struct LawOf {
 };
 
 TEST(NamedProfiles, EachDelayKeepsToItsLaw) {
-  constexpr std::uint64_t kDraws = 200'000;
+  constexpr std::uint64_t kDraws = 60'000;
   int laws = 0;
   for (const NamedProfile& named : named_profiles()) {
     for (const Direction direction : {Direction::kUp, Direction::kDown}) {
       const Profile profile = resolve_profile(named.name, direction);
       const Cdf law = std::visit(LawOf{}, profile.delay);
-      if (!law) continue;
+      if (!law || (direction == Direction::kDown && named.up == named.down)) continue;
       ++laws;
       const QuantileTable table = delay_table(profile.delay);
       const Draws draws(7, 0, direction);
@@ -173,7 +173,7 @@ TEST(NamedProfiles, EachDelayKeepsToItsLaw) {
       EXPECT_LE(kolmogorov_distance(samples, law), 0.01) << named.name;
     }
   }
-  EXPECT_EQ(laws, 2 * 11);
+  EXPECT_EQ(laws, 15);  // four of them have another one down
 }
 
 TEST(NamedProfiles, TheDelaysOfNetFiHaveItsMeanAnd99Percent) {
@@ -181,7 +181,7 @@ TEST(NamedProfiles, TheDelaysOfNetFiHaveItsMeanAnd99Percent) {
   for (int i = 0; i < 3; ++i) {
     Injector injector(resolve_profile("netfi-delay-" + std::to_string(i + 1), Direction::kUp), 7, 0, Direction::kUp);
     std::vector<double> delays;
-    for (int k = 0; k < 200'000; ++k) {
+    for (int k = 0; k < 100'000; ++k) {
       const LocalTime now = LocalTime{} + std::chrono::milliseconds(k);
       delays.push_back(seconds(injector.decide({.arrival = now, .size = 200}).release - now) * 1e3);
     }
@@ -193,7 +193,7 @@ TEST(NamedProfiles, TheDelaysOfNetFiHaveItsMeanAnd99Percent) {
 }
 
 TEST(NamedProfiles, TheLossesOfNetFiHaveItsShareAndBursts) {
-  constexpr std::size_t kDatagrams = 2'000'000;
+  constexpr std::size_t kDatagrams = 1'000'000;
   const double share[] = {0.098, 0.304, 0.505};
   const double mean_burst[] = {1.40, 1.77, 2.45};
   for (std::size_t i = 0; i < 3; ++i) {
