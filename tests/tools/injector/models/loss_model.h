@@ -43,8 +43,8 @@ class LossModel {
   Row stationary_{kNo, kNo, kNo};
   std::uint8_t state_ = kUnborn;
   std::vector<bool> pattern_;
-  std::vector<QuantileTable> lengths_;  ///< of the bursts, by state, in units of 2⁻¹⁶ datagrams
-  std::int64_t burst_ = -1;  ///< datagrams that are still to be lost; below zero: the next one begins a burst
+  std::vector<QuantileTable> lengths_;  ///< burst lengths in units of 2⁻¹⁶ datagrams, indexed by state
+  std::int64_t burst_ = -1;  ///< number of datagrams left in the burst; negative if the next one starts a burst
 };
 
 }  // namespace tendon::injector

@@ -39,7 +39,7 @@ TEST(LossModel, APatternRepeatsFromTheFirstDatagram) {
 }
 
 TEST(LossModel, OneDatagramPassesAfterEachBurstHoweverLong) {
-  // A scale of 10 000 and a shape of 1: half of the bursts are longer than 10 000 datagrams, and none is empty.
+  // The median length is 10 000 datagrams.
   const auto run = losses("bursts(pareto2,100%,100%,1:10000,100:0)", 200'000);
   std::size_t passed = 0;
   for (std::size_t i = 1; i < run.size(); ++i) passed += run[i] ? 0 : 1;

@@ -22,7 +22,7 @@ constexpr std::array<std::string_view, 3> kNetFiGap = {"outage(clear=8.5s,for=un
                                                        "outage(clear=1s,for=uniform(0ms,1s))",
                                                        "outage(clear=1s,for=uniform(0ms,2s))"};
 
-// The comments give the numbers of each source. Published quantiles come from sparse probes; denser datagrams have longer
+// The comments contain the published numbers. Published quantiles come from sparse probes; denser datagrams have longer
 // delays, because FIFO order holds some back. The duration of a delay (memory) is never published: it is chosen so that
 // the median delay at 1 kHz is less than twice the published one.
 constexpr std::array<NamedProfile, 17> kProfiles = {{
@@ -56,18 +56,18 @@ constexpr std::array<NamedProfile, 17> kProfiles = {{
      "base=4.35ms delay=lognormal(1.345ms,1.507ms) memory=50ms"},
 
     // "From LTE to 5G for connected mobility": 19 000 km of drive tests; each handover interrupts for 40 ms (median).
-    // Handover interval: a cell of 400 m at 80 km/h. Delays: longer up, because the phone requests a grant before it
-    // sends.
+    // The handover interval is a cell of 400 m at 80 km/h. The delays are longer up, because the phone requests a grant
+    // before it sends.
     {"lte-driving", "LTE in a moving car",
      "Lauridsen et al., IEEE Communications Magazine 55(3), 2017, for the interruption; the rest assumed",
      "base=15ms delay=lognormal(15ms,15ms) memory=2s handover(every=18s,for=40ms,5ms) loss=burst(0.2%,4)",
      "base=12ms delay=lognormal(10ms,12ms) memory=2s handover(every=18s,for=40ms,5ms) loss=burst(0.2%,4)"},
 
-    // Casparsen et al. (500 one-way probes per second over Starlink): cycles of 15 s, with higher latency in the last 75
-    // ms and the first 140 ms of each. Michel et al., "A first look at Starlink performance": round trips from Belgium
-    // to European servers of 50 ms (median), 40 to 60 ms (quartiles), 20 ms (minimum). Kassem et al., "A browser-side
-    // view of Starlink connectivity", IMC 2022: losses coincide with handovers. Assumed: handovers of 20 ms, the extra
-    // latency at the boundaries, and the division into up and down.
+    // Casparsen et al. (500 one-way probes per second over Starlink): cycles of 15 s, with higher latency in the last
+    // 75 ms and the first 140 ms of each. Michel et al., "A first look at Starlink performance": round trips from
+    // Belgium to European servers of 50 ms (median), 40 to 60 ms (quartiles), 20 ms (minimum). Kassem et al., "A
+    // browser-side view of Starlink connectivity", IMC 2022: losses coincide with handovers. Assumed: handovers of 20
+    // ms, the extra latency at the boundaries, and the division into up and down.
     {"leo-satellite", "low earth orbit, like Starlink",
      "Casparsen et al., arXiv:2601.08439, for the cycle; Michel et al., IMC 2022, for round trips; the rest assumed",
      "base=10ms delay=gamma(17ms,6ms) memory=1s spike(at=14.925s,every=15s,for=215ms,25ms) "
@@ -83,19 +83,19 @@ constexpr std::array<NamedProfile, 17> kProfiles = {{
      "base=87.5ms delay=gamma(0.5ms,0.5ms) memory=100ms loss=burst(0.1%,2)"},
 
     // The conditions of a study of telesurgery (github.com/UVA-DSA/telesurgery-qos-analysis, commit b47a9fef), which
-    // impaired only the commands to the robot; here, both directions have the condition. Delays have no memory, and
-    // datagrams overtake each other, as in its emulator. Mean and 99 %: 100 and 228, 299 and 627, 501 and 850 ms. Of
-    // the two rates that it has for the third, this is that of its network_conditions.txt.
+    // impaired only the commands to the robot; here, both directions are the same. As in its emulator, the delays are
+    // independent and datagrams can overtake each other. The mean and 99 % are 100 and 228, 299 and 627, 501 and 850
+    // ms. The repository has two sets of parameters for the third; these are from network_conditions.txt.
     {"netfi-delay-1", "telesurgery at a mean one-way delay of 100 ms", kNetFi, kNetFiDelay[0], kNetFiDelay[0]},
     {"netfi-delay-2", "telesurgery at a mean one-way delay of 300 ms", kNetFi, kNetFiDelay[1], kNetFiDelay[1]},
     {"netfi-delay-3", "telesurgery at a mean one-way delay of 500 ms", kNetFi, kNetFiDelay[2], kNetFiDelay[2]},
-    // Its targets are 10, 30 and 50 % of loss; these parameters give 9.8, 30.4 and 50.5 %, with mean bursts of 1.4, 1.8
-    // and 2.5 datagrams.
+    // The targets of the study are loss rates of 10, 30 and 50 %. These parameters result in 9.8, 30.4 and 50.5 %, with
+    // mean burst lengths of 1.4, 1.8 and 2.5 datagrams.
     {"netfi-loss-1", "telesurgery with 10 % lost in short bursts", kNetFi, kNetFiLoss[0], kNetFiLoss[0]},
     {"netfi-loss-2", "telesurgery with 30 % lost in short bursts", kNetFi, kNetFiLoss[1], kNetFiLoss[1]},
     {"netfi-loss-3", "telesurgery with 50 % lost in short bursts", kNetFi, kNetFiLoss[2], kNetFiLoss[2]},
-    // "Communication loss" in ms, as in the paper; its configuration counts datagrams. The targets are 10, 30 and 50 %,
-    // but a mean of 1.5 s per 10 s is 15 %, and the second is 33 %. The emulator begins with a gap.
+    // These are the times of the paper. The configuration of the emulator uses the same numbers as counts of datagrams,
+    // and starts with an outage. The targets are 10, 30 and 50 %, but the parameters result in 15, 33 and 50 %.
     {"netfi-gap-1", "telesurgery with 15 % of the time cut, up to 3 s", kNetFi, kNetFiGap[0], kNetFiGap[0]},
     {"netfi-gap-2", "telesurgery with 33 % of the time cut, up to 1 s", kNetFi, kNetFiGap[1], kNetFiGap[1]},
     {"netfi-gap-3", "telesurgery with 50 % of the time cut, up to 2 s", kNetFi, kNetFiGap[2], kNetFiGap[2]},

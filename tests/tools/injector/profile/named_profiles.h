@@ -14,7 +14,7 @@ namespace tendon::injector {
 struct NamedProfile {
   std::string_view name;
   std::string_view what;
-  std::string_view source;  ///< the citation, and what is assumed
+  std::string_view source;  ///< citation, and the assumed parts
   std::string_view up;      ///< client to server, as a profile line
   std::string_view down;    ///< server to client
 };

@@ -173,7 +173,7 @@ TEST(NamedProfiles, EachDelayKeepsToItsLaw) {
       EXPECT_LE(kolmogorov_distance(samples, law), 0.01) << named.name;
     }
   }
-  EXPECT_EQ(laws, 15);  // four of them have another one down
+  EXPECT_EQ(laws, 15);
 }
 
 TEST(NamedProfiles, TheDelaysOfNetFiHaveItsMeanAnd99Percent) {

@@ -52,8 +52,8 @@ struct GammaDelay {  ///< delay=gamma(MEAN,SD): shape (MEAN/SD)²
   Duration mean{}, deviation{};
   bool operator==(const GammaDelay&) const = default;
 };
-/// delay=mixture(LEAST,WEIGHT:MEAN,…): P(delay > LEAST + x) = Σ wᵢ exp(−x/MEANᵢ), wᵢ = WEIGHTᵢ / Σ WEIGHT. Each mean is
-/// that of one exponential, without LEAST.
+/// delay=mixture(LEAST,WEIGHT:MEAN,…): P(delay > LEAST + x) = Σ wᵢ exp(−x/MEANᵢ), wᵢ = WEIGHTᵢ / Σ WEIGHT. The
+/// means do not include LEAST.
 struct MixtureDelay {
   Duration least{};
   std::vector<Weighted> parts;  ///< the means, in any order
@@ -102,8 +102,8 @@ struct PatternLoss {  ///< loss=pattern(0001): 1 is lost; starts with the first 
   std::string pattern;
   bool operator==(const PatternLoss&) const = default;
 };
-/// loss=bursts(pareto2,P12,P21,SHAPE1:SCALE1,SHAPE2:SCALE2): bursts of random length, each followed by one datagram that
-/// passes (NetFI's GE_Pareto_BLL). The length is drawn in the state i in which the burst begins, and can be 0:
+/// loss=bursts(pareto2,P12,P21,SHAPE1:SCALE1,SHAPE2:SCALE2): bursts of random length, each followed by one datagram
+/// that passes (NetFI's GE_Pareto_BLL). The length is drawn in the state i in which the burst begins, and can be 0:
 ///
 ///     P(length ≥ k) = (1 + k/SCALEᵢ)^(−SHAPEᵢ)        Pareto II, rounded down to whole datagrams
 ///
@@ -178,8 +178,8 @@ struct Outage {  ///< outage(at=5s,for=300ms): arrivals in the window are lost
   Window when;
   bool operator==(const Outage&) const = default;
 };
-/// outage(clear=8.5s,for=uniform(0ms,3s)): a time without losses, then an outage of random length, and so on. The length
-/// follows a law of Delay.
+/// outage(clear=8.5s,for=uniform(0ms,3s)): a time without losses, then an outage of random length, and so on. The
+/// length follows a law of Delay.
 struct RandomOutage {
   Duration clear{};
   Delay length;
@@ -260,7 +260,7 @@ inline constexpr Duration kMaxDelay = std::chrono::seconds(60);
 /// Limit for events of one kind, drop rules and regimes, which are all evaluated for each datagram.
 inline constexpr std::size_t kMaxEvents = 64;
 
-/// Finding a quantile of a mixture takes a few exponentials for each part.
+/// Limits the time to build the table of a mixture.
 inline constexpr std::size_t kMaxParts = 16;
 
 /// Measured histograms have about 100 bins; the tables of netem 4096 values; a minute of 1 kHz 60 000 samples.

@@ -37,8 +37,8 @@ class OutageChain {
   OutageChain(Duration clear, LocalTime start, std::size_t number)
       : clear_(clear), number_(number), begins_(start), ends_(start) {}
 
-  /// The end of the outage in which `now` is, or nothing if there is none. `now` must not decrease. Takes about 30 ns for
-  /// each outage since the last call.
+  /// Returns the end of the outage at `now`, or nullopt if there is none. `now` must not decrease. Costs about 30 ns
+  /// for each outage since the last call.
   std::optional<LocalTime> end(LocalTime now, const QuantileTable& length, const Draws& draws);
 
  private:

@@ -47,8 +47,8 @@ class Driver {
   Driver(const Driver&) = delete;
   Driver& operator=(const Driver&) = delete;
 
-  /// Receives and releases datagrams until the duration has elapsed, the trace has ended or stop() is called. Throws std::system_error if
-  /// the system refuses a priority or a descriptor.
+  /// Receives and releases datagrams until the duration has elapsed, the trace has ended or stop() is called. Throws
+  /// std::system_error if the system refuses a priority or a descriptor.
   void run();
 
   // Other threads can call the following functions at any time.

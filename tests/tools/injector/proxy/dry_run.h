@@ -19,8 +19,8 @@ struct DryRun {
 /// Writes one line per packet, in the order of sending. As JSON:
 ///     {"dir":"up","index":0,"t_in_ns":0,"verdict":"pass","cause":"delay","t_out_ns":20123456}
 /// t_out_ns is null for a dropped packet, and the time of the first copy for a duplicated one. All times are relative
-/// to the first packet. `trace` can be null. Ends earlier at the end of a trace with AtEnd::kStop. Returns how often each
-/// Direction of a trace has been played.
+/// to the first packet. `trace` can be null. With AtEnd::kStop, stops at the end of the replayed trace. Returns
+/// TracePlayer::played() for each direction.
 std::array<double, 2> dry_run(const PreparedNetwork& network, const DryRun& options, std::ostream& out,
                               TraceWriter* trace);
 

@@ -30,10 +30,11 @@ struct LiveRun {
   bool json = false;
 };
 
-/// Runs until the duration has elapsed, the replayed trace has ended (AtEnd::kStop), SIGINT or SIGTERM. The driver has its own thread; this thread does the work
-/// that must not delay it (terminal, reports, control socket, building tables). Resolves the server's name once at the
-/// start. Returns the exit code, which is 1 for an INVALID run. Throws std::invalid_argument before the start for
-/// unusable addresses and files, and std::runtime_error for a name without an address and for failures during the run.
+/// Runs until the duration has elapsed, the replayed trace has ended (AtEnd::kStop), SIGINT or SIGTERM. The driver has
+/// its own thread; this thread does the work that must not delay it (terminal, reports, control socket, building
+/// tables). Resolves the server's name once at the start. Returns the exit code, which is 1 for an INVALID run. Throws
+/// std::invalid_argument before the start for unusable addresses and files, and std::runtime_error for a name without
+/// an address and for failures during the run.
 int live_run(const PreparedNetwork& network, const LiveRun& options);
 
 }  // namespace tendon::injector

@@ -48,7 +48,7 @@ struct ProxyMeasurements {
   ProxyCounters counters;
   DurationHistogram delay;          ///< first copies: departure − arrival, the actual one-way delay
   DurationHistogram release_error;  ///< all copies: departure − due time
-  double played = 0;                ///< TracePlayer::played() of the client that is furthest ahead
+  double played = 0;                ///< the maximum of TracePlayer::played() over the clients
 };
 
 /// Simulates a bad network between multiple clients and a server. This class does not use sockets or a clock. Datagrams
@@ -127,7 +127,8 @@ class Proxy {
   /// Applies the due changes of the timeline, only for timely display: each datagram meets those due at its arrival.
   void follow_timeline(LocalTime now);
 
-  /// The replayed trace has ended (AtEnd::kStop). Further datagrams are ignored, and those in flight still leave.
+  /// Returns true after the end of a trace with AtEnd::kStop. Then, the proxy ignores new datagrams, but releases those
+  /// in flight.
   bool ended() const noexcept { return ended_; }
 
   /// Forgets one idle client, so that the driver can close its socket.

@@ -68,7 +68,7 @@ std::vector<Check> events(const SelftestOptions& options) {
     checks.push_back(none(absence.line, "losses at another time", off));
   }
 
-  // Datagrams every 20 µs, so that each outage has some.
+  // The interval is much shorter than an outage.
   const std::string random_outage = "outage(clear=20ms,for=uniform(1ms,11ms))";
   const Duration period = std::chrono::microseconds(20);
   std::vector<double> lengths;

@@ -26,7 +26,8 @@ struct LossChain {
   static LossChain four_state(double p13, double p31, double p32, double p23, double p14);
 
   /// Bursts of Pareto-II lengths, P(L ≥ k) = (1 + k/scale)^−shape, below `longest`, each followed by one datagram that
-  /// passes (ParetoBurstLoss). The state is that of the chain and the number of losses that are left.
+  /// passes (ParetoBurstLoss). A state consists of the state of the model and the number of datagrams left
+  /// in the burst.
   static LossChain pareto_bursts(double p12, double p21, const std::array<double, 2>& shape,
                                  const std::array<double, 2>& scale, std::size_t longest);
 

@@ -114,7 +114,7 @@ Decision TracePlayer::decide(const Packet& packet) {
 
 Decision TracePlayer::through_network(Decision d, const Packet& packet) {
   const bool lost = d.verdict == Verdict::kDrop;
-  // The recorded time of a lost datagram need not be between those of its neighbors.
+  // The release of a lost datagram can be later than that of the next one, for example in an imported trace.
   const LocalTime entry = lost ? std::max(packet.arrival, last_entry_) : d.release;
   last_entry_ = std::max(last_entry_, entry);
   const Decision second = network_->decide({.arrival = entry, .size = packet.size, .bytes = packet.bytes});

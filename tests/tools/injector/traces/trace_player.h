@@ -33,16 +33,17 @@ namespace tendon::injector {
 /// * Of n links in the trace, link i uses the (i modulo n)-th, so that many clients can share an imported trace.
 /// * A direction that is not in the trace passes without delay.
 ///
-/// With add(), a network follows the trace:
+/// add() adds a network behind the trace:
 ///
 ///     trace      t₁, lost₁ as above
 ///     network    t₂, lost₂ of an Injector with its own random numbers, where the datagram arrives at t₁
 ///     result     release t₂, lost if lost₁ or lost₂; the cause of the first loss, or else of the last delay
 ///
-/// The delays add, and the network's FIFO holds from t₁ on. It draws for each datagram, in the order of the arrivals at
-/// the trace: one that the trace loses is delayed too, from the latest t₁ on. FIFO would undo the order of a trace that
-/// reorders(); such a trace needs order=free. The copy, stale replay and flipped bit are those of the trace, or else of
-/// the network; the payload is the shorter of both, and the changes of the source port add.
+/// The total delay is the sum of both delays. FIFO order in the network is based on t₁. The network also gets the
+/// datagrams that the trace loses, at the latest t₁ so far, so that these losses do not change its draws. If the trace
+/// reorders datagrams (see reorders()), the network needs order=free, because FIFO would restore their order. If trace
+/// and network both have a second copy, a stale replay or a flipped bit, the trace's is used. The shorter truncation is
+/// used, and the changes of the source port are added.
 ///
 /// Thread-safe: no.
 class TracePlayer final : public Decider {
@@ -60,11 +61,12 @@ class TracePlayer final : public Decider {
 
   Decision decide(const Packet& packet) override;
 
-  /// With kStop, true if the trace has no fate for the next datagram, which arrives at `arrival`.
+  /// Returns true with kStop if a datagram that arrives at `arrival` is after the end of the trace.
   bool stops(LocalTime arrival) const;
 
-  /// How often the trace has been played, for example 3.5 times: by index, the datagrams so far of those in the flow; by
-  /// time, until the last arrival; at most once if it does not repeat. 0 for a sparse trace or an unknown direction.
+  /// Returns the number of repetitions so far, for example 3.5. By index, this is the number of datagrams divided by
+  /// the length of the flow; by time, the time of the last arrival divided by the period. At most 1 without kRepeat; 0
+  /// for a sparse trace and for a direction that is not in the trace.
   double played() const;
 
   /// False if datagrams of this flow overtake each other.
@@ -97,7 +99,7 @@ class TracePlayer final : public Decider {
   std::uint32_t rebinds_ = 0;
   LocalTime last_arrival_{};
   std::optional<Injector> network_;
-  LocalTime last_entry_ = LocalTime::min();  ///< the latest t₁
+  LocalTime last_entry_ = LocalTime::min();  ///< latest t₁ so far
 };
 
 /// How a trace is replayed.
