@@ -11,12 +11,15 @@
 #include <stdexcept>
 #include <string>
 
+#include "tests/server/scratch_folder.h"
 #include "tests/support/refusal.h"
 #include "tests/tools/injector/proxy/status.h"
 #include "tests/tools/injector/traces/trace.h"
 
 namespace tendon::injector::dry_run_test {
 namespace {
+
+using testing::ScratchFolder;
 
 std::string printed(const NetworkOptions& network, const DryRun& options) {
   std::ostringstream out;
@@ -73,31 +76,22 @@ TEST(DryRun, RecordsATraceWhoseReplayIsTheSame) {
   EXPECT_EQ(replayed.str(), decisions.str());
 }
 
-class TraceFile {
- public:
-  TraceFile(const std::string& profile, std::uint64_t count)
-      : path_(std::filesystem::path(::testing::TempDir()) /
-              (std::string(::testing::UnitTest::GetInstance()->current_test_info()->name()) + ".csv")) {
-    const PreparedNetwork network = prepare({.profile = profile, .seed = 7});
-    std::ofstream file(path_);
-    std::ostringstream ignored;
-    TraceWriter trace(file, network.header());
-    dry_run(network, {.count = count}, ignored, &trace);
-  }
-  ~TraceFile() { std::filesystem::remove(path_); }
-  TraceFile(const TraceFile&) = delete;
-  TraceFile& operator=(const TraceFile&) = delete;
-  const std::filesystem::path& path() const { return path_; }
-
- private:
-  std::filesystem::path path_;
-};
+/// Writes the record of a dry run.
+std::filesystem::path recorded(const ScratchFolder& folder, const std::string& profile, std::uint64_t count) {
+  const PreparedNetwork network = prepare({.profile = profile, .seed = 7});
+  std::ofstream file(folder.path() / "trace.csv");
+  std::ostringstream ignored;
+  TraceWriter trace(file, network.header());
+  dry_run(network, {.count = count}, ignored, &trace);
+  return folder.path() / "trace.csv";
+}
 
 TEST(DryRun, RepeatsStopsOrPassesAtTheEndOfATraceAndSaysHowOftenItWasPlayed) {
   using AtEnd = TracePlayer::AtEnd;
-  const TraceFile file("delay=20ms loss=pattern(01)", 20);
+  const ScratchFolder folder;
+  const std::filesystem::path file = recorded(folder, "delay=20ms loss=pattern(01)", 20);
   const auto run = [&](std::optional<AtEnd> at_end) {
-    const PreparedNetwork network = prepare({.replay = file.path(), .at_end = at_end});
+    const PreparedNetwork network = prepare({.replay = file, .at_end = at_end});
     std::ostringstream out;
     const auto [up, down] = dry_run(network, {.count = 70}, out, nullptr);
     const std::string text = out.str();
@@ -111,17 +105,19 @@ TEST(DryRun, RepeatsStopsOrPassesAtTheEndOfATraceAndSaysHowOftenItWasPlayed) {
 }
 
 TEST(Prepare, TheRecordOfAReplayWithAnAddedProfileNamesBoth) {
-  const TraceFile file("delay=20ms", 20);
-  const TraceHeader header = prepare({.replay = file.path(), .add = "loss=burst(1%,3)", .seed = 9}).header();
+  const ScratchFolder folder;
+  const std::filesystem::path file = recorded(folder, "delay=20ms", 20);
+  const TraceHeader header = prepare({.replay = file, .add = "loss=burst(1%,3)", .seed = 9}).header();
   EXPECT_EQ(header.seed, 9U);
-  EXPECT_EQ(header.up, "replay of " + file.path().string() + ", then loss=burst(1%,3)");
+  EXPECT_EQ(header.up, "replay of " + file.string() + ", then loss=burst(1%,3)");
   EXPECT_EQ(header.up, header.down);
-  EXPECT_EQ(prepare({.replay = file.path()}).header().up, "");
+  EXPECT_EQ(prepare({.replay = file}).header().up, "");
 }
 
 TEST(Prepare, AProfileThatIsAddedToATraceThatReordersIsFree) {
-  const TraceFile file("delay=uniform(0ms,20ms) order=free", 200);
-  EXPECT_TRUE(prepare({.replay = file.path(), .add = "loss=1%"}).text[0].ends_with(", then loss=1% order=free"));
+  const ScratchFolder folder;
+  const std::filesystem::path file = recorded(folder, "delay=uniform(0ms,20ms) order=free", 200);
+  EXPECT_TRUE(prepare({.replay = file, .add = "loss=1%"}).text[0].ends_with(", then loss=1% order=free"));
 }
 
 TEST(Prepare, NamesTheOptionThatIsWrong) {
@@ -131,15 +127,16 @@ TEST(Prepare, NamesTheOptionThatIsWrong) {
   EXPECT_TRUE(refusal({.profile = "loss=2"}).starts_with("--profile: ")) << refusal({.profile = "loss=2"});
   EXPECT_TRUE(refusal({.profile = "lan", .down = "loss=2"}).starts_with("--down: "));
   EXPECT_NE(refusal({.replay = "none.csv"}).find("none.csv"), std::string::npos);
-  const TraceFile file("delay=20ms", 20);
-  EXPECT_TRUE(refusal({.replay = file.path(), .seed = 7}).starts_with("--seed: expected --add"));
-  EXPECT_TRUE(refusal({.replay = file.path(), .add = "loss=2"}).starts_with("--add: loss is 200%"));
-  std::ofstream(file.path()) << "# tendon-trace 1\n# benign up 20000000\n"
-                             << "dir,link,index,t_in_ns,bytes,hash,verdict,cause,t_out_ns,t_actual_ns,duplicate_ns,"
-                                "stale_back,stale_ns,flipped_bit,truncated_to,rebinds\n";
-  EXPECT_EQ(refusal({.replay = file.path(), .at_end = TracePlayer::AtEnd::kRepeat}),
-            "--at-end: " + file.path().string() + " is sparse and has no end");
-  EXPECT_EQ(refusal({.replay = file.path()}), "");
+  const ScratchFolder folder;
+  const std::filesystem::path file = recorded(folder, "delay=20ms", 20);
+  EXPECT_TRUE(refusal({.replay = file, .seed = 7}).starts_with("--seed: expected --add"));
+  EXPECT_TRUE(refusal({.replay = file, .add = "loss=2"}).starts_with("--add: loss is 200%"));
+  std::ofstream(file) << "# tendon-trace 1\n# benign up 20000000\n"
+                      << "dir,link,index,t_in_ns,bytes,hash,verdict,cause,t_out_ns,t_actual_ns,duplicate_ns,"
+                         "stale_back,stale_ns,flipped_bit,truncated_to,rebinds\n";
+  EXPECT_EQ(refusal({.replay = file, .at_end = TracePlayer::AtEnd::kRepeat}),
+            "--at-end: " + file.string() + " is sparse and has no end");
+  EXPECT_EQ(refusal({.replay = file}), "");
 }
 
 }  // namespace
