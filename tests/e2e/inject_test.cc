@@ -132,7 +132,7 @@ TEST(Inject, ACaptureOfARunMeetsTheSameFatesOnceMore) {
   }
   tcpdump.signal(SIGINT);
   EXPECT_EQ(tcpdump.wait(), 0) << tcpdump.err();
-  // Both ends are on this host, so a single capture contains both.
+  // A capture of the loopback interface contains both ends.
   Process import(program("tendon-inject"),
                  {"import", "pcap", "run.pcap", "run.pcap", "--port", client_port, "--server-port",
                   port(to_string(server.local_address())), "--out", "imported.csv"},
@@ -141,7 +141,7 @@ TEST(Inject, ACaptureOfARunMeetsTheSameFatesOnceMore) {
   const Trace first = injector::read_trace(folder.path() / "first.csv");
   const Trace imported = injector::read_trace(folder.path() / "imported.csv");
   const std::string up = fates(imported);
-  // The import omits the last datagrams, because the capture could have ended before they arrived.
+  // The last datagrams can be missing, because it is not known whether they arrived after the end of the capture.
   ASSERT_GT(up.size(), kCount * 9U / 10) << import.err();
   EXPECT_TRUE(fates(first).starts_with(up)) << fates(first) << "\n" << up;
   EXPECT_TRUE(fates(first, Direction::kDown).starts_with(fates(imported, Direction::kDown)));
