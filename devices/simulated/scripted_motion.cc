@@ -61,6 +61,10 @@ struct Prepare {
     expect_finite(s.origin, "recorded.origin");
     s.direction = unit(s.direction, "recorded.direction");
   }
+
+  void operator()(const ScriptedMotion::Guided& s) const {
+    expect(s.point != nullptr, "guided.point", 0, "the address of a point");
+  }
 };
 
 Point point_at(const ScriptedMotion::Sine& s, double t) {
@@ -137,6 +141,8 @@ Point point_at(const Recorded& s, double t) {
   const double v = (m0 + u * (2 * (3 * rise - 2 * m0 - m1) + u * 3 * (m0 + m1 - 2 * rise))) / h;
   return {s.origin + s.direction * x, s.direction * v};
 }
+
+Point point_at(const ScriptedMotion::Guided& s, double /*t*/) { return *s.point; }
 
 }  // namespace
 

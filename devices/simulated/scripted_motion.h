@@ -11,7 +11,7 @@ namespace tendon {
 
 /// The motion of an operator's hand: the moving equilibrium point of OperatorHand, in m, device base frame. Throws
 /// std::invalid_argument if a value of the script is out of range, naming the field.
-/// Thread-safe: yes, immutable. Realtime-safe: `at`.
+/// Thread-safe: yes, immutable, except for Guided. Realtime-safe: `at`.
 class ScriptedMotion {
  public:
   struct Point {
@@ -64,7 +64,12 @@ class ScriptedMotion {
     AtEnd at_end = AtEnd::kHold;
   };
 
-  using Script = std::variant<Sine, RampHold, MinimumJerk, Recorded>;
+  /// Another part of the program moves this point between two reads of the device, for example with a mouse.
+  struct Guided {
+    const Point* point = nullptr;  ///< must outlive the motion
+  };
+
+  using Script = std::variant<Sine, RampHold, MinimumJerk, Recorded, Guided>;
 
   explicit ScriptedMotion(Script script);
 

@@ -67,6 +67,15 @@ TEST(Sine, SwingsAboutItsCentreAlongItsDirectionWhateverThatVectorsLength) {
   EXPECT_NEAR(motion.at(0).velocity.norm(), 0.02 * 4 * std::numbers::pi, 1e-15);
 }
 
+TEST(Guided, IsWhereItsPointIsNow) {
+  ScriptedMotion::Point point{.position = {1, 2, 3}, .velocity = {4, 5, 6}};
+  const ScriptedMotion motion(ScriptedMotion::Guided{&point});
+  point.position.x() = 7;
+  EXPECT_EQ(motion.at(0).position, Vec3(7, 2, 3));
+  EXPECT_EQ(motion.at(0).velocity, Vec3(4, 5, 6));
+  EXPECT_THROW(ScriptedMotion(ScriptedMotion::Guided{}), std::invalid_argument);
+}
+
 TEST(RampHold, HoldsAtBothEndsForAsLongAsItWasTold) {
   const ScriptedMotion motion(
       ScriptedMotion::RampHold{.from = {0, 0, 0}, .to = {0.1, 0, 0}, .ramp = 300ms, .hold = 200ms});
