@@ -5,7 +5,9 @@
 #include <cmath>
 #include <deque>
 #include <limits>
+#include <memory>
 #include <stdexcept>
+#include <variant>
 
 #include "core/ledger/energy_ledger.h"
 #include "tests/support/dice.h"
@@ -178,42 +180,65 @@ class Hand {
 
 }  // namespace
 
-std::vector<Moment> run(const Experiment& experiment) {
+struct LiveRun::Parts {
+  explicit Parts(const Experiment& given)
+      : experiment(given),
+        heart(controller(experiment)),
+        remote(experiment.environment, experiment.seed),
+        hand(std::visit([](const auto& kind) { return Hand(kind); }, experiment.hand)),
+        ledger(hand.friction()),
+        truth(experiment.environment.truth ? experiment.environment.truth : experiment.environment.force) {}
+
+  Experiment experiment;
+  HapticController heart;
+  Remote remote;
+  Hand hand;
+  EnergyLedger ledger;
+  Environment::Force truth;
+  LocalTime now{};
+  Vec3 applied = Vec3::Zero();
+  Vec3 before = Vec3::Zero();
+};
+
+LiveRun::LiveRun(const Experiment& experiment) {
   if (!experiment.environment.force) throw std::invalid_argument("an experiment requires an environment");
   if (experiment.environment.period <= Duration::zero() || experiment.period <= Duration::zero())
     throw std::invalid_argument("a period must be above zero");
-  HapticController heart(controller(experiment));
-  Remote remote(experiment.environment, experiment.seed);
-  Hand hand = std::visit([](const auto& kind) { return Hand(kind); }, experiment.hand);
-  EnergyLedger ledger(hand.friction());
+  parts_ = std::make_unique<Parts>(experiment);
+}
 
-  const Environment::Force& truth =
-      experiment.environment.truth ? experiment.environment.truth : experiment.environment.force;
+LiveRun::~LiveRun() = default;
+
+Moment LiveRun::step() {
+  auto& [experiment, heart, remote, hand, ledger, truth, now, applied, before] = *parts_;
+  const Motion seen = hand.read(now);
+  if (now == LocalTime{}) {
+    heart.observe(remote.at_rest(seen));
+  } else {
+    ledger.observe<3>(applied, hand.motor_position() - before, experiment.period);
+  }
+  before = hand.motor_position();
+  remote.observe(seen);
+  if (const auto force = remote.arrived(now)) heart.observe(*force);
+
+  Moment moment;
+  moment.step = heart.step(seen, applied);
+  moment.t = seconds(now.time_since_epoch());
+  moment.position = hand.position();
+  moment.velocity = hand.velocity();
+  moment.true_force = truth(moment.t, hand.position());
+  moment.energy = ledger.energy();
+  applied = hand.apply(moment.step.force);
+  moment.step.force = applied;
+  now += experiment.period;
+  return moment;
+}
+
+std::vector<Moment> run(const Experiment& experiment) {
+  LiveRun live(experiment);
   std::vector<Moment> record;
   record.reserve(static_cast<std::size_t>(experiment.length / experiment.period));
-  Vec3 applied = Vec3::Zero();
-  Vec3 before = Vec3::Zero();
-  for (LocalTime now{}; now.time_since_epoch() < experiment.length; now += experiment.period) {
-    const Motion seen = hand.read(now);
-    if (!record.empty()) {
-      ledger.observe<3>(applied, hand.motor_position() - before, experiment.period);
-    }
-    before = hand.motor_position();
-    if (record.empty()) heart.observe(remote.at_rest(seen));
-    remote.observe(seen);
-    if (const auto force = remote.arrived(now)) heart.observe(*force);
-
-    Moment moment;
-    moment.step = heart.step(seen, applied);
-    moment.t = seconds(now.time_since_epoch());
-    moment.position = hand.position();
-    moment.velocity = hand.velocity();
-    moment.true_force = truth(moment.t, hand.position());
-    moment.energy = ledger.energy();
-    applied = hand.apply(moment.step.force);
-    moment.step.force = applied;
-    record.push_back(moment);
-  }
+  for (Duration t{}; t < experiment.length; t += experiment.period) record.push_back(live.step());
   return record;
 }
 

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <variant>
 #include <vector>
@@ -94,6 +95,21 @@ inline constexpr double kMostVibration = 8e-3;
 /// until the next one arrives. Deterministic on machines with the same floating point. Throws the exceptions of the
 /// parts if a value is not valid, and std::invalid_argument if there is no environment.
 std::vector<Moment> run(const Experiment& experiment);
+
+/// Does the same as run(), but only one period in each call, so that the caller can move a Guided hand. `length` is not
+/// used.
+class LiveRun {
+ public:
+  explicit LiveRun(const Experiment& experiment);
+  LiveRun(LiveRun&&) = delete;
+  ~LiveRun();
+
+  Moment step();
+
+ private:
+  struct Parts;
+  std::unique_ptr<Parts> parts_;
+};
 
 /// The `period` must be the one of the experiment.
 Outcome outcome(const std::vector<Moment>& record, Duration period);
