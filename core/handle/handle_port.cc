@@ -101,14 +101,14 @@ WrenchPort::Config wrench_config(const LimiterConfig& point, const RotationLimit
       throw std::invalid_argument(
           "rotation.most_acceleration: expected a number above 0 rad/s², because bounded_acceleration is used");
     }
-    config.parts.bounded_acceleration = {.most = {bounded->most[0], *rotation.most_acceleration}};
+    config.parts.bounded_acceleration.emplace().most = {bounded->most[0], *rotation.most_acceleration};
   }
   if (const auto& shaping = parts.shaping) {
     if (!rotation.shaping_stiffness) {
       throw std::invalid_argument(
           "rotation.shaping_stiffness: expected a number above 0 N·m/rad, because shaping is used");
     }
-    config.parts.shaping = {.stiffness = {shaping->stiffness[0], *rotation.shaping_stiffness}};
+    config.parts.shaping.emplace().stiffness = {shaping->stiffness[0], *rotation.shaping_stiffness};
   }
   if (const auto& thrift = parts.thrift) config.parts.thrift = {thrift->share, thrift->energy};
   if (const auto& damper = parts.damper) {
