@@ -247,6 +247,7 @@ tendon_package(mpi DEBIAN libopenmpi-dev MODULE MPI TARGET MPI::MPI_CXX
 # The server only uses the headers. The library is loaded when the first pipe is opened.
 tendon_package(libusb DEBIAN libusb-1.0-0-dev HEADERS libusb.h SUFFIXES libusb-1.0 LIBRARIES usb-1.0)
 tendon_package(help2man DEBIAN help2man PROGRAM help2man RUN --version VERSION 1)
+tendon_package(emscripten DEBIAN emscripten PROGRAM em++ RUN --version VERSION 3.1.6)
 
 # These packages are only used by tests. In Fast DDS 3, the library is called libfastdds.
 tendon_package(fastdds DEBIAN libfastrtps-dev HEADERS fastdds/dds/domain/DomainParticipantFactory.hpp fastcdr/Cdr.h
