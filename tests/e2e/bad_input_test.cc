@@ -7,6 +7,7 @@
 #include <cctype>
 #include <filesystem>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "tests/e2e/stage/stage.h"
@@ -146,6 +147,56 @@ TEST(BadInput, OfTheInjectorIsAnsweredWithWhatIsWrong) {
           {"a count without a dry run", "tendon-inject", with("--count", "5"), {"--count", "--dry-run"}},
           {"unknown option", "tendon-inject", with("--lose", "2%"), {"--lose"}},
       });
+}
+
+TEST(BadInput, OfASweepIsAnsweredWithWhatIsWrong) {
+  if (!std::filesystem::exists(program("tendon-lab"))) GTEST_SKIP() << "tendon-lab is not built with sanitizers";
+  const ScratchFolder folder;
+  const auto path = [&](const std::string& name) { return (folder.path() / name).string(); };
+  const std::string demo = demo_scene().string();
+  const std::string scenes = demo_scene().parent_path().string();
+  const std::string text = write(path("text.csv"), "t_ms,delay_ms\n0,20\n");
+  std::vector<BadInput> inputs;
+  const auto refused = [&](std::vector<std::string> arguments, std::vector<std::string> says, int exit_code = 2) {
+    std::string what;
+    for (const std::string& argument : arguments) what += argument + " ";
+    arguments.insert(arguments.begin(), "sweep");
+    inputs.push_back({what, "tendon-lab", std::move(arguments), std::move(says), exit_code});
+  };
+  const auto with = [&](std::vector<std::string> options, std::vector<std::string> says, int exit_code = 2) {
+    options.insert(options.begin(), {demo, "--network", "lan"});
+    refused(std::move(options), std::move(says), exit_code);
+  };
+  refused({"--network", "lan"}, {"scene", "required"});
+  refused({demo}, {"--network", "required"});
+  refused({scenes + "/fleet.toml", "--network", "lan"}, {"expected a scene with one device, found count = 64"});
+  refused({scenes + "/falcon.toml", "--network", "lan"}, {"expected a simulated device, found kind = \"falcon\""});
+  refused({path("none.toml"), "--network", "lan"}, {"cannot read", "none.toml", "No such file"}, 1);
+  refused({path(""), "--network", "lan"}, {"cannot read", "Is a directory"}, 1);
+  refused({demo, "--network", "lann"}, {"--network", "lann", "did you mean lan?"});
+  refused({demo, "--network", "delay=0:50:20ms"}, {"--network", "reaches B in whole steps", "0:50:20"});
+  refused({demo, "--network", "loss={0,1"}, {"--network", "expected } at the end of {0,1"});
+  refused({demo, "--network", "trace:none.csv"}, {"cannot read trace none.csv", "No such file"}, 1);
+  refused({demo, "--network", "trace:" + text}, {text + ":1", "expected"}, 1);
+  with({"--stiffness", "10:0:1"}, {"--stiffness", "10:0:1"});
+  with({"--stiffness", "soft"}, {"--stiffness", "soft"});
+  with({"--rate-hz", "0"}, {"--rate-hz", "\"0\""});
+  with({"--law", "feeel"}, {"feeel", "did you mean feel?"});
+  with({"--law", "clamp"}, {"clamp"});
+  with({"--seeds", "0"}, {"--seeds: expected at least 1"});
+  with({"--seeds", "-1"}, {"--seeds", "-1"});
+  with({"--for-s", "0.5"}, {"--for-s: expected more than 1 s"});
+  with({"--jobs", "0"}, {"--jobs", "0"});
+  with({"--quiet-mps", "-1"}, {"--quiet-mps", "-1"});
+  with({"--passive-j", "-1"}, {"--passive-j", "-1"});
+  with({"--plot", "box", "--out", path("a")}, {"--plot", "box", "zwidth"});
+  with({"--plot", "zwidth"}, {"--plot", "--out"});
+  with({"--json", "--out", path("a")}, {"--json", "--out"});
+  with({"--units", "7"}, {"--units", "7"});
+  with({"--out", text}, {"cannot use " + text + ": Not a directory"}, 1);
+  with({"--out", "/proc/none"}, {"cannot use /proc/none: No such file or directory"}, 1);
+  expect_refusals(folder.path(), inputs);
+  EXPECT_FALSE(std::filesystem::exists(path("a")));
 }
 
 TEST(BadInput, OfAClientIsAnsweredWithWhatIsWrong) {

@@ -3,6 +3,7 @@
 
 #include <CLI/CLI.hpp>
 #include <exception>
+#include <filesystem>
 #include <iostream>
 #include <new>
 #include <stdexcept>
@@ -33,6 +34,9 @@ int run_tool(CLI::App& app, int argc, char** argv, const Body& body) {
     return complain(error, kFailed);
   } catch (const SceneError& error) {
     return complain(error, kWrongUsage);
+  } catch (const std::filesystem::filesystem_error& error) {
+    return complain(std::runtime_error("cannot use " + error.path1().string() + ": " + error.code().message()),
+                    kFailed);
   } catch (const std::bad_alloc&) {
     return complain(std::runtime_error("out of memory; check the limit in `ulimit -v`"), kFailed);
   } catch (const std::exception& error) {
