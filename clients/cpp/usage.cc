@@ -89,13 +89,19 @@ std::string unexpected_word(const CLI::App& app, const std::string& word) {
   return "unknown command \"" + word + '"' + (meant.empty() ? "; expected one of " + commands : meant);
 }
 
-void refuse_empty_values(CLI::App& app) {
+/// Refuses empty texts, and negative counts, which CLI11 would read as the largest unsigned numbers.
+void refuse_odd_values(CLI::App& app) {
   for (CLI::Option* const option : app.get_options()) {
     if (option->get_items_expected_max() == 0) continue;  // a flag
-    option->check(
-        [](const std::string& text) { return std::string(text.empty() ? "expected a value, got an empty text" : ""); });
+    std::string type = option->get_type_name();
+    type.resize(std::min(type.find(':'), type.size()));
+    const bool counts = type == "UINT" || type == "N";
+    option->check([counts](const std::string& text) -> std::string {
+      if (text.empty()) return "expected a value, got an empty text";
+      return counts && text.front() == '-' ? "expected a whole number from 0, got " + text : "";
+    });
   }
-  for (CLI::App* const command : app.get_subcommands([](CLI::App*) { return true; })) refuse_empty_values(*command);
+  for (CLI::App* const command : app.get_subcommands([](CLI::App*) { return true; })) refuse_odd_values(*command);
 }
 
 std::string list_of(const std::vector<std::string>& words) {
@@ -114,7 +120,7 @@ void dress(CLI::App& app) {
 }
 
 void parse(CLI::App& app, int argc, const char* const* argv) {
-  refuse_empty_values(app);
+  refuse_odd_values(app);
   app.parse(argc, argv);
 }
 

@@ -16,7 +16,8 @@ namespace tendon::usage {
 void dress(CLI::App& app);
 
 /// Parses a command line. All programs call this function instead of CLI::App::parse, which reads an empty text as the
-/// number 0, for example when a script passes a variable that is not set. Throws CLI::ParseError.
+/// number 0, for example when a script passes a variable that is not set, and -1 as the largest unsigned number. Throws
+/// CLI::ParseError.
 void parse(CLI::App& app, int argc, const char* const* argv);
 
 /// Returns the error message. It suggests the closest option or command, and points out a decimal comma.

@@ -184,7 +184,8 @@ TEST(BadInput, OfASweepIsAnsweredWithWhatIsWrong) {
   with({"--law", "feeel"}, {"feeel", "did you mean feel?"});
   with({"--law", "clamp"}, {"clamp"});
   with({"--seeds", "0"}, {"--seeds: expected at least 1"});
-  with({"--seeds", "-1"}, {"--seeds", "-1"});
+  with({"--seeds", "-1"}, {"--seeds: expected a whole number from 0, got -1"});
+  with({"--first-seed", "-1"}, {"--first-seed: expected a whole number from 0, got -1"});
   with({"--for-s", "0.5"}, {"--for-s: expected more than 1 s"});
   with({"--jobs", "0"}, {"--jobs", "0"});
   with({"--quiet-mps", "-1"}, {"--quiet-mps", "-1"});
@@ -192,7 +193,7 @@ TEST(BadInput, OfASweepIsAnsweredWithWhatIsWrong) {
   with({"--plot", "box", "--out", path("a")}, {"--plot", "box", "zwidth"});
   with({"--plot", "zwidth"}, {"--plot", "--out"});
   with({"--json", "--out", path("a")}, {"--json", "--out"});
-  with({"--units", "7"}, {"--units", "7"});
+  with({"--units", "7"}, {"units \"7\": expected FIRST:COUNT"});
   with({"--out", text}, {"cannot use " + text + ": Not a directory"}, 1);
   with({"--out", "/proc/none"}, {"cannot use /proc/none: No such file or directory"}, 1);
   expect_refusals(folder.path(), inputs);

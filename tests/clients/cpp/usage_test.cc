@@ -107,6 +107,8 @@ TEST(Usage, TheHelpHasNoneOfTheLibrarysOwnNotation) {
 struct Said {
   double duration_s = 7;
   int count = 0;
+  std::uint64_t seed = 0;
+  int offset = 0;
   std::string name = "none";
   std::vector<double> pair;
   bool json = false;
@@ -119,6 +121,8 @@ std::string refusal(std::vector<const char*> words) {
   for (CLI::App* const each : {&app, verb}) {
     each->add_option("--duration-s", said.duration_s);
     each->add_option("--count", said.count)->check(CLI::Range(0, 9));
+    each->add_option("--seed", said.seed);
+    each->add_option("--offset", said.offset);
     each->add_option("--name", said.name);
     each->add_option("--pair", said.pair)->delimiter(',')->expected(2);
     each->add_flag("--json", said.json);
@@ -144,6 +148,12 @@ TEST(CommandLines, AnEmptyTextIsNoValue) {
   EXPECT_EQ(refusal({"verb", "--duration-s", ""}), "--duration-s" + why);
   EXPECT_NE(refusal({"--duration-s="}), "none");
   EXPECT_EQ(refusal({"--duration-s", "0", "--json", "--pair", "1,2", "verb", "--name", "a", "--json"}), "none");
+}
+
+TEST(CommandLines, ANegativeCountIsRefused) {
+  EXPECT_EQ(refusal({"--seed", "-1"}), "--seed: expected a whole number from 0, got -1");
+  EXPECT_EQ(refusal({"verb", "--seed", "-1"}), "--seed: expected a whole number from 0, got -1");
+  EXPECT_EQ(refusal({"--seed", "1", "--offset", "-1"}), "none");
 }
 
 TEST(CommandLines, ADecimalCommaIsNamed) {

@@ -179,16 +179,19 @@ void write_table(const std::filesystem::path& file, const std::string& text) {
   std::filesystem::rename(replacement, file);
 }
 
+/// Puts the name of the option before an error of `make`.
+template <class Make>
+auto named(std::string_view option, const Make& make) {
+  try {
+    return make();
+  } catch (const std::invalid_argument& error) {
+    throw std::invalid_argument(std::string(option) + ": " + error.what());
+  }
+}
+
 }  // namespace
 
 std::vector<GridCell> cells_of(const GridOptions& options) {
-  const auto named = [](std::string_view option, const auto& make) {
-    try {
-      return make();
-    } catch (const std::invalid_argument& error) {
-      throw std::invalid_argument(std::string(option) + ": " + error.what());
-    }
-  };
   const auto laws = named("--law", [&] { return separated(options.laws); });
   const auto networks = named("--network", [&] {
     std::vector<std::string> all;
@@ -241,7 +244,7 @@ void run_grid(const GridOptions& options, std::ostream& out) {
   std::map<std::string, std::string> parts;
   for (const GridCell& cell : cells) {
     if (!parts.contains(cell.law)) parts[cell.law] = bench.parts_of(cell.law);
-    bench.add_network(cell.network);
+    named("--network", [&] { bench.add_network(cell.network); });
   }
   const auto length_of = [&](const GridCell& cell) {
     if (options.length_s) return from_seconds(*options.length_s);
