@@ -60,8 +60,8 @@ namespace tendon {
 /// `lost` and the force is 0. A link whose delay exceeds max_delay is treated as lost. A robot (`holds_place`) that is
 /// ready and not live holds its last position with a spring of K and B along all axes, and the ramp blends this spring
 /// with the law. After a loss, the round trip is measured again, so that the spring of the next act does not depend on
-/// the silence. Energy that the network has not delivered is lost to the pair. While the force decreases, the hand gives
-/// way and energy is dissipated. A resting hand cannot replace it, so the force is smaller until the next press.
+/// the silence. Energy that the network has not delivered is lost to the pair, and some energy is dissipated while the
+/// force decreases. A resting hand cannot replace it, so the force is smaller until the next press.
 ///
 /// **Laws.** The folder methods/ contains one law per method. K, D, and B are the values of the leader, and the values
 /// of the follower are smaller by s_f s_x. The norm of all forces is at most max_force.

@@ -27,11 +27,11 @@ struct CouplingMethodInfo {
   std::string_view name;       ///< in scenes and error messages
   std::string_view what;       ///< one line
   bool has_places = false;     ///< positions of leader and follower correspond (CouplingAbsolute)
-  bool has_springs = false;    ///< both ends have a spring, which adapts to the delay
+  bool has_springs = false;    ///< the springs at both ends adapt to the delay
   bool has_velocity = true;    ///< uses the velocity of the peer
   bool is_felt = true;         ///< the leader feels the contact of the follower
   bool keeps_scales = false;   ///< the scales cannot be changed, because the totals of the method depend on them
-  bool can_be_shared = false;  ///< a follower can have several leaders
+  bool can_be_shared = false;  ///< works with more than one leader
   bool needs_tank = false;     ///< a follower with a limiter can only move when the leader pays for it (EnergyTank)
   std::string_view needs_damping{};  ///< why own_damping must be above 0; empty if it can be 0
 };

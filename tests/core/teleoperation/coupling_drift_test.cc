@@ -19,7 +19,7 @@ struct Cell {
   double amplitude;       ///< m, of the hand
   double frequency;       ///< Hz
   int seconds;            ///< of motion
-  int presses;            ///< of the clutch, in this time
+  int presses;            ///< number of clutch presses
   double coulomb = 0.02;  ///< N, of both devices
 };
 

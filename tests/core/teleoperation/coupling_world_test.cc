@@ -251,7 +251,7 @@ class CouplingWorld {
       if (watch.not_live_for > 55 && !robot) breaks(wanted.norm() > 0, "idle");
     }
     const bool steady = port.seen && port.ready && watch.stepped && ours;
-    // A robot with waves has held its place since the silence before, against whatever moves it.
+    // After a silence, the spring that holds a robot with waves can be stretched, so the force can jump.
     const bool held = robot && port.setup.coupling.method == CouplingMethod::kWaves;
     if (steady && !held && live != watch.live) breaks((wanted - watch.wanted).norm() > 0.021 * period * most, "step");
     watch.stepped = port.seen && port.ready;

@@ -52,7 +52,7 @@ struct Leg {
   int count;  ///< periods
   double x;   ///< m, where the wish arrives
 };
-/// The hand moves into the wall, stays there for a second, and then moves back.
+/// A press of one second.
 constexpr Leg kTouching[] = {{500, kTouch}, {1000, kTouch}, {500, -kTouch}};
 
 std::vector<Row> touched(const Settings& settings) {

@@ -94,7 +94,7 @@ constexpr std::array<NamedProfile, 17> kProfiles = {{
     {"netfi-loss-1", "telesurgery with 10 % lost in short bursts", kNetFi, kNetFiLoss[0], kNetFiLoss[0]},
     {"netfi-loss-2", "telesurgery with 30 % lost in short bursts", kNetFi, kNetFiLoss[1], kNetFiLoss[1]},
     {"netfi-loss-3", "telesurgery with 50 % lost in short bursts", kNetFi, kNetFiLoss[2], kNetFiLoss[2]},
-    // The times are from the paper. The configuration of the emulator uses the same numbers as counts of datagrams,
+    // This uses the times of the paper. The configuration of the emulator uses the same numbers as counts of datagrams,
     // and starts with an outage. The targets are 10, 30 and 50 %, but the parameters result in 15, 33 and 50 %.
     {"netfi-gap-1", "telesurgery with 15 % of the time cut, up to 3 s", kNetFi, kNetFiGap[0], kNetFiGap[0]},
     {"netfi-gap-2", "telesurgery with 33 % of the time cut, up to 1 s", kNetFi, kNetFiGap[1], kNetFiGap[1]},

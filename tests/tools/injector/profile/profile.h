@@ -52,8 +52,8 @@ struct GammaDelay {  ///< delay=gamma(MEAN,SD): shape (MEAN/SD)²
   Duration mean{}, deviation{};
   bool operator==(const GammaDelay&) const = default;
 };
-/// delay=mixture(LEAST,WEIGHT:MEAN,…): P(delay > LEAST + x) = Σ wᵢ exp(−x/MEANᵢ), wᵢ = WEIGHTᵢ / Σ WEIGHT. The
-/// means do not include LEAST.
+/// delay=mixture(LEAST,WEIGHT:MEAN,…): P(delay > LEAST + x) = Σ wᵢ exp(−x/MEANᵢ), wᵢ = WEIGHTᵢ / Σ WEIGHT. Each
+/// MEAN is counted from LEAST.
 struct MixtureDelay {
   Duration least{};
   std::vector<Weighted> parts;  ///< the means, in any order

@@ -26,7 +26,7 @@ struct NetworkOptions {
   std::filesystem::path replay = {};
   TracePlayer::By replay_by = TracePlayer::By::kIndex;
   std::optional<TracePlayer::AtEnd> at_end = {};
-  std::string add = {};  ///< profile behind the trace; empty if there is none
+  std::string add = {};  ///< profile that follows the trace, or empty
   std::optional<std::uint64_t> seed = {};
 };
 

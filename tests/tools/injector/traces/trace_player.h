@@ -33,7 +33,7 @@ namespace tendon::injector {
 /// * Of n links in the trace, link i uses the (i modulo n)-th, so that many clients can share an imported trace.
 /// * A direction that is not in the trace passes without delay.
 ///
-/// add() adds a network behind the trace:
+/// With add(), datagrams pass through a network after the trace:
 ///
 ///     trace      t₁, lost₁ as above
 ///     network    t₂, lost₂ of an Injector with its own random numbers, where the datagram arrives at t₁
