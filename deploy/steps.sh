@@ -54,18 +54,23 @@ add_packages() {
   commands=("install_packages ${*:2}")
 }
 
-# too_late: succeeds if the current step would end after TENDON_SECONDS on this machine, which may be slower than planned.
-# It then succeeds for all later steps too, because they may need the result of this one.
-late=false
-too_late() {
+# on_this_machine SECONDS: prints how long work that is planned to take SECONDS takes on this machine, given the steps so
+# far. Slow steps lengthen the estimate. Fast ones change nothing, because they may have had little to do.
+on_this_machine() {
   local i planned=60 took=60
-  [ -n "${TENDON_SECONDS-}" ] || return 1
-  if $late; then return 0; fi
   for i in "${!lasted[@]}"; do
     if [[ ${names[i]} != packages ]]; then planned=$((planned + lengths[i])) took=$((took + lasted[i])); fi
   done
   if [ $took -lt $planned ]; then took=$planned; fi
-  if [ $((SECONDS + lengths[current] * took / planned)) -le "$TENDON_SECONDS" ]; then return 1; fi
+  echo $(($1 * took / planned))
+}
+
+# too_late: succeeds if the current step would end after TENDON_SECONDS on this machine. It then succeeds for all later
+# steps too, because they may need the result of this one.
+late=false
+too_late() {
+  [ -n "${TENDON_SECONDS-}" ] || return 1
+  if ! $late && [ $((SECONDS + $(on_this_machine "${lengths[current]}"))) -le "$TENDON_SECONDS" ]; then return 1; fi
   late=true
 }
 
@@ -86,27 +91,25 @@ run_steps() {
 finish() { return "$1"; }
 
 # seconds_left [RUNNING [DONE TOTAL]]: estimates the remaining time. The current step has run for RUNNING seconds, and
-# ninja or ctest has finished DONE of TOTAL items. A slow step lengthens the estimates of the others. A fast one changes
-# nothing, because it may have had little to do.
+# ninja or ctest has finished DONE of TOTAL items.
 seconds_left() {
-  local i running=${1-0} counted=${2-0} total=${3-0} planned=60 took=60 step=0 others=0
+  local i running=${1-0} counted=${2-0} total=${3-0} step=0 others=0
   for i in "${!names[@]}"; do
     if [ -n "${lasted[i]-}" ]; then
-      if [[ ${names[i]} != packages ]]; then planned=$((planned + lengths[i])) took=$((took + lasted[i])); fi
+      continue
     elif [ "$i" = "$current" ]; then
       step=${lengths[i]}
     else
       others=$((others + lengths[i]))
     fi
   done
-  if [ $took -lt $planned ]; then took=$planned; fi
-  step=$((step * took / planned - running))
+  step=$(($(on_this_machine "$step") - running))
   if [ $step -lt 0 ]; then step=0; fi
   # The weight of the plan decreases as more items are finished.
   if [ "$counted" -gt 0 ]; then
     step=$(((step * (total - counted) + running * (total - counted) / counted * counted) / total))
   fi
-  echo $((step + others * took / planned))
+  echo $((step + $(on_this_machine "$others")))
 }
 
 # time_left …: prints the result of seconds_left in words, or nothing if there is no plan.
