@@ -13,18 +13,21 @@ namespace tendon {
 
 namespace {
 
-/// Throws std::invalid_argument if the configuration is not valid.
-const CouplingConfig& checked(const CouplingConfig& config) {
+/// Returns the configuration without the values that the method does not use. Throws std::invalid_argument if it is not
+/// valid.
+CouplingConfig checked(CouplingConfig config) {
   const auto reasons = check(config);
-  if (reasons.empty()) return config;
-  throw std::invalid_argument(std::string(reasons.front().key) + ": " + reasons.front().sentence);
+  if (!reasons.empty()) {
+    throw std::invalid_argument(std::string(reasons.front().key) + ": " + reasons.front().sentence);
+  }
+  if (!info(config.method).has_velocity) config.spring.damping = 0;
+  return config;
 }
 
 PositionPosition<3>::Config spring_of(const CouplingConfig& config, const MappedEnd& frame) {
   PositionPosition<3>::Config spring = config.spring;
   // The leader of a position–force coupling has no spring, so the follower's spring is not in a loop with the delay.
   if (!info(config.method).has_springs) spring.adapt_to_delay = false;
-  if (!info(config.method).has_velocity) spring.damping = 0;
   for (double* const value : {&spring.stiffness, &spring.damping, &spring.own_damping}) {
     *value = frame.stiffness(*value);
   }
@@ -67,7 +70,7 @@ std::optional<GripCoupling> grip_of(const CouplingConfig& config, const MappedEn
 Coupling::Coupling(const Config& config)
     : config_(checked(config)),
       frame_(config.map, config.role),
-      spring_(spring_of(config, frame_)),
+      spring_(spring_of(config_, frame_)),
       tank_(tank_of(config, frame_)),
       law_(coupling_law_of(config, frame_)),
       loss_stages_(config.peer_period) {

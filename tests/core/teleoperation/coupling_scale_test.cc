@@ -1,11 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <iostream>
 #include <string>
+#include <vector>
 
+#include "core/base/rotation.h"
 #include "tests/core/teleoperation/ports.h"
 #include "tests/support/dice.h"
 
@@ -42,6 +46,80 @@ TEST(CouplingScale, IsSetByALeaderThatIsNotEngagedAndByNobodyElse) {
   PortSetup waves = led([](double) { return 0.0; });
   waves.coupling.method = CouplingMethod::kWaves;
   EXPECT_FALSE(Coupling(waves.coupling).set_scale(2, 1)) << "sums of waves have one scale";
+}
+
+/// Moves 20 mm to and fro at 0.5 Hz through a clutch, an end of the act, a fault, a loss and a new peer of the leader, and calls
+/// `look` in each period of the last act.
+template <class Look>
+void go_through_phases(Ports& ports, const Look& look) {
+  ASSERT_TRUE(ports.engage());
+  ports.run(500);
+  ports.leader.buttons = 1;
+  ports.run(100);
+  ports.leader.buttons = 0;
+  ports.run(300);
+  ports.follower.coupling->disengage();
+  ports.run(100);
+  ASSERT_TRUE(ports.engage());
+  ports.follower.ready = false;
+  ports.run(100);
+  ports.follower.ready = true;
+  ports.run(100);
+  ASSERT_TRUE(ports.engage());
+  ports.cut_there = ports.cut_back = true;
+  ports.run(500);
+  ports.cut_there = ports.cut_back = false;
+  ports.run(100);
+  ASSERT_TRUE(ports.engage());
+  ports.leader.coupling->renew();
+  ports.run(100);
+  ASSERT_TRUE(ports.engage());
+  ports.run(3000, look);
+}
+
+// Regression: with set-position, a change of the scales brought back the mutual damping, which this method does not use.
+TEST(CouplingScale, ScalesThatWereSetAreThoseOfAScene) {
+  for (const CouplingMethod method : kCouplingMethods) {
+    if (info(method).keeps_scales) continue;
+    const auto forces = [&](bool set) {
+      PortSetup leader = led([](double t) { return 0.02 * std::sin(kTurn * t / 2); });
+      PortSetup follower = port_of(PortRole::kFollower);
+      follower.around[0] = {.stiffness = 300, .reference = [](double) { return 0.01; }, .wall = true};
+      follower.measures_contact = true;
+      for (PortSetup* const end : {&leader, &follower}) {
+        couple_by(method, end->coupling);
+        end->coupling.spring.damping = 3;
+        end->coupling.map.rotation = rotation_by(Vec3(0, 0, 0.3));
+        if (set) continue;
+        end->coupling.map.position_scale = 0.7;
+        end->coupling.map.force_scale = 1.3;
+      }
+      Ports ports(leader, follower, {.delay = 20, .seed = 1}, {.delay = 20, .seed = 2});
+      ports.run(50);
+      if (set) {
+        EXPECT_TRUE(ports.leader.coupling->set_scale(0.7, 1.3));
+      }
+      ports.run(950);
+      std::vector<Vec3> all;
+      go_through_phases(ports, [&](int) {
+        all.push_back(ports.leader.applied);
+        all.push_back(ports.follower.applied);
+      });
+      return all;
+    };
+    const std::vector<Vec3> of_scene = forces(false);
+    const std::vector<Vec3> set = forces(true);
+    ASSERT_EQ(set.size(), of_scene.size());
+    double most = 0;
+    double apart = 0;
+    for (std::size_t i = 0; i < set.size(); ++i) {
+      most = std::max(most, of_scene[i].norm());
+      apart = std::max(apart, (set[i] - of_scene[i]).norm());
+    }
+    std::cout << to_string(method) << ": " << most << " N, apart by " << apart << " N\n";
+    EXPECT_GT(most, 0.1) << to_string(method);
+    EXPECT_LT(apart, 1e-5 * most) << to_string(method);
+  }
 }
 
 /// The clutch is held in free space. After that, the follower moves ten times as far.
