@@ -53,7 +53,8 @@ struct Outcome {
 
 class World {
  public:
-  World(std::uint64_t seed, Sabotage sabotage) : dice_(seed), sabotage_(sabotage) {
+  /// If `rough` is true, all links stall, and send bursts and duplicates (rough_network).
+  World(std::uint64_t seed, Sabotage sabotage, bool rough = false) : dice_(seed), sabotage_(sabotage) {
     const auto count = static_cast<std::size_t>(dice_.within(2, 5));
     star_ = dice_.chance(0.3);
     restarts_ = dice_.chance(0.5) ? dice_.decades(-3.3, -1.7) : 0;
@@ -79,6 +80,10 @@ class World {
       start(i);
     }
     for (std::size_t i = 0; i < count * count; ++i) {
+      if (rough) {
+        links_.emplace_back(rough_network(dice_));
+        continue;
+      }
       links_.emplace_back(Network{.delay = static_cast<int>(dice_.chance(0.5) ? 0 : dice_.decades(0, 2.3)),
                                   .jitter = static_cast<int>(dice_.chance(0.3) ? 0 : dice_.decades(0, 2.3)),
                                   .loss = dice_.chance(0.3) ? 0 : dice_.uniform() * 0.9,
@@ -246,10 +251,10 @@ class World {
   Outcome outcome_;
 };
 
-void expect_no_world_gains(std::uint64_t worlds, int periods) {
+void expect_no_world_gains(std::uint64_t worlds, int periods, bool rough = false) {
   Outcome worst;
   for (std::uint64_t seed = 1; seed <= worlds; ++seed) {
-    const Outcome outcome = World(seed, Sabotage::kNone).run(periods);
+    const Outcome outcome = World(seed, Sabotage::kNone, rough).run(periods);
     EXPECT_FALSE(outcome.broken()) << "seed " << seed << ": account " << outcome.least_account << " J, sum "
                                    << outcome.least_sum << " J";
     EXPECT_TRUE(outcome.finite) << "seed " << seed;
@@ -264,11 +269,11 @@ void expect_no_world_gains(std::uint64_t worlds, int periods) {
   EXPECT_GT(worst.given, 0.01 * static_cast<double>(worlds)) << "nobody gave anything: nothing was tested";
 }
 
-int found(Sabotage sabotage) {
+int found(Sabotage sabotage, bool rough = false) {
   int worlds = 0;
   int by_sum = 0;
   for (std::uint64_t seed = 1; seed <= 100; ++seed) {
-    const Outcome outcome = World(seed, sabotage).run(2000);
+    const Outcome outcome = World(seed, sabotage, rough).run(2000);
     worlds += outcome.broken() ? 1 : 0;
     by_sum += std::min(outcome.least_account, outcome.least_sum) < -kNanojoule ? 1 : 0;
   }
@@ -278,6 +283,11 @@ int found(Sabotage sabotage) {
 
 TEST(TankWorlds, NoAccountAndNoSumOfLedgersIsEverNegative) {
   expect_no_world_gains(15 * static_cast<std::uint64_t>(property_cases()) / 100, 2000);
+}
+
+TEST(TankWorlds, NoAccountAndNoSumLosesByBurstsAndStalls) {
+  const int cases = property_cases();
+  expect_no_world_gains(static_cast<std::uint64_t>(cases >= 10'000 ? cases : cases / 10), 1000, true);
 }
 
 // Run by hand: --gtest_also_run_disabled_tests --gtest_filter='*TenThousand*'
@@ -304,6 +314,7 @@ TEST(TankWorlds, OfThreePortsOrMoreOneMayBeLostForGood) {
 
 TEST(TankWorlds, ABoundOnePercentTooHighIsFound) { EXPECT_GT(found(Sabotage::kBoundOnePercentUp), 0); }
 TEST(TankWorlds, TotalsThatAreCreditedTwiceAreFound) { EXPECT_GT(found(Sabotage::kTotalsTwice), 0); }
+TEST(TankWorlds, TotalsThatAreCreditedTwiceAreFoundInBursts) { EXPECT_GT(found(Sabotage::kTotalsTwice, true), 0); }
 TEST(TankWorlds, GivingAfterTheLimiterIsFound) { EXPECT_GT(found(Sabotage::kGiveAfterLimit), 0); }
 TEST(TankWorlds, AnEpochThatIsIgnoredIsFound) { EXPECT_GT(found(Sabotage::kEpochIgnored), 0); }
 

@@ -33,6 +33,31 @@ struct Network {
   std::function<std::vector<int>(int now)> arrivals{};
 };
 
+/// Draws a network with stalls of 10 to 600 periods, after which all messages arrive at once. Between them, it has a
+/// delay, reordering, loss, and duplicates that arrive up to 1000 periods later.
+inline Network rough_network(Dice& dice) {
+  struct State {
+    Dice dice;
+    int delay, jitter;
+    double loss, repeated, stalls;
+    int until = 0;
+  };
+  State drawn{.dice = Dice(dice.bits()),
+              .delay = dice.chance(0.3) ? 0 : static_cast<int>(dice.decades(0, 2)),
+              .jitter = static_cast<int>(dice.decades(0, 1.7)),
+              .loss = dice.chance(0.5) ? 0 : dice.uniform() * 0.3,
+              .repeated = dice.uniform() * 0.5,
+              .stalls = dice.decades(-3, -1.3)};
+  return {.arrivals = [of = drawn](int now) mutable {
+    if (now >= of.until && of.dice.chance(of.stalls)) of.until = now + static_cast<int>(of.dice.decades(1, 2.8));
+    if (of.dice.chance(of.loss)) return std::vector<int>{};
+    const int sent = std::max(now, of.until) + of.delay;
+    std::vector<int> arrivals{sent + (now < of.until ? 0 : static_cast<int>(of.dice.within(0, of.jitter + 1)))};
+    if (of.dice.chance(of.repeated)) arrivals.push_back(sent + static_cast<int>(of.dice.decades(0, 3)));
+    return arrivals;
+  }};
+}
+
 /// One direction of a bad network. The time is the number of the period, which both ends share.
 template <class Message>
 class OneWay {

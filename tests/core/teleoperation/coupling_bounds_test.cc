@@ -1,0 +1,182 @@
+// SPDX-License-Identifier: Apache-2.0
+// Each bound of core/PROOFS.md that a coupling uses is sharp. Over links with stalls, bursts, duplicates and reordering
+// (rough_network), hands that first supply energy and then take what they can get must find nothing at the bound, and
+// must find energy if the bound is 2 % too high.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <iostream>
+
+#include "core/ledger/energy_ledger.h"
+#include "core/teleoperation/methods/model_mediated.h"
+#include "core/teleoperation/methods/two_channel_passivity.h"
+#include "core/teleoperation/methods/wave_variables.h"
+#include "tests/core/teleoperation/one_way.h"
+#include "tests/support/dice.h"
+#include "tests/support/property_cases.h"
+
+namespace tendon::coupling_bounds_test {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr Duration kPeriod = 1ms;
+constexpr double kT = 1e-3;
+constexpr int kPeriods = 3000;
+constexpr int kSupply = 1000;  ///< periods in which the hands supply energy
+
+/// J: the energy that both ends have absorbed is never below `least`. They have absorbed `most` at some time.
+struct Absorbed {
+  double now = 0;
+  double least = 0;
+  double most = 0;
+
+  void add(double joules) {
+    now += joules;
+    least = std::min(least, now);
+    most = std::max(most, now);
+  }
+  bool is_negative() const { return least < -1e-9 * std::max(most, 1e-3); }
+};
+
+/// Section "Wave variables": a wave has no more energy than was sent. Here it has `factor` times as much.
+Absorbed waves(std::uint64_t seed, double factor) {
+  Dice dice(seed);
+  const double impedance = dice.decades(-1, 1.5);
+  const WavePort<1>::Config config{
+      .impedance = impedance, .period = kPeriod, .smoothing = dice.chance(0.5) ? kPeriod : WavePort<1>::kSmoothing};
+  std::array<WavePort<1>, 2> ends{WavePort<1>(config), WavePort<1>(config)};
+  std::array<OneWay<WaveMessage<1>>, 2> ways{OneWay<WaveMessage<1>>(rough_network(dice)),
+                                             OneWay<WaveMessage<1>>(rough_network(dice))};
+  const double size = dice.decades(-2, 0);
+  const double hertz = dice.decades(-1, 1);
+  std::array<double, 2> speed{};
+  std::array<double, 2> force{};
+  Absorbed absorbed;
+  for (int i = 0; i < kPeriods; ++i) {
+    for (std::size_t e = 0; e < 2; ++e) {
+      ways[1 - e].deliver(i, [&](WaveMessage<1> wave) {
+        wave.integral *= std::sqrt(factor);
+        wave.energy *= factor;
+        ends[e].receive(wave);
+      });
+      // A hand with the impedance of the line takes the whole wave.
+      speed[e] = (force[e] + impedance * speed[e]) / (2 * impedance);
+      if (i < kSupply) speed[e] += size * std::sin(hertz * i * kT + static_cast<double>(e));
+      force[e] = ends[e].command(Vec<1>(speed[e])).force[0];
+      absorbed.add(-force[e] * speed[e] * kT);
+      ways[e].send(i, ends[e].observe({Vec<1>(force[e]), Vec<1>(speed[e] * kT), kPeriod}));
+    }
+  }
+  return absorbed;
+}
+
+/// Section "Two-channel passivity control": no end outputs more energy than the other has reported. Here it outputs
+/// `factor` times as much.
+Absorbed two_channels(std::uint64_t seed, double factor) {
+  Dice dice(seed);
+  PassivityLeader<1> leader({.max_damping = 1e9, .period = kPeriod});
+  PassivityFollower<1> follower({.drift_rate = dice.chance(0.5) ? 0 : dice.within(0, 20), .period = kPeriod});
+  OneWay<LeaderMessage<1>> there(rough_network(dice));
+  OneWay<FollowerMessage<1>> back(rough_network(dice));
+  const double size = dice.decades(-1, 1);
+  const double fast = dice.decades(-2, 0);
+  double led = 0;     // m/s, newest velocity at the follower
+  double pushed = 0;  // N, newest force at the leader
+  Absorbed absorbed;
+  for (int i = 0; i < kPeriods; ++i) {
+    const double way = i < kSupply ? -1 : 1;
+    there.deliver(i, [&](LeaderMessage<1> message) {
+      message.energy_in *= factor;
+      led = message.velocity[0];
+      follower.receive(message);
+    });
+    back.deliver(i, [&](FollowerMessage<1> message) {
+      message.energy_in *= factor;
+      pushed = message.force[0];
+      leader.receive(message);
+    });
+    const Vec<1> speed(std::copysign(fast * dice.uniform(), way * pushed));
+    const Vec<1> felt = leader.command(speed).force;
+    absorbed.add(-felt.dot(speed) * kT);
+    there.send(i, leader.observe({felt, speed * kT, kPeriod}));
+    const Vec<1> tool(std::copysign(size * dice.uniform(), way * led));
+    const auto step = follower.step(tool);
+    absorbed.add(-tool.dot(step.velocity) * kT);
+    back.send(i, step.message);
+  }
+  return absorbed;
+}
+
+/// Section "Surfaces": with K ≤ 2b/T and the budget E − U, the ledger stays ≥ 0. The factors raise both limits.
+Absorbed surfaces(std::uint64_t seed, double of_budget, double of_stiffness) {
+  Dice dice(seed);
+  const Friction friction{.coulomb = 0, .viscous = dice.decades(-1, 0.5)};
+  SurfaceRenderer<3> renderer;
+  EnergyLedger ledger(friction);
+  OneWay<SurfaceModel<3>> way(rough_network(dice));
+  const double greed = dice.uniform();
+  SurfaceModel<3> found;
+  Vec3 x = Vec3::Zero();
+  Absorbed absorbed;
+  for (int i = 0; i < kPeriods; ++i) {
+    if (i == 0 || dice.chance(0.1)) {
+      const double share = dice.chance(0.5) ? 1 : dice.uniform();
+      found.normal = dice.direction();
+      found.offset = dice.within(-0.02, 0.02);
+      found.stiffness = of_stiffness * share * 2 * friction.viscous / kT;
+    }
+    ++found.sequence;
+    way.send(i, found);
+    way.deliver(i, [&](const SurfaceModel<3>& model) { renderer.receive(model); });
+    const double budget = of_budget * std::max(ledger.energy() - renderer.energy(x), 0.0);
+    const Vec3 force = renderer.command(x, budget).demand.force;
+    const Vec3 dx =
+        dice.chance(greed) ? Vec3(kT / (2 * friction.viscous) * force) : Vec3(dice.direction() * dice.decades(-6, -3));
+    ledger.observe(force, dx, kPeriod);
+    x += dx;
+    absorbed.add(ledger.energy() - absorbed.now);
+  }
+  return absorbed;
+}
+
+/// Expects that `run(seed, factor)` never gives out energy at a factor of 1, and does with some seeds at 1.02.
+template <class Run>
+void expect_sharp(const char* name, const Run& run) {
+  const int cases = property_cases();
+  const int seeds = cases >= 10'000 ? cases : cases / 10;
+  int at_bound = 0;
+  int above = 0;
+  double most = 0;
+  double least = 0;
+  for (int seed = 1; seed <= seeds; ++seed) {
+    const Absorbed absorbed = run(static_cast<std::uint64_t>(seed), 1.0);
+    EXPECT_FALSE(absorbed.is_negative()) << name << ", seed " << seed << ": " << absorbed.least << " J";
+    at_bound += absorbed.is_negative() ? 1 : 0;
+    most += absorbed.most;
+    least = std::min(least, absorbed.least);
+    above += run(static_cast<std::uint64_t>(seed), 1.02).is_negative() ? 1 : 0;
+  }
+  std::cout << name << ": energy found in " << at_bound << " of " << seeds << " runs at the bound (least " << least
+            << " J), in " << above << " at 1.02\n";
+  EXPECT_GT(most, 1e-3 * seeds) << name << ": nothing was supplied, so nothing was tested";
+  EXPECT_GT(above, 0) << name;
+}
+
+TEST(CouplingBounds, WavesNeedTheEnergyThatWasSent) { expect_sharp("waves", waves); }
+
+TEST(CouplingBounds, ChannelsNeedTheEnergyThatWasReported) { expect_sharp("two channels", two_channels); }
+
+TEST(CouplingBounds, ASurfaceNeedsTheSpareEnergyAsItsBudget) {
+  expect_sharp("budget", [](std::uint64_t seed, double factor) { return surfaces(seed, factor, 1); });
+}
+
+TEST(CouplingBounds, ASurfaceIsAtMostAsStiffAsTheLimiterAllows) {
+  expect_sharp("stiffness", [](std::uint64_t seed, double factor) { return surfaces(seed, 1, factor); });
+}
+
+}  // namespace
+}  // namespace tendon::coupling_bounds_test
