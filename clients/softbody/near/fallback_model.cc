@@ -65,7 +65,9 @@ Reaction blended(const Reaction& from, const Reaction& to, double share) {
   all.force = mix(from.force, to.force);
   all.depth = mix(from.depth, to.depth);
   all.stiffness = mix(from.stiffness, to.stiffness);
-  all.error = mix(from.error, to.error) + std::abs(from.force - to.force);
+  // Continuous at both ends, where rounding decides if there are two answers.
+  const double between = std::min(1.0, 2 * std::min(share, 1 - share));
+  all.error = mix(from.error, to.error) + between * std::abs(from.force - to.force);
   all.way = share < 0.5 ? from.way : to.way;
   if (!(std::abs(all.force) > 0)) return all;
   all.slope = mix(Vec2(from.force * from.slope), Vec2(to.force * to.slope)) / all.force;

@@ -38,7 +38,8 @@ class FallbackModel : public Model {
   std::unique_ptr<NearModel> near_;
 };
 
-/// Interpolates force and stiffness. `share` (0 … 1) is the weight of `from`. Adds the difference to `error`.
+/// Interpolates force and stiffness. `share` (0 … 1) is the weight of `to`. Adds the difference of the forces to
+/// `error`, with a weight that decreases to 0 where only one of the two answers counts.
 Reaction blended(const Reaction& from, const Reaction& to, double share);
 
 }  // namespace tendon::softbody
