@@ -57,34 +57,56 @@ TEST(Pair, WithoutATankTheFollowerDoesNotFollow) {
   EXPECT_GT(farthest, 0.012);
 }
 
+struct Limiters {
+  double b_leader, b_follower;
+  int t_leader, t_follower;  ///< tenths of a millisecond
+
+  /// N/m, core/PROOFS.md, "Operational stiffness".
+  double stiffness() const { return 1 / (t_leader * 1e-4 / (2 * b_leader) + t_follower * 1e-4 / (2 * b_follower)); }
+};
+constexpr Limiters kLimiters[] = {
+    {0.26, 0.26, 10, 10}, {0.5, 0.5, 10, 10}, {0.26, 1.0, 10, 10}, {0.26, 0.5, 10, 20}, {1.0, 0.3, 20, 5}};
+
+struct Pulled {
+  double slope = 0;  ///< N/m, of the force at the leader
+  double force = 0;  ///< N, at the leader at the end
+  double there = 0;  ///< N, at the follower
+};
+
+/// The leader moves away from the fixed follower for 2 s, on a spring of `stiffness` (N/m) without a delay.
+Pulled pulled(const Limiters& c, double stiffness, double speed) {
+  PairConfig config;
+  config.leader.path = [speed](double t) { return speed * t; };
+  config.follower.path = [](double) { return 0.0; };
+  config.leader.friction = {0, c.b_leader};
+  config.follower.friction = {0, c.b_follower};
+  config.leader.period = c.t_leader;
+  config.follower.period = c.t_follower;
+  for (EndConfig* end : {&config.leader, &config.follower}) {
+    end->spring = {.stiffness = stiffness, .adapt_to_delay = false};
+  }
+  Pair pair(config);
+  pair.run(1);
+  const double force = pair.leader.applied;
+  pair.run(1);
+  return {(force - pair.leader.applied) / (speed * 1), pair.leader.applied, pair.follower.applied};
+}
+
 TEST(Pair, ItsStiffnessIsThatOfTheTwoLimitersInSeries) {
-  struct Case {
-    double b_leader, b_follower;
-    int t_leader, t_follower;
-  };
-  for (const Case& c : {Case{0.26, 0.26, 10, 10}, Case{0.5, 0.5, 10, 10}, Case{0.26, 1.0, 10, 10},
-                        Case{0.26, 0.5, 10, 20}, Case{1.0, 0.3, 20, 5}}) {
-    PairConfig config;
-    const double speed = 0.005;
-    config.leader.path = [speed](double t) { return speed * t; };
-    config.follower.path = [](double) { return 0.0; };
-    config.leader.friction = {0, c.b_leader};
-    config.follower.friction = {0, c.b_follower};
-    config.leader.period = c.t_leader;
-    config.follower.period = c.t_follower;
-    for (EndConfig* end : {&config.leader, &config.follower}) {
-      end->spring = {.stiffness = 1e4, .adapt_to_delay = false};
-    }
-    Pair pair(config);
-    pair.run(1);
-    const double force = pair.leader.applied;
-    pair.run(1);
-    const double slope = (force - pair.leader.applied) / (speed * 1);
-    const double expected = 1 / (c.t_leader * 1e-4 / (2 * c.b_leader) + c.t_follower * 1e-4 / (2 * c.b_follower));
+  for (const Limiters& c : kLimiters) {
+    const Pulled found = pulled(c, 1e4, 0.005);
     std::cout << "b " << c.b_leader << ", " << c.b_follower << "; T " << c.t_leader / 10.0 << ", "
-              << c.t_follower / 10.0 << " ms: " << slope << " N/m, predicted " << expected << "\n";
-    EXPECT_NEAR(slope / expected, 1, 0.03);
-    EXPECT_NEAR(pair.follower.applied / -pair.leader.applied, 1, 0.03);
+              << c.t_follower / 10.0 << " ms: " << found.slope << " N/m, predicted " << c.stiffness() << "\n";
+    EXPECT_NEAR(found.slope / c.stiffness(), 1, 0.03);
+    EXPECT_NEAR(found.there / -found.force, 1, 0.03);
+  }
+}
+
+TEST(Pair, ASpringOfThatStiffnessIsHeldAndOneTwoPercentStifferIsNot) {
+  for (const Limiters& c : kLimiters) {
+    const double most = c.stiffness();
+    EXPECT_NEAR(pulled(c, most, 0.05).slope, most, 1e-3 * most) << c.b_leader << ' ' << c.b_follower;
+    EXPECT_LT(pulled(c, 1.02 * most, 0.05).slope, 0.985 * 1.02 * most) << c.b_leader << ' ' << c.b_follower;
   }
 }
 
