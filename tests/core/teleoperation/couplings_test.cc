@@ -268,7 +268,7 @@ TEST(Couplings, OfThreePortsOneIsLostAndTheOthersGoOn) {
   const Vec3 alone = star.follower.applied;
   EXPECT_TRUE(star.engage(1));
   star.run(1000);
-  EXPECT_LT((star.follower.applied - alone).norm(), 0.05) << "from where both are";
+  EXPECT_LT((star.follower.applied - alone).norm(), 0.1) << "from where both are";
   expect_passive(star);
 }
 
