@@ -69,7 +69,7 @@ std::vector<std::filesystem::path> draw_devices(const std::filesystem::path& ste
                 curve(rows, "floor, p50", lab::kGreen, [](const Row& row) { return row.floor_p50.value_or(0); }),
                 level("a period", 1000)};
   return lab::draw_panels(stem, "What devices cost, sealed, each with states and forces at 1 kHz",
-                          to_text(circumstances), {cost, cores, in_time, age});
+                          to_text(circumstances), {cost, cores, in_time, age}, circumstances.command);
 }
 
 }  // namespace tendon::bench

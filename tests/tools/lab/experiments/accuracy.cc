@@ -23,6 +23,7 @@
 #include "tests/tools/lab/experiments/accuracy_pictures.h"
 #include "tests/tools/lab/experiments/accuracy_table.h"
 #include "tests/tools/lab/experiments/pressed_engine.h"
+#include "tests/tools/lab/pictures/csv.h"
 
 namespace tendon::lab {
 namespace {
@@ -442,6 +443,12 @@ MeshErrors errors_of(const Candidate& candidate, Bench& bench) {
   return errors;
 }
 
+void write_csv(const AccuracyOptions& options, const std::vector<AccuracyPoint>& points, const TruthFigures& truth) {
+  CsvTable table(options.command);
+  for (const AccuracyPoint& point : points) table.add(json_of(point, truth, options.block));
+  table.write(*options.out / "accuracy.csv");
+}
+
 void errors_only(const AccuracyOptions& options, std::ostream& out) {
   const std::vector<Candidate> meshes = candidates(options);
   if (meshes.empty()) throw std::invalid_argument("--models, --elements: none of these models has such an element");
@@ -480,7 +487,7 @@ void errors_only(const AccuracyOptions& options, std::ostream& out) {
   }
   const TruthFigures& truth = all->front().truth;
   if (options.json) {
-    for (const AccuracyPoint& point : points) out << to_json(point, truth, options.block) << "\n";
+    for (const AccuracyPoint& point : points) out << json_of(point, truth, options.block).str() << "\n";
   } else {
     write_truth(out, truth, options.block);
     out << heading(false);
@@ -493,7 +500,7 @@ void errors_only(const AccuracyOptions& options, std::ostream& out) {
   }
   if (options.out) {
     std::filesystem::create_directories(*options.out);
-    write_csv(*options.out / "accuracy.csv", points, truth, options.block);
+    write_csv(options, points, truth);
     if (!ladders.empty()) draw(options, ladders, 0);
     if (!options.json) out << "written: " << (*options.out / "accuracy.csv").string() << " and a figure\n";
   }
@@ -568,7 +575,7 @@ void accuracy(const AccuracyOptions& given, std::ostream& out) {
   }
   if (options.out) {
     std::filesystem::create_directories(*options.out);
-    write_csv(*options.out / "accuracy.csv", all, figures_of(truth), options.block);
+    write_csv(options, all, figures_of(truth));
     if (!ladders.empty()) draw(options, ladders, options.network ? round_trip_ms(*options.network) : 0);
     if (rows) out << "written: " << (*options.out / "accuracy.csv").string() << " and a figure\n";
   }

@@ -109,6 +109,7 @@ struct AccuracyOptions {
   /// Deterministic: no clock and no time limit. Cannot be combined with a network or a budget.
   bool errors_only = false;
   std::optional<std::filesystem::path> out{};  ///< folder for accuracy.csv and the figures
+  std::string command{};                       ///< repeats the run
   bool json = false;
   /// One unit for each n of each element of each model, in this order. Shards and their merged result have errors only.
   Part part{};

@@ -177,7 +177,7 @@ Panel felt_over(const std::string& title, const std::string& label, const Ladder
 void draw(const AccuracyOptions& options, const Ladders& ladders, double round_trip_ms) {
   const std::string commit = "commit " + std::string(kCommit);
   if (options.errors_only) {
-    draw_panels(*options.out / "accuracy", "What finer meshes bring", commit, {error_over_n(ladders)});
+    draw_panels(*options.out / "accuracy", "What finer meshes bring", commit, {error_over_n(ladders)}, options.command);
     return;
   }
   const auto& loads = options.block.loads;
@@ -193,8 +193,8 @@ void draw(const AccuracyOptions& options, const Ladders& ladders, double round_t
     panels.push_back(felt_over("… over the time of an update", "ms", ladders, true,
                                [](const AccuracyPoint& p) { return p.update_ms_p50; }));
   }
-  draw_panels(*options.out / "accuracy", "What accuracy costs in time", "processor time of one core; " + commit,
-              panels);
+  draw_panels(*options.out / "accuracy", "What accuracy costs in time", "processor time of one core; " + commit, panels,
+              options.command);
 }
 
 }  // namespace tendon::lab

@@ -7,7 +7,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstdio>
-#include <fstream>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
@@ -19,7 +18,6 @@
 
 #include "core/base/expect.h"
 #include "server/build_info.h"
-#include "tests/support/files.h"
 #include "tests/support/json_line.h"
 
 namespace tendon::lab {
@@ -132,26 +130,6 @@ TruthFigures figures_of(Truth& truth) {
           .uncertainty = truth.uncertainty()};
 }
 
-void write_csv(const std::filesystem::path& file, const std::vector<AccuracyPoint>& points, const TruthFigures& truth,
-               const PressedBlock& block) {
-  expect_replaceable(file, {"model,"});
-  std::ofstream csv(file);
-  csv << "model";
-  if (!points.empty()) {
-    for (const auto& [name, value] : figures(points.front(), truth, block)) csv << ',' << name;
-  }
-  csv << ",commit\n";
-  for (const AccuracyPoint& point : points) {
-    csv << point.candidate.name();
-    for (const auto& [name, value] : figures(point, truth, block)) {
-      const double number = std::visit([](auto v) { return static_cast<double>(v); }, value);
-      csv << ',' << (std::isfinite(number) ? shortest(number) : std::string());
-    }
-    csv << ',' << kCommit << '\n';
-  }
-  if (!csv.flush()) throw std::runtime_error("cannot write " + file.string());
-}
-
 const char* const kFeltHeading =
     "                              update  error %        felt error %   shows %  limited vibration   latency\n"
     "model                      n      ms    small  with K     held                     %      mm/s        ms\n";
@@ -197,15 +175,16 @@ void write_felt(std::ostream& out, const AccuracyPoint& p) {
 
 std::string load_text(double newtons) { return shortest(newtons) + " N"; }
 
-std::string to_json(const AccuracyPoint& point, const TruthFigures& truth, const PressedBlock& block) {
+JsonLine json_of(const AccuracyPoint& point, const TruthFigures& truth, const PressedBlock& block) {
   JsonLine line;
   line.add("model", point.candidate.name());
   for (const auto& [name, value] : figures(point, truth, block)) add(line, name, value);
-  return line.add("commit", kCommit).str();
+  line.add("commit", kCommit);
+  return line;
 }
 
 std::string to_json(const AccuracyPoint& point, Truth& truth) {
-  return to_json(point, figures_of(truth), truth.block());
+  return json_of(point, figures_of(truth), truth.block()).str();
 }
 
 void write_truth(std::ostream& out, const TruthFigures& truth, const PressedBlock& block) {

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <filesystem>
 #include <optional>
 #include <ostream>
 #include <string>
@@ -40,9 +39,7 @@ void write_truth(std::ostream& out, const TruthFigures& truth, const PressedBloc
 void write_exponents(std::ostream& out, const Ladders& ladders);
 void write_answer(std::ostream& out, const AccuracyOptions& options, const std::optional<AccuracyPoint>& best,
                   Truth& truth);
-void write_csv(const std::filesystem::path& file, const std::vector<AccuracyPoint>& points, const TruthFigures& truth,
-               const PressedBlock& block);
-std::string to_json(const AccuracyPoint& point, const TruthFigures& truth, const PressedBlock& block);
+JsonLine json_of(const AccuracyPoint& point, const TruthFigures& truth, const PressedBlock& block);
 
 std::string load_text(double newtons);
 

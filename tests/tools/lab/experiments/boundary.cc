@@ -19,6 +19,7 @@
 #include "devices/simulated/simulated_device.h"
 #include "server/build_info.h"
 #include "tests/support/json_line.h"
+#include "tests/tools/lab/pictures/csv.h"
 #include "tests/tools/lab/pictures/gnuplot.h"
 #include "tests/tools/lab/pictures/panels.h"
 
@@ -201,7 +202,9 @@ void boundary(const BoundaryOptions& options, std::ostream& out) {
         << " N s/m, without a hand; commit " << kCommit
         << "\n\n   rate Hz  delay ms   simulated  eigenvalues  b/(T/2+t_d)   passive\n";
   }
+  CsvTable table(options.command);
   for (const Point& p : *points) {
+    table.add(json_of(p));
     if (options.json) {
       out << json_of(p).str() << "\n";
       continue;
@@ -213,6 +216,7 @@ void boundary(const BoundaryOptions& options, std::ostream& out) {
   }
   if (options.out) {
     std::filesystem::create_directories(*options.out);
+    table.write(*options.out / "boundary.csv");
     const std::span<const Point> all(*points);
     const auto files = draw_panels(
         *options.out / "boundary", "How stiff a sampled spring may be",
@@ -221,7 +225,8 @@ void boundary(const BoundaryOptions& options, std::ostream& out) {
                all.subspan(1, kDelays.size() - 1),  // zero cannot be shown on a logarithmic axis
                [](const SampledSpring& s) { return seconds(s.period) * s.delay_samples * 1e3; }),
          panel("Stiffness, N/m, over rate without delay", "rate, Hz", all.subspan(kDelays.size()),
-               [](const SampledSpring& s) { return 1 / seconds(s.period); })});
+               [](const SampledSpring& s) { return 1 / seconds(s.period); })},
+        options.command);
     if (!options.json) {
       for (const auto& file : files) out << "picture: " << file.string() << "\n";
     }

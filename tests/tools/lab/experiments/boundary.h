@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <optional>
 #include <ostream>
+#include <string>
 
 #include "core/stability/sampled_spring.h"
 #include "tests/support/swept_work.h"
@@ -15,9 +16,10 @@ namespace tendon::lab {
 double simulated_stiffness_limit(const SampledSpring& spring);
 
 struct BoundaryOptions {
-  double mass = 0.075;    ///< kg
-  double viscous = 0.26;  ///< N·s/m
-  std::optional<std::filesystem::path> out{};
+  double mass = 0.075;                         ///< kg
+  double viscous = 0.26;                       ///< N·s/m
+  std::optional<std::filesystem::path> out{};  ///< folder for boundary.csv and the figure
+  std::string command{};                       ///< repeats the run
   bool json = false;
   Part part{};  ///< the units are the rows of the table (0 to 17)
 };

@@ -5,20 +5,18 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
-#include <fstream>
 #include <functional>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <tuple>
 
-#include "core/base/expect.h"
 #include "server/build_info.h"
-#include "tests/support/files.h"
 #include "tests/support/json_line.h"
 #include "tests/tools/lab/experiments/floor.h"
 #include "tests/tools/lab/experiments/paper.h"
 #include "tests/tools/lab/experiments/perception.h"
+#include "tests/tools/lab/pictures/csv.h"
 #include "tests/tools/lab/pictures/gnuplot.h"
 #include "tests/tools/lab/pictures/panels.h"
 
@@ -52,29 +50,6 @@ double median(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
   return *middle;
-}
-
-constexpr const char* kColumns =
-    "law,stiffness_n_per_m,delay_ms,jitter_ms,rate_hz,loss,b_n_s_per_m,fc_n,hand,passive,energy_given_out_j,k_op_n_per_"
-    "m,"
-    "force_error_n,true_force_n,hf_velocity_m_s,sensation_db,noticed_share,limited_share,latency_s,max_force_n,seed,"
-    "commit";
-
-void write_csv(std::ostream& out, const Cell& cell, std::uint64_t seed) {
-  const Situation& s = cell.situation;
-  const Outcome& o = cell.outcome;
-  out << cell.name();
-  for (const double value :
-       {s.stiffness, s.delay_ms, s.jitter_ms, s.rate_hz, s.loss, s.friction.viscous, s.friction.coulomb}) {
-    out << "," << shortest(value);
-  }
-  out << "," << (s.firm ? "firm" : "loose") << "," << (cell.passive() ? 1 : 0);
-  for (const double value :
-       {std::max(0.0, -o.least_energy), o.operational_stiffness, o.force_error, o.true_force, o.late_vibration,
-        o.sensation, o.noticed_share, o.limited_share, o.latency, o.largest_force}) {
-    out << "," << shortest(value);
-  }
-  out << "," << seed << "," << kCommit << "\n";
 }
 
 JsonLine json_of(const Cell& cell, std::uint64_t seed) {
@@ -227,7 +202,7 @@ void recommend(std::ostream& out, const std::string& where, const std::vector<Su
   out << ".\n";
 }
 
-void draw(const std::filesystem::path& folder, const std::vector<Cell>& cells, std::vector<std::string>& pictures) {
+void draw(const CompareOptions& options, const std::vector<Cell>& cells, std::vector<std::string>& pictures) {
   constexpr std::array kColours = {kOrange, kBlue, kGreen, kVermilion, kPurple, kSky};
   const std::array drawn = {info(Law::kPassivityController).name, info(Law::kAol).name, info(Law::kAolPlus).name,
                             info(Law::kEnergyBounding).name, info(Preset::kFeel).name};
@@ -261,8 +236,8 @@ void draw(const std::filesystem::path& folder, const std::vector<Cell>& cells, s
     panels.push_back(vibration);
   }
   for (const auto& file :
-       draw_panels(folder / "compare", "Laws compared: medians over delay, rate, loss and hand",
-                   std::to_string(cells.size()) + " cells; commit " + std::string(kCommit), panels)) {
+       draw_panels(*options.out / "compare", "Laws compared: medians over delay, rate, loss and hand",
+                   std::to_string(cells.size()) + " cells; commit " + std::string(kCommit), panels, options.command)) {
     pictures.push_back(file.string());
   }
 }
@@ -485,15 +460,13 @@ void report(const std::vector<Cell>& cells, const CompareOptions& options, std::
   std::vector<std::string> written;
   if (options.out) {
     std::filesystem::create_directories(*options.out);
-    expect_replaceable(*options.out / "compare.csv", {"law,"});
-    std::ofstream csv(*options.out / "compare.csv");
-    csv << kColumns << "\n";
+    CsvTable table(options.command);
     for (std::size_t i = 0; i < cells.size(); ++i) {
-      write_csv(csv, cells[i], options.seed + i / contenders().size() * options.every);
+      table.add(json_of(cells[i], options.seed + i / contenders().size() * options.every));
     }
-    if (!csv.flush()) throw std::runtime_error("cannot write " + (*options.out / "compare.csv").string());
+    table.write(*options.out / "compare.csv");
     written.push_back((*options.out / "compare.csv").string());
-    draw(*options.out, cells, written);
+    draw(options, cells, written);
   }
   if (options.json) {
     if (!out.flush()) throw std::runtime_error("cannot write the cells: is the disk full?");

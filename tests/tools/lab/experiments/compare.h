@@ -65,6 +65,7 @@ struct CompareOptions {
   std::size_t every = 1;  ///< take every Nth situation of the grid
   std::uint64_t seed = 1;
   std::optional<std::filesystem::path> out{};  ///< folder for compare.csv and the figures
+  std::string command{};                       ///< repeats the run
   bool json = false;
   Part part{};  ///< its units are the selected situations from 0, each with all laws
 };

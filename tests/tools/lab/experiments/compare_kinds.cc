@@ -6,18 +6,16 @@
 #include <atomic>
 #include <cstdio>
 #include <exception>
-#include <fstream>
 #include <iostream>
 #include <mutex>
 #include <stdexcept>
 #include <thread>
 
-#include "core/base/expect.h"
 #include "core/base/nearest_word.h"
 #include "server/build_info.h"
-#include "tests/support/files.h"
 #include "tests/support/json_line.h"
 #include "tests/tools/lab/experiments/situations.h"
+#include "tests/tools/lab/pictures/csv.h"
 
 namespace tendon::lab {
 namespace {
@@ -155,31 +153,29 @@ void compare_kinds(const CompareKindsOptions& options, std::ostream& out) {
   const std::uint64_t first = options.seed + (options.held_out ? kHeldOutSeeds : 0);
   for (const std::string& kind : kinds) draw_situation(kind, first);  // rejects an unknown kind before any work
 
-  std::ofstream csv;
-  if (options.out) {
-    std::filesystem::create_directories(*options.out);
-    const std::filesystem::path file = *options.out / "compare_kinds.csv";
-    expect_replaceable(file, {"kind,"});
-    csv.open(file);
-    csv << "kind,seed,drawn,law,passive,energy_given_out_j,force_error_percent,true_force_n,vibration_mm_s,sensation_"
-           "db,"
-           "noticed_share,commit\n";
-  }
+  CsvTable table(options.command);
   for (const std::string& kind : kinds) {
     if (!draw_situation(kind, first)) {
       if (!options.json) out << kind << ": omitted, because TENDON_DATA is not set\n\n";
       continue;
     }
     const std::vector<Result> results = results_of(kind, first, options.count, all, options.progress);
-    if (csv.is_open()) {
-      for (const Result& result : results) {
-        for (std::size_t i = 0; i < all.size(); ++i) {
-          const Outcome& o = result.outcomes[i];
-          csv << kind << "," << result.seed << "," << result.drawn << "," << all[i].name << "," << passive(o) << ","
-              << shortest(std::max(0.0, -o.least_energy)) << "," << shortest(error_of(o)) << ","
-              << shortest(o.true_force) << "," << shortest(o.late_vibration * 1e3) << "," << shortest(o.sensation)
-              << "," << shortest(o.noticed_share) << "," << kCommit << "\n";
-        }
+    for (const Result& result : results) {
+      for (std::size_t i = 0; i < all.size(); ++i) {
+        const Outcome& o = result.outcomes[i];
+        table.add(JsonLine()
+                      .add("kind", kind)
+                      .add("seed", result.seed)
+                      .add("drawn", result.drawn)
+                      .add("law", all[i].name)
+                      .add("passive", passive(o))
+                      .add("energy_given_out_j", std::max(0.0, -o.least_energy))
+                      .add("force_error_percent", error_of(o))
+                      .add("true_force_n", o.true_force)
+                      .add("vibration_mm_s", o.late_vibration * 1e3)
+                      .add("sensation_db", o.sensation)
+                      .add("noticed_share", o.noticed_share)
+                      .add("commit", kCommit));
       }
     }
     if (!options.json) {
@@ -232,7 +228,11 @@ void compare_kinds(const CompareKindsOptions& options, std::ostream& out) {
            "has an error\n"
            "more than 3 points smaller; worst: points above the best of them.\n";
   }
-  if (!out.flush() || (csv.is_open() && !csv.flush())) throw std::runtime_error("cannot write: is the disk full?");
+  if (options.out) {
+    std::filesystem::create_directories(*options.out);
+    table.write(*options.out / "compare_kinds.csv");
+  }
+  if (!out.flush()) throw std::runtime_error("cannot write: is the disk full?");
 }
 
 }  // namespace tendon::lab

@@ -18,6 +18,7 @@ struct CompareKindsOptions {
   bool held_out = false;                       ///< adds kHeldOutSeeds to the seed
   std::vector<std::string> laws{};             ///< names of contenders(). If this is empty, all passive laws are used.
   std::optional<std::filesystem::path> out{};  ///< folder for compare_kinds.csv
+  std::string command{};                       ///< repeats the run
   bool json = false;                           ///< one object per kind and contender
   bool progress = false;                       ///< prints to standard error
 };

@@ -18,6 +18,7 @@
 #include "tests/tools/lab/experiments/law_steps.h"
 #include "tests/tools/lab/experiments/meter.h"
 #include "tests/tools/lab/experiments/paper.h"
+#include "tests/tools/lab/pictures/csv.h"
 #include "tests/tools/lab/pictures/gnuplot.h"
 #include "tests/tools/lab/pictures/panels.h"
 
@@ -160,7 +161,10 @@ std::vector<Costed> measure(const Bench& bench) {
   part("robust_ledger", [](Parts& p) { p.robust_ledger.emplace().encoder_step = {kPaperEncoder}; });
   part("knee", [](Parts& p) { p.knee.emplace(); });
   part("latency_reserve", [](Parts& p) { p.latency_reserve.emplace(); });
-  part("bounded_acceleration", [](Parts& p) { p.bounded_acceleration = low_friction_parts(0).bounded_acceleration; });
+  part("bounded_acceleration", [](Parts& p) {
+    p.bounded_acceleration = low_friction_parts(0).bounded_acceleration;
+    p.shaping = low_friction_parts(0).shaping;
+  });
   part("adaptive_friction", [](Parts& p) { p.adaptive_friction.emplace(); });
   part("the default parts", [](Parts& p) { p = default_parts(kPaperEncoder); });
 
@@ -188,18 +192,19 @@ void cost(const CostOptions& options, std::ostream& out) {
         << (bench.counts() ? "" : "\nInstructions are not counted, because the kernel does not permit it.") << "\n\n"
         << "                                             ns  instructions  force error N\n";
   }
+  CsvTable table(options.command);
   for (const Costed& line : lines) {
+    JsonLine json;
+    json.add("kind", line.kind)
+        .add("name", line.name)
+        .add("ns", line.nanoseconds)
+        .add("instructions", line.instructions)
+        .add("force_error_n", line.force_error)
+        .add("batches", options.batches)
+        .add("commit", kCommit);
+    table.add(json);
     if (options.json) {
-      out << JsonLine()
-                 .add("kind", line.kind)
-                 .add("name", line.name)
-                 .add("ns", line.nanoseconds)
-                 .add("instructions", line.instructions)
-                 .add("force_error_n", line.force_error)
-                 .add("batches", options.batches)
-                 .add("commit", kCommit)
-                 .str()
-          << "\n";
+      out << json.str() << "\n";
       continue;
     }
     const auto or_dash = [](const std::optional<double>& value, const char* format) {
@@ -220,6 +225,7 @@ void cost(const CostOptions& options, std::ostream& out) {
   }
   if (options.out) {
     std::filesystem::create_directories(*options.out);
+    table.write(*options.out / "cost.csv");
     std::vector<Panel> panels;
     for (const auto& kinds : {std::vector{"law", "part"}, std::vector{"estimator"}}) {
       Panel panel{
@@ -236,7 +242,8 @@ void cost(const CostOptions& options, std::ostream& out) {
       }
       panels.push_back(panel);
     }
-    draw_panels(*options.out / "cost", "What accuracy costs", "commit " + std::string(kCommit), panels);
+    draw_panels(*options.out / "cost", "What accuracy costs", "commit " + std::string(kCommit), panels,
+                options.command);
   }
   if (!out.flush()) throw std::runtime_error("cannot write the table: is the disk full?");
 }

@@ -4,12 +4,14 @@
 #include <filesystem>
 #include <optional>
 #include <ostream>
+#include <string>
 
 namespace tendon::lab {
 
 struct CostOptions {
   int batches = 200;
-  std::optional<std::filesystem::path> out{};
+  std::optional<std::filesystem::path> out{};  ///< folder for cost.csv and the figure
+  std::string command{};                       ///< repeats the run
   bool json = false;
 };
 

@@ -5,15 +5,14 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
-#include <fstream>
 #include <stdexcept>
 
 #include "core/base/expect.h"
 #include "core/ledger/output_bound.h"
 #include "server/build_info.h"
-#include "tests/support/files.h"
 #include "tests/support/json_line.h"
 #include "tests/tools/lab/experiments/paper.h"
+#include "tests/tools/lab/pictures/csv.h"
 
 namespace tendon::lab {
 namespace {
@@ -227,13 +226,7 @@ void floors(const FloorOptions& options, std::ostream& out) {
   constexpr std::array kSenses = {std::pair{Passive::kOnThisMotion, "on this motion"},
                                   std::pair{Passive::kWhateverComes, "whatever comes"},
                                   std::pair{Passive::kAccelerating, "below 300 m/s2"}};
-  std::ofstream csv;
-  if (options.out) {
-    std::filesystem::create_directories(*options.out);
-    expect_replaceable(*options.out / "floor.csv", {"b_n_s_per_m,"});
-    csv.open(*options.out / "floor.csv");
-    csv << "b_n_s_per_m,fc_n,stiffness_n_per_m,hand,passive,floor_percent,at_least_percent,commit\n";
-  }
+  CsvTable table(options.command);
   if (!options.json) {
     out << "Least error of any law, % of the true force, for a loose / firm hand on the ideal spring, 2 s; commit "
         << kCommit << "\n\npassive          b N s/m";
@@ -254,24 +247,17 @@ void floors(const FloorOptions& options, std::ostream& out) {
         for (const bool firm : {false, true}) {
           const Floor floor = floor_of(on_perfect_spring(stiffness, friction, firm), sense);
           percent[firm ? 1 : 0] = floor.error * 100;
-          if (csv.is_open()) {
-            csv << shortest(friction.viscous) << "," << shortest(friction.coulomb) << "," << shortest(stiffness) << ","
-                << (firm ? "firm" : "loose") << "," << name << "," << shortest(floor.error * 100) << ","
-                << shortest(floor.at_least * 100) << "," << kCommit << "\n";
-          }
-          if (options.json) {
-            out << JsonLine()
-                       .add("passive", name)
-                       .add("b_n_s_per_m", friction.viscous)
-                       .add("fc_n", friction.coulomb)
-                       .add("stiffness_n_per_m", stiffness)
-                       .add("hand", firm ? "firm" : "loose")
-                       .add("floor_percent", floor.error * 100)
-                       .add("at_least_percent", floor.at_least * 100)
-                       .add("commit", kCommit)
-                       .str()
-                << "\n";
-          }
+          JsonLine json;
+          json.add("passive", name)
+              .add("b_n_s_per_m", friction.viscous)
+              .add("fc_n", friction.coulomb)
+              .add("stiffness_n_per_m", stiffness)
+              .add("hand", firm ? "firm" : "loose")
+              .add("floor_percent", floor.error * 100)
+              .add("at_least_percent", floor.at_least * 100)
+              .add("commit", kCommit);
+          table.add(json);
+          if (options.json) out << json.str() << "\n";
         }
         std::snprintf(text.data(), text.size(), "%6.0f /%3.0f ", percent[0], percent[1]);
         if (!options.json) out << text.data();
@@ -279,7 +265,11 @@ void floors(const FloorOptions& options, std::ostream& out) {
       if (!options.json) out << "\n" << std::flush;
     }
   }
-  if (!out.flush() || (csv.is_open() && !csv.flush())) throw std::runtime_error("cannot write: is the disk full?");
+  if (options.out) {
+    std::filesystem::create_directories(*options.out);
+    table.write(*options.out / "floor.csv");
+  }
+  if (!out.flush()) throw std::runtime_error("cannot write: is the disk full?");
 }
 
 }  // namespace tendon::lab

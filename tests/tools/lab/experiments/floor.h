@@ -6,6 +6,7 @@
 #include <limits>
 #include <optional>
 #include <ostream>
+#include <string>
 #include <vector>
 
 #include "tests/tools/lab/experiments/experiment.h"
@@ -59,6 +60,7 @@ FloorProblem on_perfect_spring(double stiffness, const Friction& friction, bool 
 
 struct FloorOptions {
   std::optional<std::filesystem::path> out{};  ///< folder for floor.csv
+  std::string command{};                       ///< repeats the run
   bool json = false;
 };
 

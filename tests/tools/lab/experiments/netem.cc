@@ -18,6 +18,7 @@
 #include "tests/tools/injector/injector.h"
 #include "tests/tools/injector/profile/profile.h"
 #include "tests/tools/injector/selftest/statistics.h"
+#include "tests/tools/lab/pictures/csv.h"
 #include "tests/tools/lab/pictures/gnuplot.h"
 #include "tests/tools/lab/pictures/panels.h"
 
@@ -122,7 +123,7 @@ constexpr std::array kAsked = {0.01, 0.05, 0.1};
 constexpr std::array kCorrelations = {0.0, 0.1, 0.25, 0.5, 0.75, 0.9};
 constexpr std::array<std::size_t, 13> kLags = {1, 2, 3, 4, 5, 7, 10, 13, 16, 20, 25, 30, 40};
 
-std::vector<Panel> loss_panels(const NetemOptions& options, std::ostream& out) {
+std::vector<Panel> loss_panels(const NetemOptions& options, CsvTable& table, std::ostream& out) {
   Panel rate{.title = "Loss: 10 % asked for, what comes, %", .x_label = "correlation asked for, %"};
   Panel bursts{.title = "Losses in a row, mean", .x_label = "correlation asked for, %", .log_y = true};
   rate.curves = {{"asked for", kPale, {{0, 10}, {90, 10}}, Curve::Style::kDashed},
@@ -144,17 +145,17 @@ std::vector<Panel> loss_panels(const NetemOptions& options, std::ostream& out) {
         bursts.curves[1].points.emplace_back(100 * correlation, theirs.mean_burst);
         bursts.curves[2].points.emplace_back(100 * correlation, ours.mean_burst);
       }
+      JsonLine json;
+      json.add("loss_asked", asked)
+          .add("correlation_asked", correlation)
+          .add("burst_asked", burst)
+          .add("netem_loss", theirs.rate)
+          .add("netem_burst", theirs.mean_burst)
+          .add("inject_loss", ours.rate)
+          .add("inject_burst", ours.mean_burst);
+      table.add(json);
       if (options.json) {
-        out << JsonLine()
-                   .add("loss_asked", asked)
-                   .add("correlation_asked", correlation)
-                   .add("burst_asked", burst)
-                   .add("netem_loss", theirs.rate)
-                   .add("netem_burst", theirs.mean_burst)
-                   .add("inject_loss", ours.rate)
-                   .add("inject_burst", ours.mean_burst)
-                   .str()
-            << "\n";
+        out << json.str() << "\n";
         continue;
       }
       std::array<char, 120> line{};
@@ -167,7 +168,7 @@ std::vector<Panel> loss_panels(const NetemOptions& options, std::ostream& out) {
   return {rate, bursts};
 }
 
-std::vector<Panel> delay_panels(const NetemOptions& options, std::ostream& out) {
+std::vector<Panel> delay_panels(const NetemOptions& options, CsvTable& table, std::ostream& out) {
   Panel law{.title = "Delays: 2 ms + exponential of 6 ms: the share below",
             .x_label = "delay, ms",
             .x_range = {{0, 30}},
@@ -196,16 +197,16 @@ std::vector<Panel> delay_panels(const NetemOptions& options, std::ostream& out) 
     memory.curves.push_back(remembered);
     const double median = percentile(delays.ms, 0.5);
     const double late = percentile(delays.ms, 0.99);
+    JsonLine json;
+    json.add("delays", delays.name)
+        .add("mean_ms", mean)
+        .add("p50_ms", median)
+        .add("p99_ms", late)
+        .add("autocorrelation_1", first)
+        .add("autocorrelation_10", tenth);
+    table.add(json);
     if (options.json) {
-      out << JsonLine()
-                 .add("delays", delays.name)
-                 .add("mean_ms", mean)
-                 .add("p50_ms", median)
-                 .add("p99_ms", late)
-                 .add("autocorrelation_1", first)
-                 .add("autocorrelation_10", tenth)
-                 .str()
-          << "\n";
+      out << json.str() << "\n";
       continue;
     }
     std::array<char, 120> line{};
@@ -242,15 +243,17 @@ void netem(const NetemOptions& options, std::ostream& out) {
   if (!options.json) {
     out << options.count << " datagrams for each line, seed " << options.seed << ", commit " << kCommit << "\n\n";
   }
-  std::vector<Panel> panels = loss_panels(options, out);
-  for (Panel& panel : delay_panels(options, out)) panels.push_back(std::move(panel));
+  CsvTable table(options.command);
+  std::vector<Panel> panels = loss_panels(options, table, out);
+  for (Panel& panel : delay_panels(options, table, out)) panels.push_back(std::move(panel));
   if (!options.out) return;
   std::filesystem::create_directories(*options.out);
+  table.write(*options.out / "netem.csv");
   const auto files =
       draw_panels(*options.out / "netem", "What is left of a network that is asked for with a correlation",
                   std::to_string(options.count) + " datagrams for each point, seed " + std::to_string(options.seed) +
                       "; netem: its arithmetic, Linux net/sched/sch_netem.c",
-                  panels);
+                  panels, options.command);
   if (!options.json) {
     out << "\n";
     for (const auto& file : files) out << file.string() << "\n";

@@ -7,6 +7,7 @@
 #include <optional>
 #include <ostream>
 #include <random>
+#include <string>
 
 namespace tendon::lab {
 
@@ -28,9 +29,10 @@ class NetemRandom {
 };
 
 struct NetemOptions {
-  std::size_t count = 1'000'000;  ///< datagrams per line
-  std::uint64_t seed = 7;         ///< of both
-  std::optional<std::filesystem::path> out{};
+  std::size_t count = 1'000'000;               ///< datagrams per line
+  std::uint64_t seed = 7;                      ///< of both
+  std::optional<std::filesystem::path> out{};  ///< folder for netem.csv and the figure
+  std::string command{};                       ///< repeats the run
   bool json = false;
 };
 

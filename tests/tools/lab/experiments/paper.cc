@@ -14,6 +14,7 @@
 #include "server/build_info.h"
 #include "tests/support/json_line.h"
 #include "tests/tools/lab/experiments/friction_tables.h"
+#include "tests/tools/lab/pictures/csv.h"
 #include "tests/tools/lab/pictures/gnuplot.h"
 #include "tests/tools/lab/pictures/panels.h"
 
@@ -329,6 +330,7 @@ void paper(const PaperOptions& options, std::ostream& out) {
         << "\n\n"
         << "     law    K_op N/m     paper  least energy J  vibration m/s  stable  largest force N  limited\n";
   }
+  CsvTable csv(options.command);
   std::vector<std::filesystem::path> pictures;
   for (std::size_t i = 0; i < paper_experiments().size(); ++i) {
     const PaperExperiment& experiment = paper_experiments()[i];
@@ -338,6 +340,7 @@ void paper(const PaperOptions& options, std::ostream& out) {
     }
     if (!options.json) out << experiment.name << "  " << experiment.what << "\n";
     for (const PaperRow& row : rows) {
+      csv.add(json_of(row));
       if (options.json) {
         out << json_of(row).str() << "\n";
         continue;
@@ -356,7 +359,7 @@ void paper(const PaperOptions& options, std::ostream& out) {
       }
       const auto drawn = draw_panels(
           *options.out / ("paper-" + experiment.name), "Experiment " + experiment.name + ": " + experiment.what,
-          "free hand; commit " + std::string(kCommit), figure(experiment, rows[0], rows[1], rows[2]));
+          "free hand; commit " + std::string(kCommit), figure(experiment, rows[0], rows[1], rows[2]), options.command);
       pictures.insert(pictures.end(), drawn.begin(), drawn.end());
     }
   }
@@ -364,6 +367,8 @@ void paper(const PaperOptions& options, std::ostream& out) {
   for (const AnyRow& row : *all) {
     if (const auto* const table = std::get_if<FrictionTable>(&row)) friction.push_back(*table);
   }
+  for (const FrictionTable& table : friction) csv.add(json_of(table));
+  if (options.out) csv.write(*options.out / "paper.csv");
   if (options.json) {
     for (const FrictionTable& table : friction) out << json_of(table).str() << "\n";
   } else {

@@ -66,7 +66,8 @@ struct PaperRow {
 PaperRow paper_row(const PaperExperiment& experiment, Law law, std::optional<Preset> preset = {});
 
 struct PaperOptions {
-  std::optional<std::filesystem::path> out{};
+  std::optional<std::filesystem::path> out{};  ///< folder for paper.csv and the figures
+  std::string command{};                       ///< repeats the run
   bool json = false;
   /// Four rows for each experiment, then the rows of Tables II and III. With `from`, the motions of the figures are
   /// simulated again, because lines do not contain them.

@@ -11,6 +11,7 @@
 #include "tests/support/dice.h"
 #include "tests/support/json_line.h"
 #include "tests/tools/lab/experiments/pressing_by.h"
+#include "tests/tools/lab/pictures/csv.h"
 #include "tests/tools/lab/pictures/gnuplot.h"
 #include "tests/tools/lab/pictures/panels.h"
 
@@ -166,7 +167,7 @@ void draw(const std::vector<TeleopRow>& rows, const TeleopOptions& options, std:
   const std::string figures = "median of n = " + std::to_string(options.hands) + " hands from seed " +
                               std::to_string(options.seed) + "; each way varies by 20 %, 10 % lost; every pair passive";
   for (const auto& file : draw_panels(*options.out / "teleop", "What a hand feels of a wall behind a network", figures,
-                                      {press[0], press[1]})) {
+                                      {press[0], press[1]}, options.command)) {
     out << "picture: " << file.string() << '\n';
   }
 }
@@ -185,24 +186,25 @@ void teleop(const TeleopOptions& options, std::ostream& out) {
   const auto all = outcomes(work_of(trials), options.part, out);
   if (!all) return;
   const auto rows = trials.rows(*all);
-  if (options.json) {
-    for (const TeleopRow& row : rows) {
-      out << JsonLine()
-                 .add("method", to_string(row.method))
-                 .add("round_trip_ms", row.round_trip_ms)
-                 .add("felt_first", row.first)
-                 .add("felt_second", row.second)
-                 .add("buzz_mps", row.buzz)
-                 .add("pair_j", row.pair)
-                 .add("hands", options.hands)
-                 .add("seed", options.seed)
-                 .str()
-          << '\n';
-    }
-  } else {
-    out << table_of(rows);
+  CsvTable table(options.command);
+  for (const TeleopRow& row : rows) {
+    JsonLine json;
+    json.add("method", to_string(row.method))
+        .add("round_trip_ms", row.round_trip_ms)
+        .add("felt_first", row.first)
+        .add("felt_second", row.second)
+        .add("buzz_mps", row.buzz)
+        .add("pair_j", row.pair)
+        .add("hands", options.hands)
+        .add("seed", options.seed);
+    table.add(json);
+    if (options.json) out << json.str() << '\n';
   }
-  if (options.out) draw(rows, options, out);
+  if (!options.json) out << table_of(rows);
+  if (!options.out) return;
+  std::filesystem::create_directories(*options.out);
+  table.write(*options.out / "teleop.csv");
+  draw(rows, options, out);
 }
 
 }  // namespace tendon::lab

@@ -6,6 +6,7 @@
 #include <optional>
 #include <ostream>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "core/teleoperation/methods/coupling_method.h"
@@ -14,9 +15,10 @@
 namespace tendon::lab {
 
 struct TeleopOptions {
-  int hands = 21;          ///< per method and round trip, 1 … 1000
-  std::uint64_t seed = 1;  ///< of the first hand
-  std::optional<std::filesystem::path> out{};
+  int hands = 21;                              ///< per method and round trip, 1 … 1000
+  std::uint64_t seed = 1;                      ///< of the first hand
+  std::optional<std::filesystem::path> out{};  ///< folder for teleop.csv and the figure
+  std::string command{};                       ///< repeats the run
   bool json = false;
   Part part{};  ///< the units are the trials, for each hand at each round trip of each method
 };

@@ -16,6 +16,7 @@
 #include "tests/tools/injector/injector.h"
 #include "tests/tools/injector/profile/named_profiles.h"
 #include "tests/tools/lab/experiments/pressing_by.h"
+#include "tests/tools/lab/pictures/csv.h"
 
 namespace tendon::lab {
 namespace {
@@ -212,18 +213,20 @@ void teleop_matrix(const MatrixOptions& options, std::ostream& out) {
   const std::vector<MatrixCase> cases = matrix_cases();
   const auto results = outcomes(work_of(cases, options), options.part, out);
   if (!results) return;
-  out << "network,devices,counts,method,held,drift_mm,vibration_mm_s,energy_uj\n";
+  CsvTable table;
   for (std::size_t i = 0; i < cases.size(); ++i) {
-    const MatrixResult& result = (*results)[i];
-    out << cases[i].network << ',' << cases[i].devices << ',' << (cases[i].counts ? "yes" : "no") << ','
-        << to_string(cases[i].method) << ',';
-    if (!result.engaged) {
-      out << "lost,,,\n";
-      continue;
-    }
-    out << rounded(result.held, 2) << ',' << rounded(result.drift * 1e3, 3) << ',' << rounded(result.vibration * 1e3, 1)
-        << ',' << rounded(result.energy * 1e6, 1) << '\n';
+    const auto& [held, drift, vibration, energy, engaged] = (*results)[i];
+    table.add(JsonLine()
+                  .add("network", cases[i].network)
+                  .add("devices", cases[i].devices)
+                  .add("counts", cases[i].counts)
+                  .add("method", to_string(cases[i].method))
+                  .add("held", engaged ? rounded(held, 2) : "lost")
+                  .add("drift_mm", engaged ? rounded(drift * 1e3, 3) : "")
+                  .add("vibration_mm_s", engaged ? rounded(vibration * 1e3, 1) : "")
+                  .add("energy_uj", engaged ? rounded(energy * 1e6, 1) : ""));
   }
+  out << table.str();
 }
 
 }  // namespace tendon::lab

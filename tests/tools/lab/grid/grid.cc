@@ -169,16 +169,6 @@ void expect_own_table(const std::filesystem::path& file, const std::string& comm
                               "\"; use another --out");
 }
 
-void write_table(const std::filesystem::path& file, const std::string& text) {
-  std::filesystem::path replacement = file;
-  replacement += ".new";
-  std::ofstream out(replacement, std::ios::binary);
-  out << text;
-  out.close();
-  if (!out) throw std::runtime_error("cannot write " + file.string() + ": is the disk full?");
-  std::filesystem::rename(replacement, file);
-}
-
 /// Puts the name of the option before an error of `make`.
 template <class Make>
 auto named(std::string_view option, const Make& make) {
@@ -313,7 +303,7 @@ void run_grid(const GridOptions& options, std::ostream& out) {
   if (!all) return;
   std::vector<GridRow> rows;
   for (std::size_t i = 0; i < cells.size(); ++i) rows.push_back({cells[i], (*all)[i]});
-  const std::string table = to_csv(rows, options.thresholds, origin, parts);
+  const CsvTable table = table_of(rows, options.thresholds, origin, parts);
   if (options.json) {
     for (const auto& [cell, measured] : rows) {
       out << JsonLine()
@@ -328,9 +318,9 @@ void run_grid(const GridOptions& options, std::ostream& out) {
           << '\n';
     }
   } else if (options.out.empty()) {
-    out << table;
+    out << table.str();
   } else {
-    write_table(options.out / "cells.csv", table);
+    table.write(options.out / "cells.csv");
     out << "table: " << (options.out / "cells.csv").string() << '\n';
     if (options.zwidth) {
       for (const auto& file : draw_zwidth(options.out / "zwidth", rows, options.thresholds, origin)) {

@@ -14,22 +14,10 @@
 namespace tendon::lab {
 namespace {
 
-std::string field(const std::optional<double>& value, double scale = 1) {
-  constexpr int kDigits = 6;
-  return value ? rounded(*value * scale, kDigits) : "";
-}
-
-std::string field(const std::optional<bool>& value) {
-  if (!value) return "";
-  return *value ? "yes" : "no";
-}
-
-/// Quoted if it contains a comma or a quote (RFC 4180).
-std::string csv_field(std::string_view text) {
-  if (text.find_first_of(",\"\n") == std::string_view::npos) return std::string(text);
-  std::string result = "\"";
-  for (const char c : text) result += c == '"' ? "\"\"" : std::string(1, c);
-  return result + '"';
+std::optional<double> in_ms(const std::optional<double>& time) {
+  constexpr double kMsPerS = 1e3;
+  if (!time) return std::nullopt;
+  return *time * kMsPerS;
 }
 
 std::string sha256_of(std::string_view text) {
@@ -61,22 +49,32 @@ Origin origin_of(std::string command, const std::string& scene_text) {
           .arithmetic = sweep::fingerprint().functions};
 }
 
-std::string to_csv(const std::vector<GridRow>& rows, const Thresholds& thresholds, const Origin& origin,
-                   const std::map<std::string, std::string>& parts) {
-  std::string text = "# " + origin.command +
-                     "\nlaw,parts,network,rtt_p50_ms,loss_share,rate_hz,stiffness_npm,seed,felt_stiffness_npm,"
-                     "least_energy_j,vibration_mps,felt_db,force_error_n,limited_share,quiet,passive,scene_sha256,"
-                     "commit,arithmetic\n";
-  const std::string ends = ',' + origin.scene_sha256 + ',' + origin.commit + ',' + origin.arithmetic + '\n';
+CsvTable table_of(const std::vector<GridRow>& rows, const Thresholds& thresholds, const Origin& origin,
+                  const std::map<std::string, std::string>& parts) {
+  CsvTable table(origin.command);
   for (const auto& [cell, measured] : rows) {
-    text += cell.law + ',' + parts.at(cell.law) + ',' + csv_field(cell.network) + ',' +
-            field(measured.round_trip, 1e3) + ',' + field(measured.loss) + ',' + shortest(cell.rate_hz) + ',' +
-            shortest(cell.stiffness) + ',' + std::to_string(cell.seed) + ',' + field(measured.felt_stiffness) + ',' +
-            field(measured.least_energy) + ',' + field(measured.vibration) + ',' + field(measured.felt_db) + ',' +
-            field(measured.force_error) + ',' + field(measured.limited_share) + ',' +
-            field(quiet(measured, thresholds)) + ',' + field(passive(measured, thresholds)) + ends;
+    table.add(JsonLine()
+                  .add("law", cell.law)
+                  .add("parts", parts.at(cell.law))
+                  .add("network", cell.network)
+                  .add("rtt_p50_ms", in_ms(measured.round_trip))
+                  .add("loss_share", measured.loss)
+                  .add("rate_hz", shortest(cell.rate_hz))
+                  .add("stiffness_npm", shortest(cell.stiffness))
+                  .add("seed", cell.seed)
+                  .add("felt_stiffness_npm", measured.felt_stiffness)
+                  .add("least_energy_j", measured.least_energy)
+                  .add("vibration_mps", measured.vibration)
+                  .add("felt_db", measured.felt_db)
+                  .add("force_error_n", measured.force_error)
+                  .add("limited_share", measured.limited_share)
+                  .add("quiet", quiet(measured, thresholds))
+                  .add("passive", passive(measured, thresholds))
+                  .add("scene_sha256", origin.scene_sha256)
+                  .add("commit", origin.commit)
+                  .add("arithmetic", origin.arithmetic));
   }
-  return text;
+  return table;
 }
 
 }  // namespace tendon::lab

@@ -8,6 +8,7 @@
 
 #include "tests/tools/lab/experiments/experiment.h"
 #include "tests/tools/lab/grid/cell.h"
+#include "tests/tools/lab/pictures/csv.h"
 
 namespace tendon::lab {
 
@@ -35,9 +36,8 @@ struct Origin {
 };
 Origin origin_of(std::string command, const std::string& scene_text);
 
-/// Returns CSV: a line with # and the command, the names of the columns, and a line per row. Measured values have six
-/// significant digits. An empty field is not known. `parts`: of each law's limiter.
-std::string to_csv(const std::vector<GridRow>& rows, const Thresholds& thresholds, const Origin& origin,
-                   const std::map<std::string, std::string>& parts);
+/// A line per row. `parts`: of each law's limiter.
+CsvTable table_of(const std::vector<GridRow>& rows, const Thresholds& thresholds, const Origin& origin,
+                  const std::map<std::string, std::string>& parts);
 
 }  // namespace tendon::lab

@@ -11,7 +11,6 @@
 #include "core/base/expect.h"
 #include "core/control/catalogue.h"
 #include "tests/tools/lab/pictures/gnuplot.h"
-#include "tests/tools/lab/pictures/metadata.h"
 #include "tests/tools/lab/pictures/panels.h"
 
 namespace tendon::lab {
@@ -112,7 +111,7 @@ std::vector<std::filesystem::path> draw_zwidth(const std::filesystem::path& stem
                               " mm/s; passive: gives out at most " + energy_in_words(thresholds.given_out) + "; " +
                               std::to_string(seeds.size()) + (seeds.size() == 1 ? " seed" : " seeds") + "; commit " +
                               origin.commit + "; scene " + origin.scene_sha256.substr(0, 12);
-  std::vector<std::string> below = {origin.command};
+  std::vector<std::string> below;
   const bool aol_fails = std::ranges::any_of(rows, [&thresholds](const GridRow& row) {
     return row.cell.law == info(Law::kAol).name && passive(row.measured, thresholds) == false;
   });
@@ -122,11 +121,7 @@ std::vector<std::filesystem::path> draw_zwidth(const std::filesystem::path& stem
         "per "
         "period. It can give out this energy, so it needs a larger limit of passivity, or the robust ledger.");
   }
-  const auto files = draw_panels(stem, "Z-width over delay", figures, {felt, asked}, below);
-  for (const std::filesystem::path& file : files) {
-    add_metadata(file, "Description", origin.command + "; scene " + origin.scene_sha256 + "; commit " + origin.commit);
-  }
-  return files;
+  return draw_panels(stem, "Z-width over delay", figures, {felt, asked}, origin.command, below);
 }
 
 }  // namespace tendon::lab

@@ -63,7 +63,8 @@ TEST(ZWidth, BothPicturesCarryTheirCommand) {
 TEST(GridTable, QuotesNetworksAndLeavesUnknownValuesEmpty) {
   const std::vector<GridRow> rows = {row("aol", "delay=uniform(1ms,2ms)", 100, 7, wall(0.1, 1.0 / 3)),
                                      row("aol", "lan", 100, 8, {})};
-  std::istringstream csv(to_csv(rows, {}, {"tendon-lab sweep x", "5ca1ab1e", "c0ffee", "f00d"}, {{"aol", "none"}}));
+  std::istringstream csv(
+      table_of(rows, {}, {"tendon-lab sweep x", "5ca1ab1e", "c0ffee", "f00d"}, {{"aol", "none"}}).str());
   std::string line;
   std::getline(csv, line);
   EXPECT_EQ(line, "# tendon-lab sweep x");

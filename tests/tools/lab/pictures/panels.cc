@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "tests/tools/lab/pictures/gnuplot.h"
+#include "tests/tools/lab/pictures/metadata.h"
 
 namespace tendon::lab {
 namespace {
@@ -15,10 +16,12 @@ constexpr int kWidth = 1600;
 constexpr int kRow = 470;          ///< pixels per row of panels
 constexpr int kAbovePanels = 110;  ///< pixels above the first row
 constexpr std::size_t kMostPoints = 1200;
-constexpr std::size_t kNamesInRow = 4;  ///< names in a row of the legend
-constexpr int kKeyRow = 18;             ///< pixels for each row of the legend after the second
-constexpr std::size_t kLetters = 170;   ///< per line below the panels
-constexpr int kLine = 24;               ///< pixels
+constexpr double kPanel = 0.435;       ///< width of a panel, share of the picture
+constexpr double kLetter = 9.6;        ///< width that gnuplot reserves for a letter of the legend, pixels
+constexpr int kSample = 7;             ///< width of the line next to a name, letters
+constexpr int kKeyRow = 18;            ///< pixels for each row of the legend after the second
+constexpr std::size_t kLetters = 170;  ///< per line below the panels
+constexpr int kLine = 24;              ///< pixels
 
 const char* words(Curve::Style style) {
   switch (style) {
@@ -40,15 +43,21 @@ const char* words(Curve::Style style) {
   return "using 1:2 with lines lw 1.6 lc rgb ";
 }
 
-/// Additional height in pixels for the longest legend.
+/// Additional height in pixels for the legend with the most rows. All columns are as wide as the longest name.
 int room_for_keys(const std::vector<Panel>& panels) {
-  std::size_t rows = 2;
+  int rows = 2;
   for (const Panel& panel : panels) {
-    const auto names = static_cast<std::size_t>(
-        std::ranges::count_if(panel.curves, [](const Curve& c) { return !c.name.empty() && !c.points.empty(); }));
-    rows = std::max(rows, (names + kNamesInRow - 1) / kNamesInRow);
+    int names = 0;
+    std::ptrdiff_t longest = 0;
+    for (const Curve& curve : panel.curves) {
+      if (curve.name.empty() || curve.points.empty()) continue;
+      ++names;
+      longest = std::max(longest, std::ranges::count_if(curve.name, [](char c) { return (c & 0xC0) != 0x80; }));
+    }
+    const auto columns = static_cast<int>(kPanel * kWidth / (kLetter * static_cast<double>(longest + kSample)));
+    rows = std::max(rows, (names - 1) / std::max(columns, 1) + 1);
   }
-  return kKeyRow * static_cast<int>(rows - 2);
+  return kKeyRow * (rows - 2);
 }
 
 void range(std::ostream& out, char axis, const std::optional<std::pair<double, double>>& range) {
@@ -170,7 +179,7 @@ std::string panels_script(const std::filesystem::path& path, const std::string& 
   for (std::size_t p = 0; p < panels.size(); ++p) {
     const Panel& panel = panels[p];
     const double left = p % 2 == 0 ? 0.045 : 0.545;
-    const double right = left + 0.435;
+    const double right = left + kPanel;
     const std::size_t row = p / 2;
     const double top = kAbovePanels + static_cast<double>(row) * (kRow + keys) + keys + 74;
     out << "set lmargin at screen " << left << "\nset rmargin at screen " << right << "\nset tmargin at screen "
@@ -207,12 +216,15 @@ std::string panels_script(const std::filesystem::path& path, const std::string& 
 
 std::vector<std::filesystem::path> draw_panels(const std::filesystem::path& stem, const std::string& heading,
                                                const std::string& figures, const std::vector<Panel>& panels,
-                                               const std::vector<std::string>& below) {
+                                               const std::string& command, const std::vector<std::string>& below) {
+  std::vector<std::string> paragraphs = below;
+  paragraphs.insert(paragraphs.begin(), command);
   std::vector<std::filesystem::path> files;
   for (const char* const extension : {".svg", ".png"}) {
     std::filesystem::path file = stem;
     file += extension;
-    run_gnuplot(panels_script(file, heading, figures, panels, below), file);
+    run_gnuplot(panels_script(file, heading, figures, panels, paragraphs), file);
+    add_metadata(file, "Description", command + "; " + figures);
     files.push_back(file);
   }
   return files;

@@ -44,9 +44,10 @@ std::vector<std::pair<double, double>> thinned(const std::vector<std::pair<doubl
 std::string panels_script(const std::filesystem::path& path, const std::string& heading, const std::string& figures,
                           const std::vector<Panel>& panels, const std::vector<std::string>& below = {});
 
-/// Writes `stem`.svg and `stem`.png and returns their names. Throws the exceptions of `run_gnuplot`.
+/// Writes `stem`.svg and `stem`.png and returns their names. The command is written below the panels, and to the metadata
+/// of the files together with the `figures`. Throws the exceptions of `run_gnuplot` and `add_metadata`.
 std::vector<std::filesystem::path> draw_panels(const std::filesystem::path& stem, const std::string& heading,
                                                const std::string& figures, const std::vector<Panel>& panels,
-                                               const std::vector<std::string>& below = {});
+                                               const std::string& command, const std::vector<std::string>& below = {});
 
 }  // namespace tendon::lab

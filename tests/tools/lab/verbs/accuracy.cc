@@ -144,7 +144,8 @@ void add(CLI::App& verb, int& /*exit*/) {
       "  tendon-sweep plan a --units 0:24 --per-shard 1 -- tendon-lab accuracy --models condensed --n 8,12,16,20\n\n"
       "Times are measured on this machine.\n"
       "Exit: 0 success; 1 failed, because of gnuplot or the files; 2 wrong usage.");
-  verb.callback([models, elements, slowest, setup, point] {
+  verb.callback([&verb, models, elements, slowest, setup, point] {
+    options.command = command_of(verb);
     if ((options.part.units || options.part.from) && (*slowest || *setup || *point)) {
       throw std::invalid_argument(
           "--units, --from: cannot be used with a time limit, because they do not measure times");

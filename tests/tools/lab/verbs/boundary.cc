@@ -13,7 +13,8 @@ void add(CLI::App& verb, int& /*exit*/) {
   static BoundaryOptions options;
   verb.add_option("--mass", options.mass, "Mass of the device, kg")->capture_default_str();
   verb.add_option("--b", options.viscous, "Viscous friction of the device, N s/m")->capture_default_str();
-  verb.add_option("--out", options.out, "Draw the figure in this folder, as SVG and PNG (requires gnuplot)")
+  verb.add_option("--out", options.out,
+                  "Write boundary.csv and a figure to this folder, as SVG and PNG (requires gnuplot)")
       ->type_name("DIR");
   add_part_options(verb, options.part, "0 to 17, the rows of the table");
   verb.add_flag("--json", options.json, "Print JSON on stdout, one object per point, instead of the table");
@@ -23,7 +24,10 @@ void add(CLI::App& verb, int& /*exit*/) {
       "  tendon-lab boundary --b 0.26 --out figures\n\n"
       "The result does not depend on random numbers.\n"
       "Exit: 0 success; 1 failed, because of gnuplot or the files; 2 wrong usage.");
-  verb.callback([] { boundary(options, std::cout); });
+  verb.callback([&verb] {
+    options.command = command_of(verb);
+    boundary(options, std::cout);
+  });
 }
 
 const Verb kVerb("boundary", "Find the stiffest stable spring over delay and rate, in simulation and theory", add);

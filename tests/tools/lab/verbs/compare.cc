@@ -39,7 +39,8 @@ void add(CLI::App& verb, int& /*exit*/) {
       "Example: compare situations outside of the grid, on seeds on which no law was tuned\n"
       "  tendon-lab compare --kinds all --held-out --count 100\n\n"
       "Exit: 0 success; 1 failed, because of gnuplot or the files; 2 wrong usage.");
-  verb.callback([] {
+  verb.callback([&verb] {
+    options.command = drawn.command = command_of(verb);
     if (drawn.kinds.empty()) return compare(options, std::cout);
     if (options.part.units || options.part.from)
       throw std::invalid_argument("--kinds: cannot be used with --units or --from, which only support the grid");

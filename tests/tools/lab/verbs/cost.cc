@@ -13,7 +13,7 @@ void add(CLI::App& verb, int& /*exit*/) {
   verb.add_option("--batches", options.batches, "Number of batches per line; the median is used")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
-  verb.add_option("--out", options.out, "Draw the figure in this folder, as SVG and PNG (requires gnuplot)")
+  verb.add_option("--out", options.out, "Write cost.csv and a figure to this folder, as SVG and PNG (requires gnuplot)")
       ->type_name("DIR");
   verb.add_flag("--json", options.json, "Print JSON on stdout, one object per line, instead of the table");
   verb.footer(
@@ -22,7 +22,10 @@ void add(CLI::App& verb, int& /*exit*/) {
       "  tendon-lab cost --out figures\n\n"
       "Times are measured on this machine.\n"
       "Exit: 0 success; 1 failed, because of gnuplot or the files; 2 wrong usage.");
-  verb.callback([] { cost(options, std::cout); });
+  verb.callback([&verb] {
+    options.command = command_of(verb);
+    cost(options, std::cout);
+  });
 }
 
 const Verb kVerb("cost", "Measure the accuracy of laws and estimators over the time of one step", add);

@@ -13,7 +13,10 @@ void add(CLI::App& verb, int& /*exit*/) {
   verb.add_option("--out", options.out, "Write floor.csv to this folder")->type_name("DIR");
   verb.add_flag("--json", options.json, "Print JSON on stdout, one object per floor, instead of the table");
   verb.footer("\nExample\n  tendon-lab floor\n\nExit: 0 success; 1 failed; 2 wrong usage.");
-  verb.callback([] { floors(options, std::cout); });
+  verb.callback([&verb] {
+    options.command = command_of(verb);
+    floors(options, std::cout);
+  });
 }
 
 const Verb kVerb("floor", "Compute the least force error of any passive law, by convex optimization", add);

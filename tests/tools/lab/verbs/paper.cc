@@ -12,7 +12,7 @@ namespace {
 void add(CLI::App& verb, int& /*exit*/) {
   static PaperOptions options;
   verb.add_option("--out", options.out,
-                  "Draw a figure of each experiment in this folder, as SVG and PNG (requires gnuplot)")
+                  "Write paper.csv and a figure of each experiment to this folder, as SVG and PNG (requires gnuplot)")
       ->type_name("DIR");
   add_part_options(verb, options.part, "0 to 30, the rows of the table");
   verb.add_flag("--json", options.json,
@@ -23,7 +23,10 @@ void add(CLI::App& verb, int& /*exit*/) {
       "  tendon-lab paper --out figures\n\n"
       "The result does not depend on random numbers.\n"
       "Exit: 0 success; 1 failed, because of gnuplot or the files; 2 wrong usage.");
-  verb.callback([] { paper(options, std::cout); });
+  verb.callback([&verb] {
+    options.command = command_of(verb);
+    paper(options, std::cout);
+  });
 }
 
 const Verb kVerb("paper", "Run the experiments of Lee & Lee 2009 without control, with AOL and with AOL+", add);

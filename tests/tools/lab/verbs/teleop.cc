@@ -30,7 +30,8 @@ void add(CLI::App& verb, int& /*exit*/) {
   static std::string preset = "feel";
   verb.add_option("--hands", options.hands, "Number of hands for each method and round trip")->capture_default_str();
   verb.add_option("--seed", options.seed, "Seed of the first hand and its network")->capture_default_str();
-  verb.add_option("--out", options.out, "Draw the figure in this folder, as SVG and PNG (requires gnuplot)")
+  verb.add_option("--out", options.out,
+                  "Write teleop.csv and a figure to this folder, as SVG and PNG (requires gnuplot)")
       ->type_name("DIR");
   add_part_options(
       verb, options.part,
@@ -52,7 +53,8 @@ void add(CLI::App& verb, int& /*exit*/) {
       "  tendon-lab teleop --matrix >matrix.csv               takes three minutes\n\n"
       "The same seed gives the same figures.\n"
       "Exit: 0 success; 1 failed, because of gnuplot or the files; 2 wrong usage.");
-  verb.callback([] {
+  verb.callback([&verb] {
+    options.command = command_of(verb);
     if (!matrix) return teleop(options, std::cout);
     teleop_matrix({.seed = options.seed, .preset = preset_named(preset), .part = options.part}, std::cout);
   });

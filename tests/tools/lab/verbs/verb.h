@@ -31,6 +31,10 @@ class Verb {
 
 std::vector<Verb> verbs();
 
+/// Returns the command that repeats a run: the verb and its options in the order of --help, without those that only
+/// select the output, the shard or the number of threads.
+std::string command_of(const CLI::App& verb);
+
 /// Returns "a|b|c" for a catalogue whose rows have a `name`.
 template <class Catalogue>
 std::string names_of(const Catalogue& catalogue) {
