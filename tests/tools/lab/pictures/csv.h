@@ -19,7 +19,7 @@ class CsvTable {
   /// Without a `command`, there is no line with #.
   explicit CsvTable(std::string command = {}) : command_(std::move(command)) {}
 
-  /// A key that no earlier row has becomes the last column. Throws std::logic_error if a value is a list or an object.
+  /// A new key is added as the last column. Throws std::logic_error if a value is a list or an object.
   void add(const JsonLine& row);
   std::string str() const;
   /// Replaces the file in one step. Throws std::runtime_error if it is not a table of these programs, or cannot be

@@ -7,8 +7,10 @@
 #include <iterator>
 #include <limits>
 #include <stdexcept>
+#include <string>
 
 #include "tests/support/refusal.h"
+#include "tests/tools/sweep/child.h"
 
 namespace tendon::lab::csv_test {
 namespace {
@@ -51,6 +53,20 @@ TEST(Csv, ReplacesATableButNoOtherFile) {
   EXPECT_NE(thrown_by<std::runtime_error>([&] { table.write(folder / "notes.csv"); }).find("notes.csv"),
             std::string::npos);
   EXPECT_EQ(text_of(folder / "notes.csv"), "mine\n");
+}
+
+/// Flags, lists and repeated options
+TEST(Csv, TheFirstLineIsTheCommandThatRepeatsTheRun) {
+  const auto folder = std::filesystem::path(::testing::TempDir()) / "csv-command";
+  std::filesystem::remove_all(folder);
+  const sweep::ChildEnd end =
+      sweep::run({.command = {TENDON_LAB, "compare", "--out", folder.string(), "--json", "--kinds", "counts", "--kinds",
+                              "tempo", "--laws=aol,feel", "--count", "1", "--held-out"}});
+  ASSERT_EQ(end.status, 0) << end.errors;
+  std::ifstream table(folder / "compare_kinds.csv");
+  std::string line;
+  std::getline(table, line);
+  EXPECT_EQ(line, "# tendon-lab compare --kinds counts,tempo --count 1 --laws aol,feel --held-out");
 }
 
 }  // namespace
