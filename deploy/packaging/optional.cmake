@@ -252,6 +252,9 @@ tendon_package(emscripten DEBIAN emscripten PROGRAM em++ RUN --version VERSION 3
 # These packages are only used by tests. In Fast DDS 3, the library is called libfastdds.
 tendon_package(fastdds DEBIAN libfastrtps-dev HEADERS fastdds/dds/domain/DomainParticipantFactory.hpp fastcdr/Cdr.h
   LIBRARIES fastrtps fastcdr)
+tendon_package(zeromq DEBIAN libzmq3-dev PKG_CONFIG libzmq>=4.3 HEADERS zmq.h)
+tendon_package(grpc DEBIAN libgrpc++-dev HEADERS grpcpp/grpcpp.h LIBRARIES grpc++ grpc gpr absl_synchronization)
+tendon_package(grpc_plugin DEBIAN protobuf-compiler-grpc PROGRAM grpc_cpp_plugin)
 tendon_package(umockdev DEBIAN libumockdev-dev PKG_CONFIG umockdev-1.0>=0.17.16 HEADERS umockdev.h glib.h)
 tendon_package(umockdev_preload DEBIAN libumockdev-dev LIBRARIES umockdev-preload)
 tendon_package(benchmark DEBIAN libbenchmark-dev PKG_CONFIG benchmark>=1.5 HEADERS benchmark/benchmark.h)

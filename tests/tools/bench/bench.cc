@@ -1,20 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tests/tools/bench/bench.h"
 
-#include <sched.h>
-#include <sys/prctl.h>
-
 #include <algorithm>
-#include <cerrno>
-#include <csignal>
 #include <fstream>
 #include <iostream>
 #include <stdexcept>
-#include <system_error>
 
 #include "server/machine/clock.h"
 #include "tests/support/files.h"
 #include "tests/tools/bench/chart.h"
+#include "tests/tools/bench/other_process.h"
+#include "tests/tools/lab/pictures/csv.h"
 
 namespace tendon::bench {
 
@@ -23,6 +19,7 @@ const std::vector<Section>& sections() {
       {"steps", "One haptic step", measure_steps},
       {"datagrams", "One datagram", measure_datagrams},
       {"round-trip", "There and back", measure_round_trip},
+      {"peers", "Tendon beside other libraries", measure_peers},
       {"wake-ups", "How late a haptic thread wakes", measure_wake_ups},
       {"proxy", "tendon-inject", measure_proxy},
       {"worlds", "Simulated worlds", measure_worlds},
@@ -31,25 +28,6 @@ const std::vector<Section>& sections() {
       {"512", "512 devices in one process", measure_512},
   };
   return kSections;
-}
-
-void end_with_parent() { ::prctl(PR_SET_PDEATHSIG, SIGKILL); }
-
-AtPriority::AtPriority(int priority) {
-  if (priority == 0) return;
-  ::prctl(PR_SET_TIMERSLACK, 1UL, 0UL, 0UL, 0UL);
-  sched_param param{};
-  param.sched_priority = priority;
-  if (::sched_setscheduler(0, SCHED_FIFO, &param) != 0) {
-    throw std::system_error(errno, std::generic_category(), "SCHED_FIFO " + std::to_string(priority));
-  }
-  raised_ = true;
-}
-
-AtPriority::~AtPriority() {
-  if (!raised_) return;
-  const sched_param param{};
-  ::sched_setscheduler(0, SCHED_OTHER, &param);
 }
 
 void bench(const BenchOptions& options, std::ostream& out) {
@@ -73,16 +51,14 @@ void bench(const BenchOptions& options, std::ostream& out) {
   here.priority = options.priority;
   here.quick = options.quick;
   here.load_before = load();
-  here.command = "tendon-lab bench";
-  for (const std::string& name : options.only) here.command += " --only " + name;
-  if (options.priority > 0) here.command += " --fifo " + std::to_string(options.priority);
+  here.command = options.command;
   const LocalTime began = clock::now();
   if (!options.json) out << heading();
 
   std::size_t lines = 0;
   Run run(options, [&](const Row& row) {
     if (options.progress) std::cerr << "\r\033[K" << std::flush;
-    out << (options.json ? to_json(row) + "\n" : to_text(row)) << std::flush;
+    out << (options.json ? line_of(row).str() + "\n" : to_text(row)) << std::flush;
     if (!out) throw std::runtime_error("cannot write to stdout: it is closed");
     ++lines;
   });
@@ -104,6 +80,11 @@ void bench(const BenchOptions& options, std::ostream& out) {
   if (options.plot) {
     for (const auto& file : draw_devices(*options.plot, here, run.rows))
       std::cerr << "written: " << file.string() << "\n";
+  }
+  if (options.csv) {
+    lab::CsvTable table(options.command);
+    for (const Row& row : run.rows) table.add(line_of(row).add("commit", here.commit));
+    table.write(*options.csv);
   }
   if (!options.write) return;
   std::ofstream page(*options.write);

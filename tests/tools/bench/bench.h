@@ -10,6 +10,7 @@
 #include <string_view>
 #include <vector>
 
+#include "core/base/time.h"
 #include "tests/tools/bench/row.h"
 
 namespace tendon::bench {
@@ -17,6 +18,7 @@ namespace tendon::bench {
 struct BenchOptions {
   std::vector<std::string> only{};               ///< names of sections; empty: all
   std::optional<std::filesystem::path> write{};  ///< Markdown page
+  std::optional<std::filesystem::path> csv{};    ///< CSV file
   std::optional<std::filesystem::path> plot{};   ///< file name without extension of the chart of section 512
   bool json = false;
   bool quick = false;     ///< for smoke tests only
@@ -24,6 +26,8 @@ struct BenchOptions {
   /// SCHED_FIFO priority of the measured threads; 0: default scheduling. Haptic threads set their own, as in tendond.
   int priority = 0;
   std::uint64_t seed = 1;
+  Duration reply_delay{};  ///< added to each reply in the section peers
+  std::string command{};   ///< command that repeats the run
 };
 
 class Run {
@@ -54,6 +58,7 @@ struct Section {
 void measure_steps(Run& run);       ///< steps.cc
 void measure_datagrams(Run& run);   ///< datagrams.cc
 void measure_round_trip(Run& run);  ///< round_trip.cc
+void measure_peers(Run& run);       ///< peers/peers.cc
 void measure_wake_ups(Run& run);    ///< wake_ups.cc
 void measure_proxy(Run& run);       ///< proxy.cc
 void measure_worlds(Run& run);      ///< worlds.cc
@@ -61,22 +66,6 @@ void measure_devices(Run& run);     ///< devices.cc
 void measure_sessions(Run& run);    ///< sessions.cc
 void measure_512(Run& run);         ///< sessions.cc
 const std::vector<Section>& sections();
-
-/// This must be called in a child right after fork(). The child is then killed by the kernel when its parent dies.
-void end_with_parent();
-
-/// Sets the real-time priority of the calling thread and removes its timer slack. Does nothing if it is 0.
-class AtPriority {
- public:
-  /// Throws std::system_error if the kernel refuses.
-  explicit AtPriority(int priority);
-  ~AtPriority();
-  AtPriority(const AtPriority&) = delete;
-  AtPriority& operator=(const AtPriority&) = delete;
-
- private:
-  bool raised_ = false;
-};
 
 /// `tendon-lab bench`: writes each row and its baseline to `out` when it has been measured. Throws
 /// std::invalid_argument for an unknown section, std::runtime_error if a measurement or a write fails.

@@ -18,6 +18,7 @@
 #include "server/machine/udp_link.h"
 #include "tests/tools/bench/bench.h"
 #include "tests/tools/bench/measure.h"
+#include "tests/tools/bench/other_process.h"
 
 namespace tendon::bench {
 namespace {

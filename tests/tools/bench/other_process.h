@@ -14,7 +14,6 @@
 #include <string>
 
 #include "core/base/time.h"
-#include "tests/tools/bench/bench.h"
 
 namespace tendon::bench {
 
@@ -24,6 +23,22 @@ namespace tendon::bench {
 Duration read(clockid_t clock);
 
 void raise_file_limit();
+
+/// This must be called in a child right after fork(). The child is then killed by the kernel when its parent dies.
+void end_with_parent();
+
+/// Sets the real-time priority of the calling thread and removes its timer slack. Does nothing if it is 0.
+class AtPriority {
+ public:
+  /// Throws std::system_error if the kernel refuses.
+  explicit AtPriority(int priority);
+  ~AtPriority();
+  AtPriority(const AtPriority&) = delete;
+  AtPriority& operator=(const AtPriority&) = delete;
+
+ private:
+  bool raised_ = false;
+};
 
 template <class T>
 class SharedMemory {

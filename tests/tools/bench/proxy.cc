@@ -20,6 +20,7 @@
 
 #include "tests/tools/bench/bench.h"
 #include "tests/tools/bench/measure.h"
+#include "tests/tools/bench/other_process.h"
 #include "tests/tools/injector/profile/profile.h"
 #include "tests/tools/injector/proxy/driver.h"
 #include "tests/tools/injector/proxy/real_time.h"

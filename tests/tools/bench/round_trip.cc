@@ -20,6 +20,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
+#include <memory>
 #include <new>
 #include <optional>
 #include <stdexcept>
@@ -39,6 +40,8 @@
 #include "tests/tools/bench/bench.h"
 #include "tests/tools/bench/measure.h"
 #include "tests/tools/bench/other_process.h"
+#include "tests/tools/bench/peers/echo_client.h"
+#include "tests/tools/bench/round_trip.h"
 
 namespace tendon::bench {
 namespace {
@@ -53,6 +56,7 @@ struct Options {
   int exchanges = 500;  ///< per kind and block
   int warm_up = 50;     ///< excluded exchanges at the start of each block (caches, processor frequency)
   int priority = 0;     ///< SCHED_FIFO, both processes
+  Duration reply_delay{};
 };
 
 enum class Wait : std::uint8_t { kBusy, kBlocking };
@@ -185,7 +189,9 @@ class WatchedLink : public Link {
 };
 
 void serve(Orders& orders, const ServerName& server, int echo, int udp_echo, Wait wait, const std::optional<Key>& key,
-           std::optional<Suite> suite) {
+           std::optional<Suite> suite, Duration reply_delay) {
+  EchoSetup setup;
+  setup.reply_delay = reply_delay;
   UdpTransport transport(server);
   BusyLink busy(transport);
   ForceClient::Config config;
@@ -194,7 +200,10 @@ void serve(Orders& orders, const ServerName& server, int echo, int udp_echo, Wai
   config.seed = 7;
   ForceClient client(
       wait == Wait::kBusy ? static_cast<Link&>(busy) : transport, transport.server(), config,
-      [](const DeviceState& hand) -> Touch { return Vec3(-2000 * std::max(0.0, hand.position.x()), 0, 0); },
+      [&setup](const DeviceState& hand) -> Touch {
+        setup.delay_reply();
+        return Vec3(-2000 * std::max(0.0, hand.position.x()), 0, 0);
+      },
       clock::now());
   BareSocket bare(echo, nullptr, wait, std::nullopt);
   BareSocket sealed(echo, nullptr, wait, suite);
@@ -259,7 +268,8 @@ class RoundTrip {
       end_with_parent();
       try {
         const AtPriority high(options.priority);
-        serve(*orders_, server, bare_.client(), udp_.client(), wait, suite ? std::optional(key_) : std::nullopt, suite);
+        serve(*orders_, server, bare_.client(), udp_.client(), wait, suite ? std::optional(key_) : std::nullopt, suite,
+              options.reply_delay);
         ::_exit(0);
       } catch (const std::exception& error) {
         std::fprintf(stderr, "tendon-lab bench: client: %s\n", error.what());
@@ -294,6 +304,12 @@ class RoundTrip {
     result.state_bytes = state_bytes_;
     result.force_bytes = force_bytes_;
     return result;
+  }
+
+  /// For tendon_echo_client. The first call also connects.
+  void request_reply() {
+    if (orders_->at_work.load(std::memory_order_acquire) != Orders::kTendon) order(Orders::kTendon);
+    exchange();
   }
 
  private:
@@ -392,7 +408,24 @@ class RoundTrip {
   std::size_t force_bytes_ = 0;
 };
 
+class TendonClient : public EchoClient {
+ public:
+  TendonClient(const Options& options, std::optional<Suite> suite)
+      : round_trip_(options, Wait::kBlocking, Way::kUdp, suite) {}
+  bool request_reply() override {
+    round_trip_.request_reply();
+    return true;
+  }
+
+ private:
+  RoundTrip round_trip_;
+};
+
 }  // namespace
+
+std::unique_ptr<EchoClient> tendon_echo_client(std::optional<Suite> suite, Duration reply_delay, int priority) {
+  return std::make_unique<TendonClient>(Options{.priority = priority, .reply_delay = reply_delay}, suite);
+}
 
 void measure_round_trip(Run& run) {
   Options options;

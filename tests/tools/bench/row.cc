@@ -10,7 +10,6 @@
 #include <thread>
 
 #include "server/build_info.h"
-#include "tests/support/json_line.h"
 
 namespace tendon::bench {
 namespace {
@@ -115,7 +114,7 @@ std::string to_text(const Circumstances& c) {
          (c.quick ? "; --quick: too short for valid figures" : "") + "\n";
 }
 
-std::string to_json(const Row& row) {
+JsonLine line_of(const Row& row) {
   JsonLine json;
   json.add("section", row.section)
       .add("what", row.what)
@@ -130,7 +129,8 @@ std::string to_json(const Row& row) {
       .add("instructions", row.instructions);
   if (row.target) json.add("target", row.target->text).add("met", row.target->met);
   for (const auto& [name, value] : row.figures) json.add(name.c_str(), value);
-  return json.add("note", row.note).str();
+  json.add("note", row.note);
+  return json;
 }
 
 std::string to_json(const Circumstances& c) {

@@ -8,6 +8,8 @@
 #include <utility>
 #include <vector>
 
+#include "tests/support/json_line.h"
+
 namespace tendon::bench {
 
 /// The cost of a part of Tendon and the machine's minimum for the same work (the baseline), measured alternately.
@@ -60,7 +62,7 @@ inline constexpr std::string_view kPageBegins = "# What things cost";
 std::string heading();
 std::string to_text(const Row& row);
 std::string to_text(const Circumstances& circumstances);
-std::string to_json(const Row& row);
+JsonLine line_of(const Row& row);
 std::string to_json(const Circumstances& circumstances);
 std::string to_markdown(const Circumstances& circumstances, const std::vector<Row>& rows);
 

@@ -16,6 +16,7 @@
 #include "server/recording/step_flight.h"
 #include "tests/tools/bench/bench.h"
 #include "tests/tools/bench/measure.h"
+#include "tests/tools/bench/other_process.h"
 #include "tests/tools/lab/experiments/paper.h"
 
 namespace tendon::bench {

@@ -46,6 +46,7 @@
 #include "tests/e2e/stage/process.h"
 #include "tests/tools/bench/bench.h"
 #include "tests/tools/bench/measure.h"
+#include "tests/tools/bench/other_process.h"
 
 namespace tendon::bench {
 namespace {

@@ -8,6 +8,7 @@
 #include "core/haptic_controller.h"
 #include "tests/tools/bench/bench.h"
 #include "tests/tools/bench/measure.h"
+#include "tests/tools/bench/other_process.h"
 #include "tests/tools/lab/experiments/paper.h"
 #include "tests/tools/worlds/drawn_world.h"
 #include "tests/tools/worlds/explore.h"
