@@ -145,6 +145,71 @@ TEST(Tools, ATableThatTheDiskHasNoRoomForIsAFailureWithASentence) {
   EXPECT_NE(replay.err().find(table.string()), std::string::npos) << replay.err();
 }
 
+TEST(Tools, AFolderWithoutWritePermissionIsNamed) {
+  const ScratchFolder folder;
+  SmallDisk disk(folder.path() / "disk", "16k");
+  if (disk.error() != 0) GTEST_SKIP() << disk.why_not();
+  ASSERT_TRUE(disk.make_read_only());
+  const std::string demo = demo_scene().string();
+  write(folder.path() / "delays.csv", "1\n2\n3\n");
+  for (const auto& [tool, arguments] : std::vector<std::pair<std::string, std::vector<std::string>>>{
+           {"tendon-lab", {"sweep", demo, "--network", "lan", "--for-s", "2", "--out", "disk"}},
+           {"tendon-lab", {"sweep", demo, "--network", "lan", "--for-s", "2", "--out", "disk/new"}},
+           {"tendon-lab", {"boundary", "--out", "disk/new"}},
+           {"tendon-inject", {"import", "csv", "delays.csv", "--out", "disk/run.csv"}},
+           {"tendon-sweep",
+            {"plan", "disk/plan", "--units", "1:5", "--per-shard", "1", "--", program("tendon-lab")}}}) {
+    SCOPED_TRACE(tool + " " + arguments.front());
+    Process process(program(tool), arguments, folder.path());
+    EXPECT_EQ(process.wait(), 1) << process.out() << process.err();
+    EXPECT_TRUE(has(process.err(), "disk")) << process.err();
+    EXPECT_TRUE(has(process.err(), "Read-only file system") || has(process.err(), "write permission")) << process.err();
+  }
+}
+
+TEST(Tools, AnExperimentThatCannotBeRunIsRefusedWithTheReason) {
+  const ScratchFolder folder;
+  const auto scene = [](const char* name) { return demo_scene().replace_filename(name).string(); };
+  const std::string demo = demo_scene().string();
+  write(folder.path() / "letter.pcap", "a letter to a friend\n");
+  write(folder.path() / "empty.pcap", "");
+  struct Case {
+    std::vector<std::string> command;
+    int exit_code;
+    std::string says;
+  };
+  for (const Case& one : std::vector<Case>{
+           {{"tendon-lab", "sweep", scene("fleet.toml"), "--network", "lan"}, 2, "expected a scene with one device"},
+           {{"tendon-lab", "sweep", scene("leader.toml"), "--network", "lan"}, 2, "expected a scene without [teleop"},
+           {{"tendon-lab", "sweep", scene("falcon.toml"), "--network", "lan"}, 2, "expected a simulated device"},
+           {{"tendon-lab", "sweep", scene("handle.toml"), "--network", "lan", "--law", "energy-bounding"},
+            2,
+            "the other laws only limit the force on a point"},
+           {{"tendon-lab", "sweep", demo, "--network", "delay=10:0:5ms"}, 2, "expected a range A:B:STEP"},
+           {{"tendon-lab", "sweep", demo, "--network", "loss={}"}, 2, "expected a value on both sides of each comma"},
+           {{"tendon-lab", "sweep", demo, "--network", "lan", "--stiffness", "500:100:100"}, 2, "--stiffness"},
+           {{"tendon-lab", "sweep", demo, "--network", "trace:none.csv"}, 1, "cannot read trace none.csv"},
+           {{"tendon-lab", "sweep", demo, "--network", "trace:letter.pcap"}, 1, "letter.pcap"},
+           {{"tendon-inject", "import", "pcap", "none.pcap", "letter.pcap", "--port", "1", "--out", "x.csv"},
+            1,
+            "none.pcap"},
+           {{"tendon-inject", "import", "pcap", "letter.pcap", "letter.pcap", "--port", "1", "--out", "x.csv"},
+            1,
+            "letter.pcap: expected a capture (pcap or pcapng), found another file"},
+           {{"tendon-inject", "import", "pcap", "empty.pcap", "empty.pcap", "--port", "1", "--out", "x.csv"},
+            1,
+            "empty.pcap: expected a capture (pcap or pcapng), found less than 4 bytes"}}) {
+    std::string line;
+    for (const std::string& word : one.command) line += word + " ";
+    SCOPED_TRACE(line);
+    Process process(program(one.command.front()), {one.command.begin() + 1, one.command.end()}, folder.path());
+    EXPECT_EQ(process.wait(), one.exit_code) << process.err();
+    EXPECT_TRUE(has(process.err(), one.says)) << process.err();
+    EXPECT_EQ(process.out(), "");
+    EXPECT_FALSE(std::filesystem::exists(folder.path() / "x.csv"));
+  }
+}
+
 // Uses bash, because `head` must exit while the bench is still writing. Exit code 124 would come from timeout.
 TEST(Tools, TheBenchEndsWhenItsReaderGoes) {
   const ScratchFolder folder;

@@ -27,6 +27,8 @@ class SmallDisk {
 
   const std::filesystem::path& path() const noexcept { return path_; }
   int error() const noexcept { return error_; }
+  /// Root ignores the permissions of files, but not this.
+  bool make_read_only() { return ::mount(nullptr, path_.c_str(), nullptr, MS_REMOUNT | MS_RDONLY, nullptr) == 0; }
   std::string why_not() const {
     return "may not mount a small tmpfs here (" + std::system_category().message(error_) +
            "); run as root to test what a full disk does";

@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // tendon-inject: a reproducible bad network as a UDP proxy. Options are in command_line.cc.
+#include <cerrno>
 #include <exception>
+#include <filesystem>
 #include <fstream>
 #include <iostream>
 #include <optional>
 #include <stdexcept>
+#include <system_error>
 #include <utility>
 
 #include "server/machine/regular_file.h"
@@ -17,6 +20,16 @@
 
 namespace tendon::injector {
 namespace {
+
+/// Replaces the file, if it is a trace.
+std::ofstream opened_trace(const std::filesystem::path& file) {
+  expect_replaceable(file, {kTraceBegins});
+  std::ofstream stream(file, std::ios::binary);
+  if (!stream) {
+    throw std::runtime_error("cannot write " + file.string() + ": " + std::generic_category().message(errno));
+  }
+  return stream;
+}
 
 Tap read_tap(const std::filesystem::path& file) {
   std::ifstream from = open_regular_file(file);
@@ -75,9 +88,7 @@ struct Runner {
     std::ofstream file;
     std::optional<TraceWriter> trace;
     if (!task.record.empty()) {
-      expect_replaceable(task.record, {kTraceBegins});
-      file.open(task.record, std::ios::binary);
-      if (!file) throw std::runtime_error("--record: cannot write " + task.record.string());
+      file = opened_trace(task.record);
       trace.emplace(file, network.header());
     }
     if (!task.run.json) std::cout << "seed " << network.seed << "\n";
@@ -95,11 +106,9 @@ struct Runner {
 
   int operator()(const ImportTask& task) const {
     const Trace trace = imported(task);
-    expect_replaceable(task.to, {kTraceBegins});
-    std::ofstream to(task.to, std::ios::binary);
+    std::ofstream to = opened_trace(task.to);
     write_trace(to, trace);
-    to.flush();
-    if (!to) throw std::runtime_error("cannot write " + task.to.string());
+    if (!to.flush()) throw std::runtime_error("cannot write " + task.to.string() + ": is the disk full?");
     std::cerr << import_summary(trace);
     if (task.server.empty() && task.options.share == Share::kHalves)
       std::cerr << "each delay is half of a round trip\n";
