@@ -13,7 +13,7 @@
 namespace tendon::sweep {
 namespace {
 
-std::string text_of(const Plan& plan) {
+std::string file_of(const Plan& plan) {
   nlohmann::ordered_json json;
   json["program"] = plan.program.string();
   json["sha256"] = plan.sha256;
@@ -41,7 +41,7 @@ void write_plan(const std::filesystem::path& folder, const Plan& plan) {
   if (plan.per_shard == 0) throw std::invalid_argument("--per-shard 0: expected 1 or more");
   std::filesystem::create_directories(folder);
   const std::filesystem::path file = folder / "plan.json";
-  if (keep(file, text_of(plan)) == Kept::kOther) {
+  if (keep(file, file_of(plan)) == Kept::kOther) {
     throw std::runtime_error(file.string() + " is a different plan: each sweep requires its own folder");
   }
 }
