@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "core/field/brick_field.h"
+#include "core/field/fixture.h"
+#include "core/field/material.h"
+#include "core/field/primitives.h"
+
+namespace tendon::field {
+
+/// Everything that an engine uploads about one object. The solid is the union of all shapes:
+///     φ = the smallest φ of the bricks and the primitives
+/// Built outside of the haptic thread.
+struct Field {
+  static constexpr std::size_t kMostPrimitives = 32;
+  static constexpr std::size_t kMostMaterials = 32;
+  static constexpr std::size_t kMostFixtures = 16;
+  static constexpr double kPrimitiveSpacing = 1e-3;  ///< m, the spacing of a field without bricks
+
+  const BrickField* bricks = nullptr;  ///< may be null; not owned
+  std::vector<Primitive> primitives{};
+  std::vector<Material> materials{Material{}};
+  std::vector<Fixture> fixtures{};
+
+  /// Throws std::invalid_argument with the name of the field if there are too many parts, if a part is out of its range,
+  /// if a material is stiffer than `max_stiffness` (N/m), or if a primitive has a material that does not exist.
+  void expect_valid(double max_stiffness) const;
+
+  bool has_surface() const noexcept { return bricks != nullptr || !primitives.empty(); }
+
+  /// Realtime-safe: yes.
+  SurfacePoint at(const Vec3& x) const noexcept;
+  double spacing() const noexcept { return bricks != nullptr ? bricks->lattice().spacing : kPrimitiveSpacing; }
+};
+
+}  // namespace tendon::field

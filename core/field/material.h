@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+
+namespace tendon::field {
+
+/// A correction of the force over depth, in N: knot i is the correction at i · step, linear in between, constant beyond
+/// the last. The correction at depth 0 is 0.
+struct DepthTable {
+  static constexpr std::size_t kKnots = 16;
+  double step = 1e-3;                      ///< m
+  std::array<double, kKnots + 1> force{};  ///< N; force[0] = 0
+  bool used = false;                       ///< false: all zero
+};
+
+/// How a surface answers at the depth d = ‖p − x‖ of the hand x below the proxy p: a spring, beside a spring in series
+/// with a damper (a Maxwell branch), whose dent z relaxes.
+///     V(w, z) = ½ k₁ w² + C(w) + ½ k_m (w − z)²                    J;  C: integral of the table
+///     U(d, z) = V(w, z),   w = max(d, w*),   w* = argmin V(·, z)
+///     U′(d)   = k₁ d + c(d) + k_m (d − z) if d > w*, otherwise 0   N;  above its dent a surface is not felt
+///     z ← z + (w − z) T/(τ + T)                                    lowers U for every T
+/// U is convex in d and in z, and U(0, 0) = 0. `most_stiffness` bounds U″ and U′/d. There is no damper beside the
+/// springs.
+///
+/// Source: Fung, *Biomechanics*, 2nd ed., 1993, chapter 2 (standard linear solid). The proofs are in
+/// core/field/README.md. Realtime-safe: yes.
+struct Material {
+  static constexpr double kMostFriction = 2;
+  static constexpr double kLeastTau = 0.01;
+  static constexpr double kMostTau = 10;
+  static constexpr double kLeastShare = 0.1;  ///< c′ is at least −(1 − kLeastShare) k₁
+
+  double stiffness = 1000;  ///< k₁, N/m, > 0
+  double branch = 0;        ///< k_m, N/m, ≥ 0
+  double tau = 0.2;         ///< s, kLeastTau … kMostTau
+  double friction = 0;      ///< μ, 0 … kMostFriction
+  DepthTable table{};
+
+  /// Throws std::invalid_argument with the name of the field if a number is out of its range, or if the stiffness with
+  /// the branch exceeds `max_stiffness`.
+  void expect_valid(double max_stiffness) const;
+
+  double energy(double depth, double dent) const noexcept;                  ///< U, J
+  double force(double depth, double dent) const noexcept;                   ///< U′, N
+  double spring(double depth, double dent) const noexcept;                  ///< U′ without the table, N
+  double slope(double depth, double dent) const noexcept;                   ///< U″, N/m
+  double rest(double dent) const noexcept;                                  ///< w*, m
+  double relaxed(double depth, double dent, double period) const noexcept;  ///< z after `period` s
+
+  /// Returns the largest depth ≤ `most` with U(depth, dent) ≤ `energy`, or 0 if there is none.
+  double depth_of(double energy, double dent, double most) const noexcept;
+
+  double most_stiffness() const noexcept;          ///< K, N/m
+  double correction(double depth) const noexcept;  ///< c, N
+};
+
+/// Returns a material between two: `share` 0 is `from`, 1 is `to`. The tables must have the same step.
+Material blended(const Material& from, const Material& to, double share) noexcept;
+
+/// Clamps the table from knot to knot, so that its slope is between −(1 − kLeastShare) k₁ and `most_slope` (N/m).
+void bound_table(Material& material, double most_slope) noexcept;
+
+}  // namespace tendon::field
