@@ -122,8 +122,18 @@ Prediction reconstruct(const RemoteForce& answer, const Vec3& position) noexcept
   const double answered = n.dot(answer.force);
   const double share = answered > 0 ? std::clamp(along.force / answered, 0.0, 1.0) : 1.0;
   const Mat3 across = Mat3::Identity() - n * n.transpose();
-  return {.force = along.force * n + share * (across * linear.force),
-          .stiffness = n * along.gradient.transpose() + share * (across * linear.stiffness)};
+  Vec3 tangential = share * (across * linear.force);
+  Mat3 sticking = share * (across * linear.stiffness);
+  if (!std::isfinite(model.valid_radius)) {
+    const double rubs = (across * answer.force).norm();
+    const double most = answered > 0 ? rubs * (std::max(along.force, 0.0) / answered) : rubs;
+    const double size = tangential.norm();
+    if (size > most * (1 + 1e-12)) {  // not by rounding
+      tangential *= most / size;
+      sticking.setZero();
+    }
+  }
+  return {.force = along.force * n + tangential, .stiffness = n * along.gradient.transpose() + sticking};
 }
 
 }  // namespace tendon

@@ -106,6 +106,24 @@ TEST(Answer, WhatRubsAcrossFadesWithWhatItIsPressedBy) {
   EXPECT_EQ(reconstruct(with_table(), deeper_by(-0.0045)).force, Vec3::Zero());
 }
 
+TEST(Answer, WithoutARadiusAStickingForceStaysInTheConeOfItsAnswer) {
+  RemoteForce answer = with_table();  // 0.4 N across at 2 N
+  const auto across = [&](double depth, double x) {
+    return reconstruct(answer, deeper_by(depth) + Vec3(x, 0, 0)).force.x();
+  };
+  EXPECT_NEAR(across(0, -0.01), 0.4, 1e-12);  // not 1.4 N
+  EXPECT_NEAR(across(0, 0.006), -0.2, 1e-12);
+  EXPECT_NEAR(across(0, 0.02), -0.4, 1e-12);
+  EXPECT_NEAR(across(0.001, -0.01), 0.4 * 3.5 / 2, 1e-12);
+  EXPECT_NEAR(across(-0.001, -0.01), 0.2, 1e-12);
+  EXPECT_EQ(reconstruct(answer, deeper_by(0) + Vec3(0.02, 0, 0)).stiffness.row(0).norm(), 0);
+  answer.model->valid_radius = 0.01;  // here the engine has said where sticking ends
+  EXPECT_NEAR(across(0, -0.01), 1.4, 1e-12);
+  answer = RemoteForce{.model = LocalModel{.stiffness = 100 * Mat3::Identity()}};
+  answer.model->contact = Contact{.normal = Vec3::UnitZ(), .gap = 0.001};  // nothing is touched yet
+  EXPECT_EQ(reconstruct(answer, Vec3(0.01, 0, 0)).force, Vec3::Zero());
+}
+
 TEST(Answer, ATableReplacesStiffnessAlongTheNormalWithinItsEnds) {
   const RemoteForce answer = with_table();
   const auto along = [&](double depth) { return reconstruct(answer, deeper_by(depth)); };
