@@ -14,8 +14,9 @@ namespace tendon::field {
 /// A signed distance field of any shape: bricks of 8³ weights of a quadratic B-spline, only where the surface is near.
 ///     φ(x) = scale Σ_ijk w_ijk β(s₁ − i) β(s₂ − j) β(s₃ − k),   s = (x − origin)/h
 ///     β(t) = 3/4 − t² for |t| ≤ 1/2,   ½(3/2 − |t|)² for |t| ≤ 3/2,   otherwise 0
-/// φ and ∇φ are continuous. This loses 0.6 µJ on a loop on which a trilinear field loses 900 µJ (leak_test.cc). Weights
-/// are the values of φ after the prefilter (−1, 10, −1)/8 along each axis, because β smooths.
+/// φ and ∇φ are continuous near the surface. On a loop on which a proxy on a trilinear field loses 500 µJ, one on this
+/// field loses 4 µJ (tests/core/field/leak_test.cc). Weights are the values of φ after the prefilter (−1, 10, −1)/8 along
+/// each axis, because β smooths.
 ///
 /// Every node within kBand spacings of the surface must be in a brick. Elsewhere a coarse lattice with one cell per brick
 /// gives a lower bound of |φ| and no gradient:

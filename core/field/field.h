@@ -13,6 +13,7 @@ namespace tendon::field {
 
 /// Everything that an engine uploads about one object. The solid is the union of all shapes:
 ///     φ = the smallest φ of the bricks and the primitives
+/// Where two of them meet, they should overlap by 1 mm or more, because the proxy can slide into a seam.
 /// Built outside of the haptic thread.
 struct Field {
   static constexpr std::size_t kMostPrimitives = 32;

@@ -25,12 +25,13 @@ struct Proxy {
 ///                 p towards x by h/4 if x is outside of the tangent plane
 ///                 p along the tangent of p − x, by t − μ n if this is positive, at most 2 h, and a Newton step
 /// where n and t are the normal and the tangential distance from p to x: the proxy stops on the border of the friction
-/// cone. Without h/4, a hand that grazes a surface would be dragged. A wall may be as thin as h: p never enters it by
+/// cone. In a concave edge that is sharper than n, this overshoots: if t − μ n changes its sign by more than half, p goes
+/// to the zero of the chord. Without h/4, a hand that grazes a surface would be dragged. A wall may be as thin as h: p never enters it by
 /// more than h/2 in one step. If the gradient is unknown, deep in a solid, p is x.
 ///
 /// `Surface` has `SurfacePoint at(Vec3)` and `double spacing()` (h, m). Source: Zilles and Salisbury, "A constraint-based
 /// god-object method for haptic display", IROS 1995; Ruspini, Kolarov and Khatib, SIGGRAPH 1997; Hart, "Sphere tracing",
-/// The Visual Computer 12, 1996. Realtime-safe: as `Surface::at`, which is called four times at most.
+/// The Visual Computer 12, 1996. Realtime-safe: as `Surface::at`, which is called six times at most.
 template <class Surface>
 Proxy moved(const Surface& surface, const Proxy& before, const Vec3& x, double friction) noexcept {
   const double least = surface.spacing() / 4;
@@ -76,9 +77,21 @@ Proxy moved(const Surface& surface, const Proxy& before, const Vec3& x, double f
     const double side = along.norm();
     const double slide = side - friction * depth;
     if (!(slide > 0)) break;
-    proxy.position += along * (std::min(slide, most_slide) / side);
-    const SurfacePoint there = surface.at(proxy.position);
-    const double there_steep = there.gradient.norm();
+    const Vec3 from = proxy.position;
+    const double way = std::min(slide, most_slide);
+    proxy.position += along * (way / side);
+    SurfacePoint there = surface.at(proxy.position);
+    double there_steep = there.gradient.norm();
+    if (!(there_steep > 1e-6)) continue;
+    newton(there, there_steep);
+    const Vec3 normal = there.gradient / there_steep;
+    const Vec3 left = x - proxy.position;
+    const double left_depth = -left.dot(normal);
+    const double excess = (left + left_depth * normal).dot(along) / side - friction * std::max(left_depth, 0.0);
+    if (!(excess < -0.5 * way)) continue;
+    proxy.position = from + (proxy.position - from) * (way / (way - excess));
+    there = surface.at(proxy.position);
+    there_steep = there.gradient.norm();
     if (there_steep > 1e-6) newton(there, there_steep);
   }
   return proxy;

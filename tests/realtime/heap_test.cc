@@ -8,6 +8,7 @@
 #include <memory>
 #include <string>
 
+#include "core/field/renderer.h"
 #include "devices/safety/safe_device.h"
 #include "devices/simulated/profiles.h"
 #include "devices/simulated/simulated_device.h"
@@ -95,6 +96,34 @@ TEST(HapticLoop, AMillionStepsMakeNoHeapCall) {
   }
   EXPECT_EQ(calls, 0U);
   EXPECT_GT(limited, 500U);
+}
+
+// A field of bricks and a fixture on a moving object, with swaps, tables that learn, and a tank.
+TEST(FieldRenderer, TenThousandStepsMakeNoHeapCall) {
+  field::BrickField bricks;
+  field::sample([](const Vec3& x) { return x.norm() - 0.03; }, Vec3::Constant(-0.04), Vec3::Constant(0.04), 2e-3,
+                bricks);
+  field::Field first{.bricks = &bricks, .materials = {{.stiffness = 600, .branch = 300, .friction = 0.3}}};
+  first.fixtures = {{.kind = field::Fixture::Kind::kLine, .stiffness = 100}};
+  field::Field second{.bricks = &bricks, .materials = {{.stiffness = 900}}};
+  const auto renderer = std::make_unique<field::Renderer>(
+      field::Renderer::Config{.max_stiffness = 1500, .push = {.push_j = 0.01, .push_w = 0.1}});
+  std::uint64_t calls = 0;
+  int pressed = 0;
+  for (int k = 0; k < 10'000; ++k) {
+    const LocalTime now{milliseconds(k)};
+    const double t = 1e-3 * k;
+    const Vec3 x(0.01 * std::sin(3 * t), 0.01 * std::sin(2 * t), 0.029 + 0.003 * std::sin(5 * t));
+    const HeapGuard guard;
+    if (k % 1000 == 0) renderer->use(k % 2000 == 0 ? &first : &second, now);
+    if (k % 16 == 0) renderer->observe({.at = now, .velocity = {0.01, 0, 0}});
+    if (k % 16 == 8) renderer->observe(static_cast<std::uint64_t>(k) - 8, Vec3(0, 0, 1), now);
+    const auto rendered = renderer->render({.at = now, .position = x}, 0.1, static_cast<std::uint64_t>(k));
+    calls += guard.calls();
+    if (rendered.depth > 0) ++pressed;
+  }
+  EXPECT_EQ(calls, 0U);
+  EXPECT_GT(pressed, 3000);
 }
 
 // Four leaders engage, hold the clutch, stop sending, and change their shares.

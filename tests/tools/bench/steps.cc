@@ -3,10 +3,12 @@
 #include <chrono>
 #include <cmath>
 #include <cstring>
+#include <memory>
 
 #include "core/base/rotation.h"
 #include "core/estimation/velocity_estimator.h"
 #include "core/exchange/spsc_ring.h"
+#include "core/field/renderer.h"
 #include "core/haptic_controller.h"
 #include "core/ledger/energy_ledger.h"
 #include "core/ledger/output_bound.h"
@@ -181,6 +183,27 @@ void measure_steps(Run& run) {
                    blocks, kCalls, [&](std::size_t) { handle.step(places[++at % places.size()]); },
                    [&](std::size_t) { point.step(places[++at % places.size()]); }),
                "… of a handle that turns and grips: a wrench and a gripper", "the same step of a point");
+  run.add(row);
+
+  // A proxy that slides on a sphere of bricks with friction, 1 mm deep.
+  field::BrickField bricks;
+  field::sample([](const Vec3& x) { return x.norm() - 0.03; }, Vec3::Constant(-0.035), Vec3::Constant(0.035), 1e-3,
+                bricks);
+  const field::Field shape{.bricks = &bricks, .materials = {{.stiffness = 1000, .friction = 0.3}}};
+  const auto renderer = std::make_unique<field::Renderer>(field::Renderer::Config{});
+  renderer->use(&shape, now);
+  row = row_of(in_turns(
+                   blocks, kCalls,
+                   [&](std::size_t) {
+                     now += milliseconds(1);
+                     const Vec3& x = places[++at % places.size()].position;
+                     const Vec3 pressed = 0.029 * Vec3(x.x(), 5 * x.y(), 0.02).normalized();
+                     auto rendered = renderer->render({now, pressed, Vec3::Zero()}, 1, at);
+                     keep(rendered);
+                   },
+                   square_root_and_divide),
+               "field::Renderer::render, bricks", root);
+  row.target = Row::Target{"p99 ≤ 1 µs", row.p99 <= 1000};
   run.add(row);
 
   StepRecord record;
