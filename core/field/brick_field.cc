@@ -20,7 +20,7 @@ std::int16_t rounded_weight(double value) noexcept {
   return static_cast<std::int16_t>(portable::round(std::clamp(value, -kBiggestWeight, kBiggestWeight)));
 }
 
-/// Weights of β and β′ for the three nodes nearest to a position; t is the position less the middle node.
+/// Returns β and β′ at the three nearest nodes. t is the distance from the middle node in spacings.
 struct Taps {
   std::array<double, 3> value;
   std::array<double, 3> slope;
@@ -93,7 +93,7 @@ void BrickField::fill_apron(Brick& brick) noexcept {
   const auto index = [](const std::array<int, 3>& n) {
     return static_cast<std::size_t>(((n[2] + 1) * kWide + n[1] + 1) * kWide + n[0] + 1);
   };
-  // Faces first, then edges, then corners: what is missing continues along the first axis that leaves the brick.
+  // The order is faces, edges, corners. Missing weights are extrapolated along the first axis that leaves the brick.
   for (int leaving = 1; leaving <= 3; ++leaving) {
     std::array<int, 3> n{};
     for (n[2] = -1; n[2] <= kSide; ++n[2]) {
@@ -130,7 +130,7 @@ void BrickField::fill_apron(Brick& brick) noexcept {
   }
 }
 
-/// Takes distance and sign from the neighbours that a sweep in the direction `way` has visited.
+/// Computes distance and sign from the neighbours that were visited before in this direction.
 void BrickField::spread(int x, int y, int z, int way) noexcept {
   Cell& cell = cells_[cell_at(x, y, z)];
   if (cell.brick >= 0) return;
@@ -149,7 +149,7 @@ void BrickField::spread(int x, int y, int z, int way) noexcept {
         const int cells = std::abs(other.cells) + 1;
         if (cell.cells != 0 && std::abs(cell.cells) <= cells) continue;
         bool inside = other.cells < 0;
-        if (other.brick >= 0) {  // the sign of its node that is nearest to this cell
+        if (other.brick >= 0) {  // use the sign of the nearest node
           const auto node = [](int d) { return d == 0 ? kSide / 2 : d > 0 ? 1 : kSide; };
           const Brick& brick = bricks_[static_cast<std::size_t>(other.brick)];
           inside = brick.weights[static_cast<std::size_t>((node(dz) * kWide + node(dy)) * kWide + node(dx))] < 0;

@@ -15,17 +15,17 @@ namespace tendon::field {
 ///     φ(x) = scale Σ_ijk w_ijk β(s₁ − i) β(s₂ − j) β(s₃ − k),   s = (x − origin)/h
 ///     β(t) = 3/4 − t² for |t| ≤ 1/2,   ½(3/2 − |t|)² for |t| ≤ 3/2,   otherwise 0
 /// φ and ∇φ are continuous near the surface. On a loop on which a proxy on a trilinear field loses 500 µJ, one on this
-/// field loses 4 µJ (tests/core/field/leak_test.cc). Weights are the values of φ after the prefilter (−1, 10, −1)/8 along
-/// each axis, because β smooths.
+/// field loses 4 µJ (tests/core/field/leak_test.cc). Weights are the values of φ after the prefilter (−1, 10, −1)/8
+/// along each axis, because β smooths.
 ///
-/// Every node within kBand spacings of the surface must be in a brick. Elsewhere a coarse lattice with one cell per brick
-/// gives a lower bound of |φ| and no gradient:
+/// Every node within kBand spacings of the surface must be in a brick. Elsewhere a coarse lattice with one cell per
+/// brick gives a lower bound of |φ| and no gradient:
 ///     |φ| ≥ h + 8 h (c − 1),   c = cells to the nearest brick (Chebyshev)
 /// The sign is that of the neighbouring bricks. Outside the lattice, φ is that of its nearest point, plus the way to
 /// there if φ is positive.
 ///
 /// Source: Condat, Blu and Unser, "Beyond interpolation: optimal reconstruction by quasi-interpolation", ICIP 2005.
-/// Memory is taken by the constructor only: 2.3 MB. Thread-safe: `at` from several threads, the others alone.
+/// Only the constructor allocates memory (2.3 MB). Thread-safe: only `at`.
 class BrickField {
  public:
   static constexpr int kSide = 8;
@@ -37,14 +37,14 @@ class BrickField {
   static constexpr double kMostSpacing = 8e-3;
   static constexpr double kMostExtent = 2;  ///< m
 
-  using Place = std::array<std::uint16_t, 3>;        ///< of a brick in the lattice, in bricks
+  using Place = std::array<std::uint16_t, 3>;        ///< number of a brick along x, y and z
   using Weights = std::array<std::int16_t, kNodes>;  ///< x fastest, then y, then z
 
   struct Lattice {
     Vec3 origin = Vec3::Zero();  ///< node 0 of brick 0
     double spacing = 1e-3;       ///< h, m
     double scale = 1e-7;         ///< m per unit of a weight, > 0; 32767 units are at most kMostExtent
-    Place bricks{1, 1, 1};       ///< along x, y and z; at most kMostCells in all
+    Place bricks{1, 1, 1};       ///< along x, y and z
   };
 
   BrickField();

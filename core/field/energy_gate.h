@@ -6,13 +6,12 @@
 
 namespace tendon::field {
 
-/// The one rule of a field: its stored energy H rises only by energy that the hand has supplied, whatever has changed.
+/// Limits the stored energy H of a field to the energy that the hand has supplied, for every change of the field:
 ///     H ≤ H₀ + min(max(E − H₀, 0), P T) + tank
 /// E is the account of the limiter after booking the interval, and H₀ the stored energy with the old law, the old place
-/// of the proxy and the new hand. The tank is filled to `push_j` with `push_w`. What is taken from it is credited to the
-/// account, so an object can push a hand by at most push_j + push_w t. If several springs share a gate, H and H₀ are
-/// their sums, and they settle one after the other. See core/field/README.md.
-/// Realtime-safe: yes.
+/// of the proxy and the new hand. The tank is filled to `push_j` with `push_w`. What is taken from it is credited to
+/// the account, so an object can push a hand by at most push_j + push_w t. Several springs can share a gate. H and H₀
+/// are then sums. See core/field/README.md. Realtime-safe: yes.
 class EnergyGate {
  public:
   struct Config {
@@ -25,7 +24,7 @@ class EnergyGate {
 
   /// Starts a step of `period` s with E = `account`, ΣH₀ = `before` (J) and P = `power` (W).
   void open(double account, double before, double power, double period) noexcept {
-    budget_ = std::max(account - before, 0.0);
+    budget_ = std::max(0.0, account - before);  // 0 for NaN
     if (power < kNoLimit) budget_ = std::min(budget_, power * period);
     tank_ = std::min(config_.push_j, tank_ + config_.push_w * period);
     drawn_ = 0;
@@ -34,7 +33,8 @@ class EnergyGate {
   /// The most that a spring with H₀ = `before` may store.
   double most(double before) const noexcept { return before + budget_ + tank_; }
 
-  /// Books a spring that stores `now`, at most `most(before)`. A fall is the work of the hand, and pays for no other.
+  /// Books a spring that stores `now`, at most `most(before)`. Energy that is released here is not available to other
+  /// springs.
   void settle(double before, double now) noexcept {
     const double rise = std::max(now - before, 0.0);
     const double paid = std::min(rise, budget_);

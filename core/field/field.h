@@ -11,10 +11,10 @@
 
 namespace tendon::field {
 
-/// Everything that an engine uploads about one object. The solid is the union of all shapes:
+/// The description of one object that is uploaded by an engine. The solid is the union of all shapes:
 ///     φ = the smallest φ of the bricks and the primitives
 /// Where two of them meet, they should overlap by 1 mm or more, because the proxy can slide into a seam.
-/// Built outside of the haptic thread.
+/// Must be built outside the haptic thread.
 struct Field {
   static constexpr std::size_t kMostPrimitives = 32;
   static constexpr std::size_t kMostMaterials = 32;
@@ -26,8 +26,8 @@ struct Field {
   std::vector<Material> materials{Material{}};
   std::vector<Fixture> fixtures{};
 
-  /// Throws std::invalid_argument with the name of the field if there are too many parts, if a part is out of its range,
-  /// if a material is stiffer than `max_stiffness` (N/m), or if a primitive has a material that does not exist.
+  /// Throws std::invalid_argument with the name of the field if there are too many parts, if a part is out of its
+  /// range, if a material is stiffer than `max_stiffness` (N/m), or if a primitive has a material that does not exist.
   void expect_valid(double max_stiffness) const;
 
   bool has_surface() const noexcept { return bricks != nullptr || !primitives.empty(); }

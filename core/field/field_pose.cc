@@ -10,7 +10,7 @@ namespace {
 
 Quat small_turn(const Vec3& angle) noexcept { return unit({1, 0.5 * angle.x(), 0.5 * angle.y(), 0.5 * angle.z()}); }
 
-/// The rotation that leaves `share` of a small one.
+/// Scales a small rotation by `share`.
 Quat faded(const Quat& q, double share) noexcept {
   const double sign = q.w < 0 ? -1.0 : 1.0;
   return unit({share * sign * q.w + (1 - share), share * sign * q.x, share * sign * q.y, share * sign * q.z});

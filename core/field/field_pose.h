@@ -28,9 +28,9 @@ struct TimedPose {
   Vec3 angular_velocity = Vec3::Zero();  ///< rad/s, base frame axes
 };
 
-/// Where the object is now: the newest pose, extrapolated by dt = now − at, at most 50 ms either way.
+/// Computes the current pose of the object from the newest one, extrapolated by dt = now − at, limited to ± 50 ms:
 ///     position + v dt,   q(ω dt) · turn   with q(θ) = (1, θ/2)/‖(1, θ/2)‖, which turns by 2 atan(‖θ‖/2)
-/// Longer extrapolation overshoots when an object stops. The difference between two poses fades with a time constant of
+/// Longer extrapolation overshoots if an object stops. The difference between two poses fades with a time constant of
 /// 15 ms, so that the object does not jump. Until the first pose, the object is at the origin of the base frame.
 /// Realtime-safe: yes.
 class FieldPose {
@@ -38,7 +38,7 @@ class FieldPose {
   static constexpr Duration kMostLead = std::chrono::milliseconds(50);
   static constexpr double kFade = 0.015;  ///< s
 
-  /// Takes a newer pose. Returns false and does nothing if it is not finite, not a rotation, or out of its bounds.
+  /// Takes a newer pose. Returns false and does nothing if a value is not finite or out of range.
   bool observe(const TimedPose& pose) noexcept;
 
   /// Returns the pose at `now`. Must be called once per haptic step of `period` s.
@@ -53,7 +53,7 @@ class FieldPose {
   bool fresh_ = false;   ///< not used yet
   bool placed_ = false;  ///< `used_` is a pose of the engine
   Pose used_{};
-  Vec3 rest_ = Vec3::Zero();  ///< m, difference that has not faded yet
+  Vec3 rest_ = Vec3::Zero();  ///< m, remaining difference from the previous pose
   Quat turn_rest_{};
 };
 

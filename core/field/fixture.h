@@ -17,7 +17,7 @@ struct Fixture {
 
   Kind kind = Kind::kPoint;
   Vec3 at = Vec3::Zero();
-  Vec3 direction = Vec3::UnitZ();                               ///< unit vector: along the line, or normal to the plane
+  Vec3 direction = Vec3::UnitZ();                               ///< unit vector along the line or normal to the plane
   double stiffness = 0;                                         ///< K, N/m, > 0
   double most_force = std::numeric_limits<double>::infinity();  ///< F_most, N, > 0
 

@@ -10,10 +10,10 @@
 namespace tendon::field {
 namespace {
 
-/// V along w is a parabola in each segment of the table: V′(w) = V′(start) + slope (w − start).
+/// In each segment of the table, V′ is linear: V′(w) = V′(start) + slope (w − start).
 struct Segment {
   double start = 0;  ///< m
-  double end = 0;    ///< m; +infinity for the last one
+  double end = 0;    ///< m
   double force = 0;  ///< N, V′ at the start
   double slope = 0;  ///< N/m, > 0
 };

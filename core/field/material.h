@@ -6,8 +6,8 @@
 
 namespace tendon::field {
 
-/// A correction of the force over depth, in N: knot i is the correction at i · step, linear in between, constant beyond
-/// the last. The correction at depth 0 is 0.
+/// The correction of the force in N as a function of the depth. Knot i is for the depth i · step. The table is linear
+/// between knots and constant beyond the last one. The correction at depth 0 is 0.
 struct DepthTable {
   static constexpr std::size_t kKnots = 16;
   double step = 1e-3;                      ///< m
@@ -15,14 +15,14 @@ struct DepthTable {
   bool used = false;                       ///< false: all zero
 };
 
-/// How a surface answers at the depth d = ‖p − x‖ of the hand x below the proxy p: a spring, beside a spring in series
+/// The force of a surface at the depth d = ‖p − x‖ of the hand x below the proxy p: a spring, beside a spring in series
 /// with a damper (a Maxwell branch), whose dent z relaxes.
 ///     V(w, z) = ½ k₁ w² + C(w) + ½ k_m (w − z)²                    J;  C: integral of the table
 ///     U(d, z) = V(w, z),   w = max(d, w*),   w* = argmin V(·, z)
-///     U′(d)   = k₁ d + c(d) + k_m (d − z) if d > w*, otherwise 0   N;  above its dent a surface is not felt
+///     U′(d)   = k₁ d + c(d) + k_m (d − z) if d > w*, otherwise 0   N;  there is no force above the dent
 ///     z ← z + (w − z) T/(τ + T)                                    lowers U for every T
-/// U is convex in d and in z, and U(0, 0) = 0. `most_stiffness` bounds U″ and U′/d. There is no damper beside the
-/// springs.
+/// U is convex in d and in z, and U(0, 0) = 0. `most_stiffness` bounds U″ and U′/d. There is no parallel
+/// damper.
 ///
 /// Source: Fung, *Biomechanics*, 2nd ed., 1993, chapter 2 (standard linear solid). The proofs are in
 /// core/field/README.md. Realtime-safe: yes.

@@ -6,18 +6,18 @@
 
 #include "core/base/motion.h"
 
-/// Fields: shapes that an engine describes once, and that the haptic thread renders. All lengths are in m. Without
-/// another note, positions are in the frame of the object.
+/// Fields: shapes that an engine describes once, and that the haptic thread renders. All lengths are in m. Positions
+/// are in the frame of the object unless noted otherwise.
 namespace tendon::field {
 
-/// What a shape says about one position.
+/// The signed distance and its gradient at a position.
 struct SurfacePoint {
   double distance = 0;           ///< φ: m to the surface, negative inside the solid
   Vec3 gradient = Vec3::Zero();  ///< ∇φ, of length 1 for primitives; zero if the direction is unknown
   std::uint8_t material = 0;     ///< index of the material of the nearest surface
 };
 
-/// The solid is where n·(x − at) < 0.
+/// A half-space. n·(x − at) is negative inside the solid.
 struct Plane {
   Vec3 at = Vec3::Zero();
   Vec3 normal = Vec3::UnitZ();  ///< n, a unit vector out of the solid
@@ -49,7 +49,7 @@ struct Primitive {
   std::uint8_t material = 0;
 };
 
-/// Throws std::invalid_argument with the name of the field if a number is not finite or out of its range.
+/// Throws std::invalid_argument with the name of the field if a value is not finite or out of range.
 void expect_valid(const Primitive& primitive);
 
 /// Returns φ and ∇φ of one primitive:

@@ -8,30 +8,31 @@
 
 namespace tendon::field {
 
-inline constexpr int kProxyRounds = 2;      ///< more rounds do not reduce the error
-inline constexpr double kOnSurface = 2e-6;  ///< m, a proxy this near to the surface is on it
+inline constexpr int kProxyRounds = 2;      ///< more rounds do not reduce the error of the force noticeably
+inline constexpr double kOnSurface = 2e-6;  ///< m, tolerance of contact
 
 struct Proxy {
   Vec3 position = Vec3::Zero();  ///< p
-  Vec3 normal = Vec3::UnitZ();   ///< out of the solid, at the last contact
+  Vec3 normal = Vec3::UnitZ();   ///< unit vector out of the solid, at the last contact
   std::uint8_t material = 0;     ///< at the last contact
   bool touching = false;
 };
 
-/// Moves the proxy (god object) after the hand x: it follows x in free space and stays on the surface in contact. In each
+/// Moves the proxy (god object) p towards the hand x. In contact, the proxy stays on the surface. In each
 /// of kProxyRounds rounds, with h the spacing of the field:
 ///     φ(p) > 0    p towards x by max(φ, h/4), at most to x                 sphere tracing
 ///     otherwise   p ← p − φ ∇φ/‖∇φ‖²                                       Newton's step, at most 3 h
 ///                 p towards x by h/4 if x is outside of the tangent plane
 ///                 p along the tangent of p − x, by t − μ n if this is positive, at most 2 h, and a Newton step
 /// where n and t are the normal and the tangential distance from p to x: the proxy stops on the border of the friction
-/// cone. In a concave edge that is sharper than n, this overshoots: if t − μ n changes its sign by more than half, p goes
-/// to the zero of the chord. Without h/4, a hand that grazes a surface would be dragged. A wall may be as thin as h: p never enters it by
-/// more than h/2 in one step. If the gradient is unknown, deep in a solid, p is x.
+/// cone. In a concave edge that is sharper than n, this overshoots: if t − μ n changes its sign by more than half, p
+/// goes to the zero of the chord. The minimum of h/4 prevents drag near a surface. A wall must be at least h
+/// thick. If the gradient is unknown, deep in a solid, p is x.
 ///
-/// `Surface` has `SurfacePoint at(Vec3)` and `double spacing()` (h, m). Source: Zilles and Salisbury, "A constraint-based
-/// god-object method for haptic display", IROS 1995; Ruspini, Kolarov and Khatib, SIGGRAPH 1997; Hart, "Sphere tracing",
-/// The Visual Computer 12, 1996. Realtime-safe: as `Surface::at`, which is called six times at most.
+/// `Surface` has `SurfacePoint at(Vec3)` and `double spacing()` (h, m). Source: Zilles and Salisbury, "A
+/// constraint-based god-object method for haptic display", IROS 1995; Ruspini, Kolarov and Khatib, SIGGRAPH 1997; Hart,
+/// "Sphere tracing", The Visual Computer 12, 1996. `Surface::at` is called at most six times. Realtime-safe: yes, if
+/// `Surface::at` is.
 template <class Surface>
 Proxy moved(const Surface& surface, const Proxy& before, const Vec3& x, double friction) noexcept {
   const double least = surface.spacing() / 4;

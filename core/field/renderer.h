@@ -14,7 +14,7 @@
 
 namespace tendon::field {
 
-/// Renders a field in the haptic thread, so that the delay of the engine does not matter while the field is right.
+/// Renders a field in the haptic thread. The force then does not depend on the delay of the engine.
 /// With the hand x, the proxy p, the depth d = ‖p − x‖ and the dent z, in every step in this order:
 ///     1  E is the account of the limiter after it has booked the interval
 ///     2  H₀ = ΣU_old(d, z)           old law, old place of p, new hand
@@ -37,31 +37,31 @@ class Renderer {
   static constexpr double kSwapSpeed = 0.2;  ///< m/s
   static constexpr Duration kSwapTime = std::chrono::milliseconds(200);
   static constexpr double kBlend = 0.05;       ///< s
-  static constexpr double kMostPeriod = 0.01;  ///< s; a longer step counts as this
+  static constexpr double kMostPeriod = 0.01;  ///< s, maximum used time of a step
 
   struct Config {
-    double max_stiffness = 1500;  ///< N/m, > 0; of a material with its table
-    EnergyGate::Config push{};    ///< the energy that moving objects may give to the hand
+    double max_stiffness = 1500;  ///< N/m, > 0; maximum slope of a material with its table
+    EnergyGate::Config push{};    ///< energy that a moving object can transfer to the hand
     bool learns = true;           ///< true forces teach the tables of the materials (Residual)
     bool holds = true;            ///< the rest of a true force is held
   };
 
   struct Rendered {
-    Vec3 force = Vec3::Zero();      ///< N, on the hand, base frame
+    Vec3 force = Vec3::Zero();      ///< N, on the hand
     Mat3 stiffness = Mat3::Zero();  ///< N/m, along the normal of the contact and to the fixtures
     double stored = 0;              ///< H, J
     double depth = 0;               ///< d, m
     Vec3 proxy = Vec3::Zero();      ///< p, base frame
     double refused = 0;             ///< J that the gate refused in this step
     double credit = 0;      ///< J from the tank, to be credited to the account before the limiter bounds the force
-    bool swapping = false;  ///< the limits after a swap are in force
+    bool swapping = false;  ///< true while the limits after a swap are used
   };
 
   /// Throws std::invalid_argument with the name of the field if it is out of range.
   explicit Renderer(const Config& config);
 
-  /// Replaces the field; null ends the rendering in one step. `field` must be valid and outlive its use. The tables of
-  /// materials that are the same in both fields are kept.
+  /// Replaces the field, or removes it if the pointer is null. `field` must be valid and outlive its use. Learned
+  /// tables are kept if the material does not change.
   void use(const Field* field, LocalTime now) noexcept;
 
   /// See FieldPose::observe.
@@ -76,7 +76,7 @@ class Renderer {
   const Material& material(std::size_t index) const noexcept { return materials_[index]; }
 
  private:
-  /// A spring from the hand to its own p: that of a fixture.
+  /// The spring of a fixture and its p.
   struct Pull {
     Fixture law{};
     Vec3 place = Vec3::Zero();  ///< p in the base frame

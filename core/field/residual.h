@@ -12,16 +12,16 @@
 
 namespace tendon::field {
 
-/// Learns from the true forces of the engine what a field does not know. A truth F_k answers the step k, and is compared
-/// with what the field gave in step k, so the delay does not matter. With the depth d, the direction n of the force and
-/// the spring part f of step k, without the table c of its material:
-///     e = F_k·n − f − c(d)             N, if the hand was deeper than 0.2 mm
+/// Corrects the errors of a field. A true force F_k is compared with the force of the
+/// field in the same step k, so the result does not depend on the delay. With the depth d, the direction n of the force
+/// and the spring part f of step k, without the table c of its material:
+///     e = F_k·n − f − c(d)             N, if the depth was above 0.2 mm
 ///     c_i ← c_i + 0.3 w_i e/Σw²        for the two knots beside d with the weights w of the interpolation; c₀ = 0
 ///     r = F_k − (f + c(d)) n           N, the rest, with the new table
-/// Depth → force is a map without a time, so the table is the same for every delay. The rest is held:
+/// The table does not depend on time, so it is the same for every delay. The rest is held:
 ///     F = min(1, d/0.3 mm) (r e^(−age/0.1 s − ‖x − x_k‖²/2(3 mm)²) + r₀)
 /// with r₀ chosen such that F does not jump at a truth; it fades with 12 ms. The table belongs to the material, so the
-/// energy gate and `most_stiffness` cover it. For the held rest, only the limiter answers.
+/// energy gate and `most_stiffness` cover it. The held rest is only bounded by the limiter.
 /// Realtime-safe: yes.
 class Residual {
  public:
@@ -33,7 +33,7 @@ class Residual {
   static constexpr double kReach = 3e-3;       ///< m
   static constexpr double kEase = 0.012;       ///< s
 
-  /// What the field gave in one step.
+  /// The force of the field in one step.
   struct Given {
     std::uint64_t tick = 0;
     Vec3 hand = Vec3::Zero();
@@ -51,7 +51,7 @@ class Residual {
   bool learn(std::uint64_t tick, const Vec3& truth, LocalTime now, double max_stiffness,
              std::span<Material> materials) noexcept;
 
-  /// Returns the held rest (N, on the hand) at `hand`. Must be called once per haptic step of `period` s.
+  /// Returns the held force (N, on the hand) at `hand.position`. Must be called once per haptic step of `period` s.
   Vec3 held(const Motion& hand, double depth, double period) noexcept;
 
   void forget() noexcept { *this = Residual(); }
@@ -65,7 +65,7 @@ class Residual {
   Vec3 place_ = Vec3::Zero();             ///< x_k
   LocalTime learned_at_{};
   Vec3 ease_ = Vec3::Zero();   ///< r₀
-  Vec3 given_ = Vec3::Zero();  ///< the last held force, without the factor of the depth
+  Vec3 given_ = Vec3::Zero();  ///< N, before it is scaled with the depth
 };
 
 }  // namespace tendon::field

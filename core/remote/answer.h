@@ -42,9 +42,9 @@ Vec3 within(const LocalModel& model, const Vec3& position) noexcept;
 /// s = N / (n·force), clamped to [0, 1]: the tangential force fades with the normal force. The stiffness is −∂F/∂x for
 /// constant s. The stiffness is zero outside the radius, outside the table, and in segments of the table that decrease.
 ///
-/// Cone: in a contact without a radius, where sticking ends is unknown. The tangential force is then shortened to that
-/// of the answer, scaled by N₊/(n·force): a surface whose answer needed the friction T/N has at least this friction. A
-/// shortened force has no stiffness. This also ends a tangential force before the gap is closed.
+/// Friction cone: if a contact has no radius, it is unknown when the tool starts to slide. The norm of the tangential
+/// force is then limited to that of the answer, scaled by N₊/(n·force), because the friction coefficient is at least
+/// that of the answer. If the limit is used, the tangential stiffness is zero.
 ///
 /// Source: this was compared with holding, with extrapolation in time and with secants. The table was best for less
 /// than 50 answers per second, and otherwise the stiffness (tests/tools/lab/experiments/reconstruction_test.cc).

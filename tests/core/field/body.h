@@ -19,7 +19,7 @@ struct Body {
   Vec3 x = Vec3::Zero();
   Vec3 v = Vec3::Zero();
 
-  /// Moves for 1 ms under a held force (N, on the hand).
+  /// Simulates 1 ms with a constant force (N, on the hand).
   void go(const Vec3& force, const Vec3& target, const Vec3& target_speed) {
     for (int i = 0; i < 20; ++i) {
       const Vec3 aim = target + (i * kStep) * target_speed;

@@ -44,7 +44,7 @@ TEST(BrickField, ValueAndGradientAreContinuousAcrossBricks) {
   Dice dice(2);
   int crossed = 0;
   for (int i = 0; i < 100'000; ++i) {
-    // Both sides of a border between two bricks, near the surface.
+    // Two positions on either side of the boundary between two bricks.
     Vec3 x = 0.04 * Vec3(dice.within(-1, 1), dice.within(-1, 1), dice.within(-0.4, 0.4));
     const auto axis = static_cast<Eigen::Index>(dice.bits() % 3);
     x[axis] = -0.04 + 2e-3 * (8 * std::round((x[axis] + 0.04) / 16e-3) - 0.5);
@@ -52,7 +52,7 @@ TEST(BrickField, ValueAndGradientAreContinuousAcrossBricks) {
     const Vec3 h = 1e-10 * Vec3::Unit(axis);
     const SurfacePoint a = field.at(x - h);
     const SurfacePoint b = field.at(x + h);
-    const bool on_surface = std::abs(torus(x)) < 0.2e-3;  // farther away, the aprons miss some neighbours
+    const bool on_surface = std::abs(torus(x)) < 0.2e-3;  // otherwise some neighbours of an apron can be missing
     EXPECT_NEAR(a.distance, b.distance, on_surface ? 1e-9 : 1e-6);
     EXPECT_LT((a.gradient - b.gradient).norm(), on_surface ? 1e-6 : 0.05);
     crossed += on_surface ? 1 : 0;

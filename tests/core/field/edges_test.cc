@@ -17,12 +17,12 @@ namespace {
 constexpr double kStiffness = 1000;
 
 struct Score {
-  double error = 0;      ///< % of the RMS of the exact force
+  double error = 0;      ///< RMS error in % of the exact force
   double jump = 0;       ///< N in a step of 1 ms
   double true_jump = 0;  ///< N, of the exact box
 };
 
-/// A hand that circles 2 mm below the faces of the cube, over edges and near corners, at about 0.1 m/s.
+/// The hand moves 2 mm below the faces of the cube, across edges and corners, at about 0.1 m/s.
 Vec3 hand(double t, bool inside) {
   const double turn = 2 * std::numbers::pi * t;
   const Vec3 n = Vec3(std::cos(0.41 * turn), std::sin(0.41 * turn), 0.9 * std::sin(0.17 * turn + 0.3));

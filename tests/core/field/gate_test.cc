@@ -9,6 +9,7 @@
 #include <array>
 #include <cstdint>
 #include <iostream>
+#include <limits>
 #include <memory>
 #include <string>
 #include <vector>
@@ -42,8 +43,8 @@ const std::array<BrickField, 4>& grids() {
 }
 
 struct Outcome {
-  double least = 0;        // J, the least E − H
-  double least_given = 0;  // J, the least E without what the tank has credited, plus push_j + push_w t
+  double least = 0;        // J, minimum of E − H
+  double least_given = 0;  // J, minimum of E without credits from the tank, plus push_j + push_w t
   int bound = 0;           // steps in which the gate refused energy
 };
 
@@ -74,7 +75,7 @@ TimedPose random_pose(Dice& dice, LocalTime now) {
           .angular_velocity = dice.within(0, 5) * dice.direction()};
 }
 
-/// The stiffness of a material with its table and of the fixture is at most share · 2b/T.
+/// Simulates one hand. The sum of all stiffnesses is at most share · 2b/T.
 Outcome run(std::uint64_t seed, double share, const EnergyGate::Config& push) {
   Dice dice(seed);
   const double fixtures = dice.chance(0.3) ? 0.3 * share * kMostStiffness : 0;
@@ -103,9 +104,9 @@ Outcome run(std::uint64_t seed, double share, const EnergyGate::Config& push) {
     if (style == 0) {
       v = 0.95 * v + 0.01 * dice.direction() - 0.015 * x;
       dx = v * kPeriod;
-    } else if (style == 1) {  // the worst motion of a hold
+    } else if (style == 1) {  // the motion that takes the most energy
       dx = (dice.chance(0.5) ? 1 : -1) * last.force * (kPeriod / (2 * kB)) + 2e-4 * dice.direction();
-    } else if (style == 2) {  // presses slowly, then jumps to the proxy
+    } else if (style == 2) {  // presses slowly and then returns to the proxy
       dx = k % 60 < 50 ? Vec3(-x.normalized() * (x.norm() > 0.036 ? 1e-3 : 4e-5)) : Vec3(last.proxy - x);
     } else {
       v = 0.98 * v + 0.02 * dice.direction();
@@ -179,12 +180,14 @@ TEST(FieldGate, SpringsSettleOneAfterTheOther) {
   EXPECT_EQ(gate.most(3), 3 + 6 + 1);
   gate.settle(3, 7);  // pays 4 of 6
   EXPECT_EQ(gate.most(1), 1 + 2 + 1);
-  gate.settle(1, 0);  // a fall pays for nobody
+  gate.settle(1, 0);  // a decrease is not available to other springs
   EXPECT_EQ(gate.most(0), 2 + 1);
   gate.settle(0, 2.5);
   EXPECT_EQ(gate.drawn(), 0.5);
   EXPECT_EQ(gate.tank(), 0.5);
   gate.open(0, 2, EnergyGate::kNoLimit, kPeriod);  // the account is below the stored energy
+  EXPECT_EQ(gate.most(2), 2 + 0.5);
+  gate.open(std::numeric_limits<double>::quiet_NaN(), 2, EnergyGate::kNoLimit, kPeriod);
   EXPECT_EQ(gate.most(2), 2 + 0.5);
   gate.open(10, 0, 0.2, kPeriod);
   EXPECT_EQ(gate.most(0), 0.2 * kPeriod + 0.5);

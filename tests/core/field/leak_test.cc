@@ -22,7 +22,7 @@ constexpr double kStiffness = 1000;
 constexpr double kSpacing = 2e-3;
 constexpr int kSteps = 10'000;
 
-/// Trilinear interpolation of the same weights' precision, for comparison.
+/// Trilinear interpolation with rounded values, for comparison.
 struct Trilinear {
   double spacing() const noexcept { return kSpacing; }
   SurfacePoint at(const Vec3& x) const noexcept {
@@ -87,9 +87,9 @@ std::vector<Vec3> loop(Dice& dice) {
 }
 
 struct Leak {
-  double gradient = 0;    ///< J, worst energy given out by −K φ ∇φ
-  double projection = 0;  ///< J, worst, by a spring to the memoryless projection of the hand
-  double proxy = 0;       ///< J, mean energy given out by the spring to a proxy
+  double gradient = 0;    ///< J, maximum work of the force −K φ ∇φ on the hand
+  double projection = 0;  ///< J, maximum work of a spring to the projection of the position
+  double proxy = 0;       ///< J, mean work of the spring to the proxy
   double proxy_most = -1;
 };
 

@@ -93,7 +93,7 @@ TEST(FieldMaterial, UnderAHeldHandTheBranchRelaxes) {
   EXPECT_NEAR(law.force(0.01, dent), 5, 1e-12);
   for (int k = 0; k < 100; ++k) dent = law.relaxed(0.01, dent, 1e-3);
   EXPECT_NEAR(law.force(0.01, dent), 2 + 3 * std::exp(-1), 0.01);
-  EXPECT_EQ(law.force(0.5 * law.rest(dent), dent), 0);  // above its dent the surface is not felt
+  EXPECT_EQ(law.force(0.5 * law.rest(dent), dent), 0);
 }
 
 TEST(FieldMaterial, ABlendIsLinearInTheForce) {
@@ -124,7 +124,7 @@ TEST(FieldFixture, PullsToAPointALineOrAPlaneUpToItsForce) {
     EXPECT_NEAR(law.distance_of(law.energy(d), 1), d, 1e-12);
     EXPECT_EQ(law.distance_of(law.energy(d), 0.5 * d), 0.5 * d);
   }
-  EXPECT_EQ((Fixture{.stiffness = 200}).energy(1), 100);  // without a limit of the force
+  EXPECT_EQ((Fixture{.stiffness = 200}).energy(1), 100);  // the force is not limited
 }
 
 }  // namespace

@@ -25,11 +25,11 @@ TEST(FieldProxy, OnAPlaneItStaysAboveTheHandAndOnTheBorderOfItsCone) {
   proxy = moved(field, proxy, {0, 0, -0.002}, 0.5);
   EXPECT_TRUE(proxy.touching);
   EXPECT_LT(proxy.position.norm(), 1e-12);
-  proxy = moved(field, proxy, {0.0009, 0, -0.002}, 0.5);  // inside of the cone: it sticks
+  proxy = moved(field, proxy, {0.0009, 0, -0.002}, 0.5);  // inside the friction cone
   EXPECT_LT(proxy.position.norm(), 1e-12);
   proxy = moved(field, proxy, {0.0015, 0, -0.002}, 0.5);
   EXPECT_NEAR(proxy.position.x(), 0.0005, 1e-12);
-  proxy = moved(field, proxy, {0.0015, 0, 0.001}, 0.5);  // and it lets go
+  proxy = moved(field, proxy, {0.0015, 0, 0.001}, 0.5);  // leaves the surface
   proxy = moved(field, proxy, {0.0015, 0, 0.001}, 0.5);
   proxy = moved(field, proxy, {0.0015, 0, 0.001}, 0.5);
   EXPECT_EQ(proxy.position, Vec3(0.0015, 0, 0.001));

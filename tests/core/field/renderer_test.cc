@@ -22,7 +22,7 @@ namespace {
 
 using std::chrono::milliseconds;
 
-constexpr double kPaid = 1e9;  // J, an account that pays for everything
+constexpr double kPaid = 1e9;  // J
 
 LocalTime at_ms(int ms) { return LocalTime(milliseconds(ms)); }
 
@@ -42,19 +42,19 @@ Field flat(double stiffness) {
 
 struct Swap {
   double jump = 0;    ///< N/ms, the largest in 300 ms after the swap
-  double least = 0;   ///< J, the least E − H without a limiter, or E with one
+  double least = 0;   ///< J, minimum of E
   double before = 0;  ///< N
   double after = 0;   ///< N, 1 s later
 };
 
-/// A hand presses on a sphere with 1.7 N, and the field is replaced. `given` J are in the account for this.
+/// Replaces the field while a hand presses on a sphere with 1.7 N, and adds `given` J to the account.
 Swap swap_under_load(double rise, double stiffness_ratio, double given) {
   const auto low = ball(0.03);
   const auto high = ball(0.03 + rise);
   const Field first{.bricks = low.get(), .materials = {{.stiffness = 1000, .friction = 0.4}}};
   const Field second{.bricks = high.get(), .materials = {{.stiffness = 1000 * stiffness_ratio, .friction = 0.4}}};
   Renderer renderer({.max_stiffness = 5000});
-  Body body{.friction = {.coulomb = 0.02, .viscous = 1.6}, .x = {0, 0, 0.034}};  // 2b/T is above all stiffnesses
+  Body body{.friction = {.coulomb = 0.02, .viscous = 1.6}, .x = {0, 0, 0.034}};  // 2b/T = 3200 N/m
   Limiter limiter(
       {.law = Law::kAolPlus, .friction = body.friction, .longest_hold = milliseconds(1), .shared_account = true});
   renderer.use(&first, at_ms(0));
@@ -87,8 +87,8 @@ TEST(FieldRenderer, ASwapUnderLoadIsPaidOrSinks) {
     const char* what;
     double rise;
     double ratio;
-    double paid;    // N: what the hand of 300 N/m and the new surface settle at
-    double unpaid;  // N
+    double paid;    // N, final force if the account contains 20 mJ
+    double unpaid;  // N, final force otherwise
   };
   for (const Case& c :
        {Case{"rises 2 mm", 2e-3, 1, 2.12, 1.69}, Case{"sinks 2 mm", -2e-3, 1, 1.21, 1.21},
@@ -145,7 +145,7 @@ TEST(FieldRenderer, ASunkProxyRisesAsTheHandPays) {
       EXPECT_EQ(stored, 0);
     }
     if (k == 399) {
-      EXPECT_GT(rendered.depth, 0.05e-3);  // by the friction that the hand has overcome
+      EXPECT_GT(rendered.depth, 0.05e-3);  // paid by viscous friction
       EXPECT_LT(rendered.depth, 0.5e-3);
     }
   }
@@ -160,7 +160,7 @@ TEST(FieldRenderer, APoseWithoutATankCannotPush) {
     renderer.use(&field, at_ms(0));
     double credit = 0;
     double most = 0;
-    for (int k = 0; k < 1000; ++k) {  // the plane rises by 20 mm through a hand that is held still
+    for (int k = 0; k < 1000; ++k) {  // the plane moves 20 mm upwards, and the hand does not move
       const double z = -0.005 + std::min(0.02, 1e-4 * k);
       EXPECT_TRUE(renderer.observe({.at = at_ms(k), .pose = {.position = {0, 0, z}}}));
       const auto rendered = renderer.render({.at = at_ms(k)}, credit, static_cast<std::uint64_t>(k));
@@ -191,7 +191,7 @@ TEST(FieldRenderer, FixturesAndSurfaceShareOneAccount) {
     rendered = renderer.render({.at = at_ms(k), .position = {0, 0, -0.004}}, kPaid, static_cast<std::uint64_t>(k));
   }
   EXPECT_NEAR(rendered.force.z(), 2, 1e-9);
-  EXPECT_NEAR(rendered.force.x(), 1, 1e-9);  // its largest force: 200 N/m · 10 mm is 2 N
+  EXPECT_NEAR(rendered.force.x(), 1, 1e-9);  // most_force
 }
 
 TEST(FieldRenderer, MaterialsBlendWhereTheHandCrossesTheirBorder) {
@@ -252,7 +252,7 @@ TEST(FieldRenderer, TenThousandStepsHaveOneDigestOnEveryProcessor) {
     }
   }
   EXPECT_GT(touched, 2000);
-  EXPECT_EQ(digest, 0U);
+  EXPECT_EQ(digest, 10400069833835146708U);
 }
 
 }  // namespace

@@ -15,7 +15,7 @@ namespace {
 
 using std::chrono::milliseconds;
 
-constexpr double kPaid = 1e9;  // J, an account that pays for everything
+constexpr double kPaid = 1e9;  // J
 
 LocalTime at_ms(int ms) { return LocalTime(milliseconds(ms)); }
 
@@ -107,7 +107,7 @@ TEST(FieldResidual, ATruthDoesNotMakeTheHeldForceJump) {
       ASSERT_TRUE(residual.learn(k, {k % 60 == 0 ? 1.0 : -1.0, 0, 0}, at_ms(static_cast<int>(k)), 1500, {}));
     }
     const Vec3 now = residual.held({.at = at_ms(static_cast<int>(k))}, 0.002, 1e-3);
-    EXPECT_LT((now - before).norm(), 0.17);  // 2 N with a time constant of 12 ms
+    EXPECT_LT((now - before).norm(), 0.17);
     before = now;
   }
 }

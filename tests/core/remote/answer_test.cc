@@ -117,10 +117,10 @@ TEST(Answer, WithoutARadiusAStickingForceStaysInTheConeOfItsAnswer) {
   EXPECT_NEAR(across(0.001, -0.01), 0.4 * 3.5 / 2, 1e-12);
   EXPECT_NEAR(across(-0.001, -0.01), 0.2, 1e-12);
   EXPECT_EQ(reconstruct(answer, deeper_by(0) + Vec3(0.02, 0, 0)).stiffness.row(0).norm(), 0);
-  answer.model->valid_radius = 0.01;  // here the engine has said where sticking ends
+  answer.model->valid_radius = 0.01;
   EXPECT_NEAR(across(0, -0.01), 1.4, 1e-12);
   answer = RemoteForce{.model = LocalModel{.stiffness = 100 * Mat3::Identity()}};
-  answer.model->contact = Contact{.normal = Vec3::UnitZ(), .gap = 0.001};  // nothing is touched yet
+  answer.model->contact = Contact{.normal = Vec3::UnitZ(), .gap = 0.001};  // not in contact
   EXPECT_EQ(reconstruct(answer, Vec3(0.01, 0, 0)).force, Vec3::Zero());
 }
 

@@ -96,7 +96,7 @@ class Engine {
   field::Proxy proxy_{};
 };
 
-/// Returns the RMS error of the applied force in % of the RMS of the true force, over 3 s.
+/// Returns the RMS error of the applied force in % of the true force during 3 s.
 double error(const Scene& scene, Model kind, int delay_ms) {
   constexpr int kSteps = 3000;
   Engine truth(scene);
