@@ -9,8 +9,8 @@ namespace tendon::field {
 /// Limits the stored energy H of a field to the energy that the hand has supplied, for every change of the field:
 ///     H ≤ H₀ + min(max(E − H₀, 0), P T) + tank
 /// E is the account of the limiter after booking the interval, and H₀ the stored energy with the old law, the old place
-/// of the proxy and the new hand. The tank is filled to `push_j` with `push_w`. What is taken from it is credited to
-/// the account, so an object can push a hand by at most push_j + push_w t. Several springs can share a gate. H and H₀
+/// of the proxy and the new hand. The tank is filled to `push_j` with `push_w`. Energy from the tank is credited
+/// to the account, so an object can push a hand by at most push_j + push_w t. Several springs can share a gate. H and H₀
 /// are then sums. See core/field/README.md. Realtime-safe: yes.
 class EnergyGate {
  public:
