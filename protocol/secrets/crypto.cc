@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "core/base/bytes.h"
+#include "protocol/secrets/blake2b.h"
 
 namespace tendon {
 namespace {
@@ -51,6 +52,7 @@ static_assert(sizeof(crypto_aead_aes256gcm_state) == 512 && alignof(crypto_aead_
 static_assert(crypto_aead_aes256gcm_NPUBBYTES == sizeof(Nonce) && crypto_aead_aes256gcm_ABYTES == crypto::kTagSize);
 static_assert(crypto_aead_aes256gcm_KEYBYTES == sizeof(Bytes32));
 static_assert(crypto_hash_sha256_BYTES == sizeof(Bytes32) && crypto_auth_hmacsha256_BYTES == sizeof(Bytes32));
+static_assert(crypto_generichash_blake2b_BYTES_MIN <= 16 && crypto_generichash_blake2b_BYTES_MAX >= sizeof(Bytes32));
 static_assert(crypto_scalarmult_BYTES == sizeof(Bytes32) && crypto_scalarmult_SCALARBYTES == sizeof(Bytes32));
 static_assert(crypto_aead_chacha20poly1305_IETF_KEYBYTES == sizeof(Bytes32));
 static_assert(crypto_aead_chacha20poly1305_IETF_ABYTES == crypto::kTagSize);
@@ -84,6 +86,18 @@ Bytes32 hmac_sha256(std::span<const std::byte> key, Pieces message) noexcept {
   crypto_auth_hmacsha256_final(&state, out(tag));
   sodium_memzero(&state, sizeof state);
   return tag;
+}
+
+std::array<std::byte, 16> blake2b_128(std::span<const std::byte> message) noexcept {
+  std::array<std::byte, 16> digest;
+  crypto_generichash_blake2b(out(digest), digest.size(), in(message), message.size(), nullptr, 0);
+  return digest;
+}
+
+Bytes32 blake2b_256(std::span<const std::byte> message) noexcept {
+  Bytes32 digest;
+  crypto_generichash_blake2b(out(digest), digest.size(), in(message), message.size(), nullptr, 0);
+  return digest;
 }
 
 Bytes32 x25519_public(const Key& secret) noexcept {

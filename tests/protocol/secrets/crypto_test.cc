@@ -5,6 +5,9 @@
 
 #include <set>
 
+#include "protocol/secrets/blake2b.h"
+#include "tests/protocol/examples.h"
+
 // vectors_test.cc contains the known answers.
 
 namespace tendon::crypto_test {
@@ -42,6 +45,13 @@ TEST(Crypto, ARenewedKeyIsAnother) {
   const Key key = Ratchet(1).next();
   EXPECT_NE(crypto::renewed(key).bytes(), key.bytes());
   EXPECT_NE(crypto::renewed(crypto::renewed(key)).bytes(), crypto::renewed(key).bytes());
+}
+
+TEST(Crypto, Blake2bGivesTheKnownDigests) {  // computed with hashlib of Python
+  const auto abc = std::as_bytes(std::span("abc", 3));
+  EXPECT_EQ(examples::hex(crypto::blake2b_128(abc)), "cf4ab791c62b8d2b2109c90275287816");
+  EXPECT_EQ(examples::hex(crypto::blake2b_256(abc)),
+            "bddd813c634239723171ef3fee98579b94964e3bb1cb3e427262c8c068d52319");
 }
 
 }  // namespace

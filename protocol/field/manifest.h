@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/base/motion.h"
+
+// Defines the encoding of a signed distance field. The field is stored in bricks of 8³ weights (int16, little-endian, x
+// is the fastest index). A brick is identified by its BLAKE2b-128 hash. The manifest contains the lattice and the list of
+// bricks, and the field is identified by the BLAKE2b-256 hash of the manifest. If a part of the object is cut, only the
+// bricks with new hashes must be sent.
+
+namespace tendon::limits {
+
+inline constexpr std::size_t kBrickBytes = 1024;  ///< 512 int16; fits into a datagram
+/// A status has 1024 bits: one for each brick, and the last one for the manifest.
+inline constexpr std::size_t kMaxFieldBricks = 1023;
+inline constexpr std::size_t kMaxFieldCells = 65'536;  ///< number of possible places in the lattice
+inline constexpr double kMinFieldSpacing = 0.25e-3;    ///< m, between two weights
+inline constexpr double kMaxFieldSpacing = 8e-3;       ///< m
+inline constexpr double kMaxFieldExtent = 2;           ///< m, size of the lattice and maximum distance
+inline constexpr unsigned kMaxFieldMaterials = 32;
+inline constexpr std::size_t kMaxFieldPart = 1000;  ///< bytes; a request with a part fits into a datagram of its own
+
+}  // namespace tendon::limits
+
+namespace tendon {
+
+using BrickBytes = std::array<std::byte, limits::kBrickBytes>;
+using BrickHash = std::array<std::byte, 16>;
+using FieldName = std::array<std::byte, 32>;
+
+/// The place of weight w(i, j, k) of the brick at p is origin + spacing (8 p + (i, j, k)), in the frame of the object.
+struct FieldLattice {
+  Vec3 origin = Vec3::Zero();                    ///< m
+  double spacing = 1e-3;                         ///< m
+  double scale = 1e-7;                           ///< m per unit of a weight
+  std::array<std::uint16_t, 3> bricks{1, 1, 1};  ///< along x, y and z
+};
+
+struct PlacedBrick {
+  std::array<std::int32_t, 3> place{};  ///< in bricks
+  std::uint8_t material = 0;
+  BrickHash hash{};
+};
+
+/// Encodes a manifest, all numbers little-endian:
+///     origin 3 × f64 | spacing f64 | scale f64 | lattice 3 × u16 | bricks u16     48 bytes
+///     then for each brick:  place 3 × u16 | material u8 | hash 16 bytes           23 bytes
+/// Throws std::invalid_argument with the name of the number that is out of bounds.
+std::vector<std::byte> encode_manifest(const FieldLattice& lattice, std::span<const PlacedBrick> bricks);
+
+/// Reads a manifest, which can be incomplete. The bytes must remain valid.
+class FieldManifest {
+ public:
+  static constexpr std::size_t kHead = 48;
+  static constexpr std::size_t kEntry = 23;
+  static constexpr std::size_t kMost = kHead + limits::kMaxFieldBricks * kEntry;
+
+  explicit FieldManifest(std::span<const std::byte> bytes) noexcept : bytes_(bytes) {}
+
+  /// Returns an error message for the first value that is out of bounds, or an empty string.
+  std::string refused_head() const;  ///< requires kHead bytes
+  std::string refused() const;       ///< of all bytes
+
+  bool has_head() const noexcept { return bytes_.size() >= kHead; }
+  FieldLattice lattice() const noexcept;  ///< requires the head
+  std::size_t bricks() const noexcept;    ///< 0 if the head is incomplete
+  std::size_t known() const noexcept;     ///< number of complete entries
+  PlacedBrick brick(std::size_t i) const noexcept;
+  /// Returns brick(i).hash without copying it.
+  std::span<const std::byte, sizeof(BrickHash)> hash(std::size_t i) const noexcept;
+
+ private:
+  std::span<const std::byte> bytes_;
+};
+
+/// Returns the first four bytes for error messages, for example "0a1b2c3d…".
+std::string short_name(std::span<const std::byte> hash);
+
+}  // namespace tendon

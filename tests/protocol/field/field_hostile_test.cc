@@ -1,0 +1,294 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include <bit>
+#include <functional>
+#include <limits>
+
+#include "core/base/bytes.h"
+#include "protocol/field/receiver.h"
+#include "protocol/limits.h"
+#include "protocol/secrets/blake2b.h"
+#include "tests/protocol/field/upload.h"
+#include "tests/support/refusal.h"
+
+// An upload that does not follow the rules is refused with the name of the field, the brick or the bound, and the next
+// correct one works.
+
+namespace tendon::field_hostile_test {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+using Refusal = std::optional<FieldReceiver::Refusal>;
+using Bytes = std::vector<std::byte>;
+
+constexpr LocalTime kStart{seconds(100)};
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+struct Server {
+  BrickStore store{{.owner_bytes = 2000 * limits::kBrickBytes}};
+  FieldReceiver receiver{{.owner = 0}, store};
+  LocalTime now = kStart;
+
+  Refusal part(const Bytes& manifest, std::size_t offset, std::size_t length) {
+    return part(crypto::blake2b_256(manifest), manifest, manifest.size(), offset, length);
+  }
+  Refusal part(const FieldName& field, const Bytes& manifest, std::size_t size, std::size_t offset,
+               std::size_t length) {
+    return receiver.take(now, FieldPart{.field = field,
+                                        .size = static_cast<std::uint32_t>(size),
+                                        .offset = static_cast<std::uint32_t>(offset),
+                                        .bytes = std::span(manifest).subspan(0, length)});
+  }
+  /// Sends all parts and returns the first error.
+  Refusal offer(const Bytes& manifest) { return offer(crypto::blake2b_256(manifest), manifest); }
+  Refusal offer(const FieldName& field, const Bytes& manifest) {
+    for (std::size_t at = 0; at < manifest.size(); at += limits::kMaxFieldPart) {
+      const auto bytes = std::span(manifest).subspan(at);
+      const FieldPart part{.field = field,
+                           .size = static_cast<std::uint32_t>(manifest.size()),
+                           .offset = static_cast<std::uint32_t>(at),
+                           .bytes = bytes.first(std::min(bytes.size(), limits::kMaxFieldPart))};
+      if (auto refused = receiver.take(now, part)) return refused;
+    }
+    return {};
+  }
+  Refusal brick(const BrickHash& hash, std::span<const std::byte> bytes) {
+    return receiver.take(now, FieldBrick{.hash = hash, .bytes = bytes});
+  }
+};
+
+const std::vector<FieldSender::Brick>& bricks() {
+  static const auto kBricks = random_bricks(3, 1);
+  return kBricks;
+}
+BrickHash hash_of(std::size_t i) { return crypto::blake2b_128(bricks()[i].bytes); }
+
+Bytes manifest_of(std::span<const FieldSender::Brick> of) {
+  const FieldSender sender({}, lattice_of_1024(), of);
+  return {sender.manifest().begin(), sender.manifest().end()};
+}
+Bytes good() { return manifest_of(bricks()); }
+
+template <class Number>
+Bytes with(std::size_t at, Number number) {
+  Bytes manifest = good();
+  if constexpr (std::is_same_v<Number, double>) {
+    put_little_endian(std::bit_cast<std::uint64_t>(number), manifest.data() + at);
+  } else {
+    put_little_endian(number, manifest.data() + at);
+  }
+  return manifest;
+}
+constexpr std::size_t kScale = 32;
+constexpr std::size_t kLattice = 40;
+constexpr std::size_t kCount = 46;
+constexpr std::size_t kFirst = FieldManifest::kHead;
+
+struct Case {
+  const char* said;  ///< part of the refusal
+  std::function<Refusal(Server&)> attack;
+};
+
+const std::vector<Case>& cases() {
+  const auto offered = [](const Bytes& manifest) { return [manifest](Server& s) { return s.offer(manifest); }; };
+  const auto number = [offered](std::size_t at, auto value) { return offered(with(at, value)); };
+  static const std::vector<Case> kCases = {
+      // Parts:
+      {"bytes = 0: expected 1 … 117", [](Server& s) { return s.part(good(), 0, 0); }},
+      {"bytes = 117: expected 1 … 116", [](Server& s) { return s.part({}, good(), 117, 1, 117); }},
+      {"bytes = 1001: expected 1 … 1000", [](Server& s) { return s.part({}, Bytes(2000), 2000, 0, 1001); }},
+      {"size = 0: expected 71 … 23577 bytes", [](Server& s) { return s.part({}, good(), 0, 0, 1); }},
+      {"size = 4294967295: expected 71 …", [](Server& s) { return s.part({}, good(), 0xFFFFFFFF, 0, 1); }},
+      {"offset = 200: expected below 117", [](Server& s) { return s.part({}, good(), 117, 200, 1); }},
+      {"offset = 4294967295: expected below", [](Server& s) { return s.part({}, good(), 117, 0xFFFFFFFF, 1); }},
+      {"offset = 50: expected at most 0", [](Server& s) { return s.part({}, good(), 117, 50, 1); }},
+      {"offset = 3: expected at most 2",
+       [](Server& s) {
+         s.part({}, good(), 117, 0, 2);
+         const Refusal refused = s.part({}, good(), 117, 3, 1);
+         s.receiver.drop({});
+         return refused;
+       }},
+      {"size = 118: expected 117",
+       [](Server& s) {
+         s.part({}, good(), 117, 0, 2);
+         const Refusal refused = s.part({}, good(), 118, 2, 1);
+         s.receiver.drop({});
+         return refused;
+       }},
+      {"field 00000000…: the manifest has the hash", [](Server& s) { return s.offer({}, good()); }},
+      // Manifests:
+      {"bricks = 65535: expected 1 … 1023", number(kCount, std::uint16_t{65535})},
+      {"bricks = 0: expected 1 … 1023", number(kCount, std::uint16_t{0})},
+      {"size = 117: expected 94 bytes", number(kCount, std::uint16_t{2})},
+      {"scale = 0: expected", number(kScale, 0.0)},
+      {"scale = nan: expected", number(kScale, kNaN)},
+      {"scale = 1e+12: expected", number(kScale, 1e12)},
+      {"scale = inf: expected", number(kScale, kInfinity)},
+      {"scale = -1e-07: expected", number(kScale, -1e-7)},
+      {"spacing = 0: expected 0.00025 … 0.008 m", number(24, 0.0)},
+      {"spacing = nan: expected", number(24, kNaN)},
+      {"spacing = 0.009: expected", number(24, 0.009)},
+      {"origin.x = nan: expected ±1e12 m", number(0, kNaN)},
+      {"origin.y = inf: expected", number(8, kInfinity)},
+      {"origin.z = -1e+13: expected", number(16, -1e13)},
+      {"lattice.x = 0: expected 1 or more", number(kLattice, std::uint16_t{0})},
+      {"lattice.z = 65535: expected", number(kLattice + 4, std::uint16_t{65535})},
+      {"lattice = 8e+05: expected at most 65536 cells",
+       number(kLattice, std::uint64_t{3} << 48U | 100U | 100U << 16U | std::uint64_t{80} << 32U)},
+      {"bricks[2].place.x = 16: expected 0 … 15", number(kFirst + 2 * 23, std::uint16_t{16})},
+      {"bricks[0].place.z = 65535: expected 0 … 7", number(kFirst + 4, std::uint16_t{65535})},
+      {"bricks[1].place: expected a place without a brick", number(kFirst + 23, std::uint16_t{0})},
+      {"bricks[0].material = 32: expected 0 … 31", number(kFirst + 6, std::uint8_t{32})},
+      // Too many:
+      {"offers = 4: expected at most 3",
+       [](Server& s) {
+         Refusal last;
+         for (std::uint16_t i = 1; i <= 10'000; ++i) {
+           last = s.part({}, with(0, static_cast<double>(i)), 117, 0, 1);
+           FieldName name{};
+           put_little_endian(i, name.data());
+           last = s.part(name, good(), 117, 0, 100);
+         }
+         s.now += seconds(30);  // they were never sent
+         return last;
+       }},
+      {"bricks = 2046: expected at most 2000 of all fields of a client",
+       [](Server& s) {
+         const auto one = manifest_of(random_bricks(1023, 2));
+         const auto two = manifest_of(random_bricks(1023, 3));
+         EXPECT_FALSE(s.offer(one));
+         const Refusal refused = s.offer(two);
+         s.receiver.drop(crypto::blake2b_256(one));
+         return refused;
+       }},
+      // Bricks:
+      {"bytes = 0: expected 1024", [](Server& s) { return s.brick(hash_of(0), {}); }},
+      {"bytes = 1023: expected 1024",
+       [](Server& s) { return s.brick(hash_of(0), std::span(bricks()[0].bytes).first(1023)); }},
+      {"bytes = 1025: expected 1024", [](Server& s) { return s.brick(hash_of(0), Bytes(1025)); }},
+      {"expected a brick of an offered field", [](Server& s) { return s.brick(hash_of(0), bricks()[0].bytes); }},
+      {"the bytes have the hash",
+       [](Server& s) {
+         EXPECT_FALSE(s.offer(good()));
+         const Refusal refused = s.brick(hash_of(0), bricks()[1].bytes);
+         EXPECT_EQ(s.store.bricks(), 0U);
+         return refused;
+       }},
+      {"expected at most 5e+05 bytes per second",
+       [](Server& s) {
+         Refusal last;
+         for (int i = 0; i < 1000; ++i) last = s.brick(hash_of(0), bricks()[0].bytes);
+         s.now += seconds(2);
+         return last;
+       }},
+  };
+  return kCases;
+}
+
+TEST(FieldHostile, EveryAttackIsRefusedByNameAndTheNextFieldWorks) {
+  for (const Case& one : cases()) {
+    Server server;
+    const Refusal refused = one.attack(server);
+    ASSERT_TRUE(refused) << one.said;
+    EXPECT_NE(refused->detail.find(one.said), std::string::npos) << refused->detail << "\nexpected " << one.said;
+    EXPECT_TRUE(refused->detail.starts_with("field ") || refused->detail.starts_with("brick ")) << refused->detail;
+    EXPECT_LE(refused->detail.size(), limits::kMaxDetail) << refused->detail;
+    EXPECT_EQ(server.store.bricks(), 0U) << one.said;
+
+    const Refusal offered = server.offer(good());
+    ASSERT_FALSE(offered) << one.said << ": " << offered->detail;
+    for (std::size_t i = 0; i < bricks().size(); ++i) EXPECT_FALSE(server.brick(hash_of(i), bricks()[i].bytes));
+    server.now += seconds(1);
+    while (server.receiver.next_status(server.now)) {
+    }
+    EXPECT_TRUE(server.receiver.ready(crypto::blake2b_256(good()))) << one.said;
+  }
+}
+
+TEST(FieldHostile, APlaceOf2To31IsRefusedBeforeItIsSent) {
+  for (const std::int32_t along :
+       {std::numeric_limits<std::int32_t>::min(), -1, 16, std::numeric_limits<std::int32_t>::max()}) {
+    auto wrong = bricks();
+    wrong[2].place[0] = along;
+    const std::string said = thrown_by([&] { FieldSender({}, lattice_of_1024(), wrong); });
+    EXPECT_EQ(said, "bricks[2].place.x = " + shortest(along) + ": expected 0 … 15");
+  }
+}
+
+TEST(FieldHostile, TooManyOrNoBricksAreRefusedBeforeTheyAreSent) {
+  const std::vector<PlacedBrick> many(65'535);
+  EXPECT_EQ(thrown_by([&] { encode_manifest(lattice_of_1024(), many); }), "bricks = 65535: expected 1 … 1023");
+  EXPECT_EQ(thrown_by([&] { encode_manifest(lattice_of_1024(), {}); }), "bricks = 0: expected 1 … 1023");
+}
+
+TEST(FieldHostile, AStatusDoesNotTellWhatAnotherKeyHasUploaded) {
+  Server server;
+  ASSERT_FALSE(server.offer(good()));
+  for (std::size_t i = 0; i < bricks().size(); ++i) ASSERT_FALSE(server.brick(hash_of(i), bricks()[i].bytes));
+  FieldReceiver guesser({.owner = 1}, server.store);
+  const Bytes manifest = good();
+  const FieldName name = crypto::blake2b_256(manifest);
+  ASSERT_FALSE(guesser.take(kStart, FieldPart{.field = name, .size = 117, .offset = 0, .bytes = manifest}));
+  const auto status = guesser.next_status(kStart);
+  ASSERT_TRUE(status);
+  for (std::size_t i = 0; i < bricks().size(); ++i) {
+    EXPECT_TRUE(status->misses(i));
+    EXPECT_EQ(guesser.brick(hash_of(i)), nullptr);
+  }
+  EXPECT_FALSE(guesser.ready(name));
+}
+
+TEST(FieldHostile, AnOfferThatIsNeverSentExpiresAfter30Seconds) {
+  Server server;
+  ASSERT_FALSE(server.part(good(), 0, 100));
+  EXPECT_EQ(server.receiver.offers(), 1U);
+  int statuses = 0;
+  const auto wait = [&](Duration length) {
+    for (const LocalTime end = server.now + length; server.now < end; server.now += milliseconds(1)) {
+      while (server.receiver.next_status(server.now)) ++statuses;
+    }
+  };
+  wait(seconds(29));
+  EXPECT_EQ(server.receiver.offers(), 1U);
+  EXPECT_EQ(statuses, 29 * 20);
+  wait(milliseconds(1001));
+  EXPECT_EQ(server.receiver.offers(), 0U);
+  EXPECT_EQ(server.receiver.due(), LocalTime::max());
+}
+
+TEST(FieldHostile, AFullStoreTakesFromTheOwnerWithTheMostBricks) {
+  BrickStore store({.bytes = 10 * limits::kBrickBytes, .owner_bytes = 8 * limits::kBrickBytes, .owners = 2});
+  const auto put = [&](BrickStore::Owner owner, unsigned first, unsigned last) {
+    for (unsigned i = first; i <= last; ++i) {
+      BrickHash hash{};
+      hash[0] = static_cast<std::byte>(i);
+      store.put(owner, hash, BrickBytes{static_cast<std::byte>(i)});
+    }
+  };
+  const auto has = [&](BrickStore::Owner owner, unsigned i) {
+    BrickHash hash{};
+    hash[0] = static_cast<std::byte>(i);
+    const BrickBytes* const found = store.find(owner, hash);
+    return found != nullptr && found->front() == static_cast<std::byte>(i);
+  };
+  put(0, 1, 8);
+  put(1, 11, 12);
+  EXPECT_EQ(store.bricks(), 10U);
+  put(1, 13, 15);
+  EXPECT_EQ(store.held(0), 5U);
+  EXPECT_EQ(store.held(1), 5U);
+  EXPECT_FALSE(has(0, 3));
+  EXPECT_TRUE(has(0, 4));
+  put(0, 21, 200);  // a flood
+  EXPECT_EQ(store.held(1), 5U);
+  for (unsigned i = 11; i <= 15; ++i) EXPECT_TRUE(has(1, i));
+  EXPECT_FALSE(has(0, 11));
+  EXPECT_EQ(store.bricks(), 10U);
+}
+
+}  // namespace
+}  // namespace tendon::field_hostile_test
