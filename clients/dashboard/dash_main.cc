@@ -5,7 +5,6 @@
 #include <cstddef>
 #include <exception>
 #include <iostream>
-#include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <span>
@@ -18,7 +17,6 @@
 #include "clients/cpp/key_file.h"
 #include "clients/cpp/machine.h"
 #include "clients/cpp/server_name.h"
-#include "clients/cpp/udp_transport.h"
 #include "clients/cpp/usage.h"
 #include "clients/dashboard/board.h"
 #include "clients/dashboard/feed.h"
@@ -29,32 +27,13 @@
 #include "clients/dashboard/page_files.h"
 #include "clients/dashboard/recordings.h"
 #include "clients/dashboard/routes.h"
+#include "clients/dashboard/server_link.h"
 #include "clients/dashboard/web_server.h"
 #include "protocol/wire/text.h"
 #include "server/machine/output.h"
 
 namespace tendon::dash {
 namespace {
-
-/// Separate from the link of the observer, because the server identifies clients by address.
-class OperatorLink : public Link {
- public:
-  explicit OperatorLink(const Address& server) : transport_(std::make_unique<UdpTransport>(server)) {}
-
-  void send(const Address& to, std::span<const std::byte> datagram) override {
-    try {
-      if (to != transport_->server()) transport_ = std::make_unique<UdpTransport>(to);
-    } catch (const std::runtime_error&) {
-      return;  // the datagram is lost
-    }
-    transport_->send(to, datagram);
-  }
-  std::size_t receive(Address& from, std::span<std::byte> buffer) override { return transport_->receive(from, buffer); }
-  LocalTime present(LocalTime now) const override { return transport_->present(now); }
-
- private:
-  std::unique_ptr<UdpTransport> transport_;
-};
 
 std::string new_pass() {
   const Seed seed = seed_from_system();
@@ -166,7 +145,7 @@ int run(const Options& options) {
   Board board;
   WebCounts counts;
   BridgeCounts bridge;
-  std::optional<OperatorLink> operator_link;
+  std::optional<ServerLink> operator_link;  // separate, because the server identifies clients by address
   std::optional<Operator> operates;
   Abilities abilities{.server = options.server.text(), .recordings = recordings.has_value()};
   std::function<std::string(std::uint32_t, Order)> press;

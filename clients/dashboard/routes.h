@@ -11,26 +11,14 @@
 #include <variant>
 #include <vector>
 
+#include "clients/cpp/web/http_server.h"
 #include "clients/dashboard/operator.h"
 #include "clients/dashboard/page_files.h"
 #include "clients/dashboard/recordings.h"
 
 namespace tendon::dash {
 
-/// The relevant parts of an HTTP request. The texts belong to the caller.
-struct Request {
-  std::string_view method;
-  std::string_view target;  ///< path and query, undecoded
-  std::optional<std::string_view> host{};
-  std::optional<std::string_view> origin{};
-  std::optional<std::string_view> authorization{};
-  std::optional<std::string_view> range{};
-  std::string_view accept_encoding{};
-  bool upgrade = false;     ///< requests a WebSocket
-  std::string protocols{};  ///< Sec-WebSocket-Protocol, several separated by commas
-  bool local = false;       ///< from an address of this machine
-  bool proxied = false;     ///< forwarded by a proxy: Forwarded, X-Forwarded-For, X-Real-IP or Via
-};
+using web::Request;
 
 struct Reply {  // without Date and Connection
   struct Slice {

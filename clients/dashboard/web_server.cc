@@ -3,21 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <boost/asio/io_context.hpp>
-#include <boost/asio/ip/tcp.hpp>
-#include <boost/asio/ip/udp.hpp>
-#include <boost/asio/read.hpp>
-#include <boost/asio/signal_set.hpp>
-#include <boost/asio/steady_timer.hpp>
-#include <boost/asio/write.hpp>
-#include <boost/beast/core/flat_buffer.hpp>
-#include <boost/beast/core/tcp_stream.hpp>
-#include <boost/beast/http/empty_body.hpp>
-#include <boost/beast/http/parser.hpp>
-#include <boost/beast/http/read.hpp>
-#include <boost/beast/websocket/rfc6455.hpp>
-#include <boost/beast/websocket/stream.hpp>
-#include <csignal>
 #include <list>
 #include <optional>
 #include <span>
@@ -27,15 +12,13 @@
 #include <variant>
 #include <vector>
 
-#include "clients/dashboard/server_socket.h"
+#include "clients/cpp/web/http_server.h"
+#include "clients/dashboard/server_link.h"
 
 namespace tendon::dash {
 namespace {
 
-namespace beast = boost::beast;
-namespace http = beast::http;
-namespace websocket = beast::websocket;
-using asio::ip::tcp;
+using Bytes = std::span<const std::byte>;
 
 /// Datagrams are read in batches. Otherwise tendon-dash would wake up 1000 times per second on the processors of the
 /// haptic loop. The measured round trip includes this delay, but is not used in computations.
@@ -44,9 +27,6 @@ constexpr int kMaxDrained = 64;  ///< maximum number of datagrams read from one 
 constexpr std::size_t kPiece = 64 * 1024;
 /// The maximum number of connections that are being refused. Further connections are closed without a reply.
 constexpr std::size_t kMaxRefusals = 64;
-/// A refused connection is read for this time and number of bytes, because a reset would discard the reply.
-constexpr Duration kLinger = std::chrono::seconds(1);
-constexpr std::size_t kMaxLingered = 64 * 1024;
 constexpr std::size_t kMaxLine = 64;          ///< longest message of a page: "watch 15"
 constexpr std::size_t kMaxOrder = 16 * 1024;  ///< longest message of a viewer: it subscribes to all of 16 devices
 /// Kernel buffer for a viewer that does not read, in addition to FoxgloveSession::kMaxBytes. Linux doubles this
@@ -60,14 +40,6 @@ std::array<std::uint8_t, 16> network_of(const Address& address) {
   return ip;
 }
 
-auto waiting_time(Duration d) {
-  return std::chrono::duration_cast<asio::steady_timer::duration>(std::max(d, Duration::zero()));
-}
-
-Bytes bytes_of(const beast::flat_buffer& buffer) {
-  return {static_cast<const std::byte*>(buffer.data().data()), buffer.data().size()};
-}
-
 class Connection;
 
 struct Shared {
@@ -78,137 +50,70 @@ struct Shared {
   WebCounts& counts;
   BridgeCounts& bridge;
   WebServer::Clock clock;
-  asio::io_context context{1};
-  std::list<std::unique_ptr<Connection>> connections;
-  const ServerSocket* link = nullptr;  ///< of the Observer
+  web::HttpServer& server;
+  const ServerLink& link;  ///< of the Observer
+  std::list<std::unique_ptr<Connection>> connections{};
 };
 
 /// A browser connection for HTTP requests or a WebSocket.
-///
-/// Deleted only after it is closed and has no pending operations (`pending_`), so that handlers can use `this`.
-class Connection {
+class Connection : public web::HttpConnection {
  public:
-  Connection(Shared& shared, tcp::socket socket)
-      : shared_(shared), stream_(std::move(socket)), request_buffer_(shared.config.max_request) {
-    error_code gone;
-    const tcp::endpoint peer = stream_.socket().remote_endpoint(gone);
-    if (!gone) network_ = network_of(address_of(peer));
-    local_ = !gone && is_loopback(address_of(peer));
-    // A batch of states must not wait for the acknowledgement of the previous one.
-    stream_.socket().set_option(tcp::no_delay(true), gone);
+  Connection(Shared& shared, web::Incoming stream)
+      : HttpConnection(std::move(stream), {.max_request = shared.config.max_request,
+                                           .request_patience = shared.config.request_patience,
+                                           .reply_patience = shared.config.patience}),
+        shared_(shared) {
+    if (peer()) network_ = network_of(*peer());
   }
-  ~Connection() {
+  ~Connection() override {
     if (page_) shared_.feed.leave(*page_);
     if (viewer_) shared_.foxglove.leave(*viewer_);
     if (gate_) --shared_.bridge.pages;
   }
-  Connection(const Connection&) = delete;
-  Connection& operator=(const Connection&) = delete;
 
-  void start() { read_request(); }
+  void read_request() override {
+    waits_since_ = shared_.clock();
+    HttpConnection::read_request();
+  }
   void refuse() {
     refused_ = true;
     write_reply(Routes::plain(503, "too many connections"));
   }
   bool refused() const noexcept { return refused_; }
-  bool closed() const noexcept { return closed_; }
   const std::array<std::uint8_t, 16>& network() const noexcept { return network_; }
   LocalTime waits_since() const noexcept { return waits_since_; }
-  bool done() const noexcept { return closed_ && pending_ == 0; }
-
-  void close() {
-    if (std::exchange(closed_, true)) return;
-    error_code gone;
-    tcp::socket& socket = web_socket_ ? web_socket_->next_layer().socket() : stream_.socket();
-    socket.shutdown(tcp::socket::shutdown_both, gone);
-    socket.close(gone);
-    server_.reset();
-  }
 
   void pump() {
-    if (closed_ || !web_socket_ || !open_ || std::exchange(writing_, true)) return;
+    if (!open() || writing()) return;
     if (page_) {
       if (auto text = shared_.feed.next(*page_)) {
         text_ = std::move(*text);
-        web_socket_->text(true);
-        return write_message(asio::buffer(text_));
+        write(std::as_bytes(std::span(text_)), false);
       }
     } else if (viewer_) {
       if (auto message = shared_.foxglove.next(*viewer_)) {
         text_ = std::move(message->bytes);
-        web_socket_->binary(message->binary);
-        return write_message(asio::buffer(text_));
+        write(std::as_bytes(std::span(text_)), message->binary);
       }
     } else if (auto datagram = gate_->next()) {
       datagram_ = std::move(*datagram);
-      web_socket_->binary(true);
-      return write_message(asio::buffer(datagram_.data(), datagram_.size()));
+      write(datagram_, true);
     }
-    writing_ = false;
   }
 
  private:
-  template <class Handler>
-  auto with(Handler handler) {
-    ++pending_;
-    return [this, handler = std::move(handler)](auto... results) mutable {
-      --pending_;
-      if (!closed_) handler(results...);
-      if (!done()) return;
-      auto& all = shared_.connections;
-      all.erase(std::ranges::find(all, this, [](const auto& one) { return one.get(); }));
-    };
-  }
-
-  void read_request() {
-    parser_.emplace();
-    parser_->header_limit(static_cast<std::uint32_t>(shared_.config.max_request));
-    parser_->body_limit(0);
-    waits_since_ = shared_.clock();
-    stream_.expires_after(waiting_time(shared_.config.request_patience));
-    http::async_read(stream_, request_buffer_, *parser_,
-                     with([this](error_code error, std::size_t) { take_request(error); }));
-  }
-
-  void take_request(error_code error) {
+  void take_request(const web::Request& request) override {
     waits_since_ = LocalTime::max();
-    if (error == http::error::end_of_stream || error == beast::error::timeout ||
-        error == asio::error::connection_reset) {
-      return close();
-    }
     ++shared_.counts.requests;
     keep_alive_ = false;
     with_body_ = true;
-    if (error == http::error::header_limit || error == http::error::buffer_overflow) {
-      return write_reply(Routes::plain(431, "the request is too long"));
-    }
-    if (error == http::error::body_limit) return write_reply(Routes::plain(413, "expected a request without content"));
-    if (error) return write_reply(Routes::plain(400, "not a valid HTTP request"));
-    const auto& message = parser_->get();
-    const auto header = [&](http::field field) -> std::optional<std::string_view> {
-      const auto found = message.find(field);
-      if (found == message.end()) return std::nullopt;
-      return std::string_view(found->value().data(), found->value().size());
-    };
-    if (message.count(http::field::host) > 1 || message.count(http::field::origin) > 1 ||
-        message.count(http::field::authorization) > 1) {
+    if (request.refused == 431) return write_reply(Routes::plain(431, "the request is too long"));
+    if (request.refused == 413) return write_reply(Routes::plain(413, "expected a request without content"));
+    if (request.refused != 0) return write_reply(Routes::plain(400, "not a valid HTTP request"));
+    if (request.repeated) {
       return write_reply(Routes::plain(400, "expected at most one Host, one Origin and one Authorization"));
     }
-    Request request;
-    request.method = {message.method_string().data(), message.method_string().size()};
-    request.target = {message.target().data(), message.target().size()};
-    request.host = header(http::field::host);
-    request.origin = header(http::field::origin);
-    request.authorization = header(http::field::authorization);
-    request.range = header(http::field::range);
-    request.accept_encoding = header(http::field::accept_encoding).value_or("");
-    request.upgrade = websocket::is_upgrade(message);
-    const auto [first, last] = message.equal_range(http::field::sec_websocket_protocol);
-    for (auto one = first; one != last; ++one) request.protocols += std::string(one->value()) + ",";
-    request.local = local_;
-    request.proxied = header(http::field::forwarded) || header(http::field::via) ||
-                      message.count("X-Forwarded-For") > 0 || message.count("X-Real-IP") > 0;
-    keep_alive_ = message.keep_alive();
+    keep_alive_ = request.keep_alive;
     with_body_ = request.method != "HEAD";
     Answer answer = shared_.routes.answer(request);
     if (auto* reply = std::get_if<Reply>(&answer)) {
@@ -219,13 +124,13 @@ class Connection {
         return write_reply(Routes::plain(503, "too many pages are already connected"));
       }
       page_ = shared_.feed.join(shared_.clock());
-      accept(Side::kPage);
+      open_socket(Side::kPage);
     } else if (const auto* viewer = std::get_if<FoxgloveSocket>(&answer)) {
       if (shared_.foxglove.clients() >= shared_.config.max_viewers) {
         return write_reply(Routes::plain(503, "too many viewers are already connected"));
       }
       viewer_ = shared_.foxglove.join(shared_.clock());
-      accept(Side::kViewer, viewer->protocol);
+      open_socket(Side::kViewer, viewer->protocol);
     } else {
       if (shared_.bridge.pages >= shared_.config.max_bridges) {
         ++shared_.bridge.refused_full;
@@ -234,117 +139,90 @@ class Connection {
       ++shared_.bridge.pages;
       ++shared_.bridge.opened;
       gate_.emplace(shared_.config.bridge, std::get<BridgeSocket>(answer).local, shared_.bridge, shared_.clock());
-      accept(Side::kBridge);
+      open_socket(Side::kBridge);
     }
   }
 
-  void write_reply(Reply reply) {
-    if (reply.status >= 400 && reply.status != 404 && reply.status != 416) ++shared_.counts.refused;
-    reply_ = std::move(reply);
-    text_ = reply_.head(keep_alive_);
+  void write_reply(Reply answer) {
+    if (answer.status >= 400 && answer.status != 404 && answer.status != 416) ++shared_.counts.refused;
+    reply_ = std::move(answer);
     sent_ = 0;
+    std::string first = reply_.head(keep_alive_);
     if (with_body_) {
-      if (const auto* text = std::get_if<std::string>(&reply_.body)) text_ += *text;
-      if (const auto* text = std::get_if<std::string_view>(&reply_.body)) text_ += *text;
+      if (const auto* text = std::get_if<std::string>(&reply_.body)) first += *text;
+      if (const auto* text = std::get_if<std::string_view>(&reply_.body)) first += *text;
     }
-    write_piece();
+    reply(std::move(first), keep_alive_ ? Then::kReadRequest : refused_ ? Then::kLinger : Then::kClose);
   }
 
-  void write_piece() {
-    stream_.expires_after(waiting_time(shared_.config.patience));
-    asio::async_write(stream_, asio::buffer(text_), with([this](error_code error, std::size_t) {
-                        const auto* file = std::get_if<Reply::Slice>(&reply_.body);
-                        if (error) return close();
-                        if (file != nullptr && with_body_ && sent_ < file->range.count) {
-                          const std::uint64_t left = file->range.count - sent_;
-                          text_ = file->file.read(file->range.first + sent_, std::min<std::uint64_t>(left, kPiece));
-                          if (text_.empty())
-                            return close();  // the file was truncated; the browser detects missing bytes
-                          sent_ += text_.size();
-                          return write_piece();
-                        }
-                        reply_.body = std::string();  // closes the file
-                        if (keep_alive_) return read_request();
-                        if (refused_) return linger();
-                        close();
-                      }));
-  }
-
-  void linger() {
-    error_code gone;
-    stream_.socket().shutdown(tcp::socket::shutdown_send, gone);
-    stream_.expires_after(waiting_time(kLinger));
-    text_.resize(kMaxLingered);
-    asio::async_read(stream_, asio::buffer(text_), with([this](error_code, std::size_t) { close(); }));
+  std::string next_piece() override {
+    const auto* file = std::get_if<Reply::Slice>(&reply_.body);
+    if (file != nullptr && with_body_ && sent_ < file->range.count) {
+      const std::uint64_t left = file->range.count - sent_;
+      std::string piece = file->file.read(file->range.first + sent_, std::min<std::uint64_t>(left, kPiece));
+      if (piece.empty()) close();  // the file was truncated; the browser detects missing bytes
+      sent_ += piece.size();
+      return piece;
+    }
+    reply_.body = std::string();  // closes the file
+    return {};
   }
 
   enum class Side : std::uint8_t { kPage, kViewer, kBridge };
 
-  void accept(Side side, const std::string& protocol = {}) {
-    stream_.expires_never();
-    if (side == Side::kViewer) {
-      error_code gone;
-      stream_.socket().set_option(asio::socket_base::send_buffer_size(kViewerSendBuffer), gone);
-    }
-    web_socket_.emplace(std::move(stream_));
-    websocket::stream_base::timeout timeout{};
-    timeout.handshake_timeout = waiting_time(shared_.config.patience);
-    timeout.idle_timeout = waiting_time(shared_.config.patience);
-    timeout.keep_alive_pings = side != Side::kBridge;
-    web_socket_->set_option(timeout);
-    web_socket_->read_message_max(side == Side::kPage ? kMaxLine : side == Side::kViewer ? kMaxOrder : kMaxDatagram);
-    if (!protocol.empty()) {
-      web_socket_->set_option(websocket::stream_base::decorator([protocol](websocket::response_type& response) {
-        response.set(http::field::sec_websocket_protocol, protocol);
-      }));
-    }
+  void open_socket(Side side, const std::string& protocol = {}) {
     if (side == Side::kBridge) {
       try {
-        server_ = std::make_unique<ServerSocket>(shared_.context, shared_.link->server(), shared_.clock);
+        server_.emplace(shared_.link.server());
       } catch (const std::runtime_error&) {
         return close();
       }
+      readable_.emplace(shared_.server, server_->descriptor());
     }
-    web_socket_->async_accept(parser_->get(), with([this](error_code error) {
-                                if (error) return close();
-                                open_ = true;
-                                read_message();
-                                if (gate_) read_server();
-                                pump();
-                              }));
+    accept({.patience = shared_.config.patience,
+            .silence = shared_.config.patience,
+            .pings = side != Side::kBridge,
+            .max_message = side == Side::kPage     ? kMaxLine
+                           : side == Side::kViewer ? kMaxOrder
+                                                   : kMaxDatagram,
+            .protocol = protocol,
+            .send_buffer_size = side == Side::kViewer ? kViewerSendBuffer : 0});
   }
 
-  void read_message() {
-    message_.clear();
-    web_socket_->async_read(
-        message_, with([this](error_code error, std::size_t) {
-          if (error) return close();
-          const LocalTime now = shared_.clock();
-          const Bytes bytes = bytes_of(message_);
-          if (gate_) {
-            if (gate_->passes(now, bytes, web_socket_->got_binary())) server_->send(bytes);
-          } else {
-            const std::string_view text(static_cast<const char*>(message_.data().data()), message_.data().size());
-            const bool heard = !web_socket_->got_binary() && (viewer_ ? shared_.foxglove.receive(now, *viewer_, text)
-                                                                      : shared_.feed.receive(now, *page_, text));
-            if (!heard) return close();
-            pump();
-          }
-          read_message();
-        }));
+  void opened() override {
+    read_message();
+    if (gate_) read_server();
+    pump();
   }
 
-  void write_message(asio::const_buffer bytes) {
-    web_socket_->async_write(bytes, with([this](error_code error, std::size_t) {
-                               writing_ = false;
-                               if (error) return close();
-                               pump();
-                             }));
+  void take_message(Bytes bytes, bool binary) override {
+    const LocalTime now = shared_.clock();
+    if (gate_) {
+      if (gate_->passes(now, bytes, binary)) server_->send(server_->server(), bytes);
+    } else {
+      const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+      const bool heard = !binary && (viewer_ ? shared_.foxglove.receive(now, *viewer_, text)
+                                             : shared_.feed.receive(now, *page_, text));
+      if (!heard) return close();
+      pump();
+    }
+    read_message();
+  }
+
+  void written() override { pump(); }
+
+  void closing() override {
+    readable_.reset();
+    server_.reset();
+  }
+
+  void gone() override {
+    std::erase_if(shared_.connections, [this](const auto& one) { return one.get() == this; });
   }
 
   void read_server() {
-    server_->when_readable(with([this](error_code error) {
-      if (error) return close();
+    readable_->wait(with([this](bool readable) {
+      if (!readable) return close();
       std::array<std::byte, kMaxDatagram> buffer;
       Address from;
       for (int i = 0; i < kMaxDrained; ++i) {
@@ -358,31 +236,21 @@ class Connection {
   }
 
   Shared& shared_;
-  beast::tcp_stream stream_;
-  beast::flat_buffer request_buffer_;
-  std::optional<http::request_parser<http::empty_body>> parser_;
   std::array<std::uint8_t, 16> network_{};
   LocalTime waits_since_ = LocalTime::max();
   bool refused_ = false;
-  bool local_ = false;
   bool keep_alive_ = false;
   bool with_body_ = true;
   Reply reply_;
-  std::string text_;
   std::uint64_t sent_ = 0;  ///< bytes of the file
 
-  std::optional<websocket::stream<beast::tcp_stream>> web_socket_;
-  beast::flat_buffer message_;
   std::optional<Feed::PageId> page_;
   std::optional<FoxgloveFeed::ClientId> viewer_;
   std::optional<BridgeGate> gate_;
-  std::unique_ptr<ServerSocket> server_;
-  std::vector<std::byte> datagram_;
-  bool open_ = false;
-  bool writing_ = false;
-
-  int pending_ = 0;
-  bool closed_ = false;
+  std::optional<ServerLink> server_;
+  std::optional<web::Watch> readable_;
+  std::string text_;                 ///< the message that is being written
+  std::vector<std::byte> datagram_;  ///< the same on the bridge
 };
 
 }  // namespace
@@ -390,36 +258,8 @@ class Connection {
 struct WebServer::State {
   State(const Config& own, const Routes& routes, Feed& feed, FoxgloveFeed& foxglove, WebCounts& counts,
         BridgeCounts& bridge, Clock clock)
-      : config(own),
-        shared{.config = config,
-               .routes = routes,
-               .feed = feed,
-               .foxglove = foxglove,
-               .counts = counts,
-               .bridge = bridge,
-               .clock = clock,
-               .connections = {}},
-        link(shared.context, config.server, clock) {
-    shared.link = &link;
-    const tcp::endpoint at(ip_of(config.listen), config.listen.port);
-    error_code error;
-    acceptor.open(at.protocol(), error);
-    if (!error) acceptor.set_option(tcp::acceptor::reuse_address(true), error);
-    if (!error) acceptor.bind(at, error);
-    if (!error) acceptor.listen(asio::socket_base::max_listen_connections, error);
-    if (error) throw std::runtime_error("cannot listen on " + to_string(config.listen) + ": " + error.message());
-  }
-
-  void accept() {
-    acceptor.async_accept([this](error_code error, tcp::socket socket) {
-      if (error) {  // no descriptors left: retry later
-        accept_again.expires_after(waiting_time(std::chrono::milliseconds(100)));
-        return accept_again.async_wait([this](error_code) { accept(); });
-      }
-      take(std::make_unique<Connection>(shared, std::move(socket)));
-      accept();
-    });
-  }
+      : config(own), server(config.listen), link(config.server), shared{config, routes, feed,   foxglove, counts,
+                                                                        bridge, clock,  server, link} {}
 
   void take(std::unique_ptr<Connection> connection) {
     const bool room = make_room(*connection);
@@ -431,7 +271,7 @@ struct WebServer::State {
     }
     shared.connections.push_back(std::move(connection));
     if (room) {
-      shared.connections.back()->start();
+      shared.connections.back()->read_request();
     } else {
       shared.connections.back()->refuse();
     }
@@ -464,17 +304,20 @@ struct WebServer::State {
   }
 
   void wait_for_server() {
+    if (std::exchange(watched, link.changes()) != link.changes()) {
+      readable.emplace(server, link.descriptor());
+      waiting = false;
+    }
     if (std::exchange(waiting, true)) return;
-    link.when_readable([this](error_code) {
+    readable->wait([this](bool datagram) {
+      if (!datagram) return;
       waiting = false;
       schedule_turn(kGather);
     });
   }
 
   void schedule_turn(Duration in) {
-    turn_timer.expires_after(waiting_time(in));
-    turn_timer.async_wait([this](error_code cancelled) {
-      if (cancelled) return;
+    turn_timer = server.after(in, [this] {
       const LocalTime now = shared.clock();
       const LocalTime next = turn(now);
       shared.foxglove.take(now);
@@ -485,8 +328,7 @@ struct WebServer::State {
   }
 
   void schedule_tick() {
-    tick_timer.expires_after(waiting_time(Feed::kTick));
-    tick_timer.async_wait([this](error_code) {
+    tick_timer = server.after(Feed::kTick, [this] {
       const LocalTime now = shared.clock();
       tick(now);
       shared.foxglove.tick(now);
@@ -497,12 +339,13 @@ struct WebServer::State {
   }
 
   Config config;
+  web::HttpServer server;
+  ServerLink link;
   Shared shared;
-  ServerSocket link;
-  tcp::acceptor acceptor{shared.context};
-  asio::steady_timer turn_timer{shared.context};
-  asio::steady_timer tick_timer{shared.context};
-  asio::steady_timer accept_again{shared.context};
+  web::Alarm turn_timer;
+  web::Alarm tick_timer;
+  std::optional<web::Watch> readable{std::in_place, server, link.descriptor()};
+  std::uint64_t watched = 0;  ///< link.changes() when `readable` was made
   bool waiting = false;
   std::function<LocalTime(LocalTime)> turn;
   std::function<void(LocalTime)> tick;
@@ -514,26 +357,19 @@ WebServer::WebServer(const Config& config, const Routes& routes, Feed& feed, Fox
 
 WebServer::~WebServer() = default;
 
-Address WebServer::address() const { return address_of(state_->acceptor.local_endpoint()); }
+Address WebServer::address() const { return state_->server.address(); }
 
 Link& WebServer::link() { return state_->link; }
 
 void WebServer::run(Duration duration, const std::function<LocalTime(LocalTime)>& turn,
                     const std::function<void(LocalTime)>& tick) {
-  asio::io_context& context = state_->shared.context;
   state_->turn = turn;
   state_->tick = tick;
-  asio::signal_set signals(context, SIGINT, SIGTERM);
-  signals.async_wait([&](error_code, int) { context.stop(); });
-  asio::steady_timer end(context);
-  if (duration > Duration::zero()) {
-    end.expires_after(waiting_time(duration));
-    end.async_wait([&](error_code) { context.stop(); });
-  }
-  state_->accept();
   state_->schedule_turn(Duration::zero());
   state_->schedule_tick();
-  context.run();
+  state_->server.run(duration, [this](web::Incoming stream) {
+    state_->take(std::make_unique<Connection>(state_->shared, std::move(stream)));
+  });
   for (const auto& connection : state_->shared.connections) connection->close();
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <memory>
 
@@ -36,7 +37,7 @@ class WebServer {
     std::size_t max_pages = 16;                         ///< pages on /live; each page needs 150 kB/s of JSON
     std::size_t max_viewers = 8;                        ///< clients of /foxglove; each client needs 200 kB/s per device
     std::size_t max_bridges = 32;                       ///< the limit of observers of a server
-    std::size_t max_request = 16 * 1024;                ///< bytes of request headers
+    std::uint32_t max_request = 16 * 1024;              ///< bytes of request headers
     Duration request_patience = std::chrono::seconds(5);  ///< timeout of a request
     Duration patience = std::chrono::seconds(30);         ///< timeout for reading replies, and for WebSockets
     BridgeGate::Config bridge{};

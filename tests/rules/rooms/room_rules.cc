@@ -61,10 +61,7 @@ const std::vector<Door>& front_doors() {
   static const std::vector<Door> kDoors = {
       {"Asio", {"asio.hpp", "asio/"}, {"server/machine/udp_link.cc", "clients/cpp/udp_transport.cc"}},
       // HTTP and WebSockets may only be used by processes without a haptic thread.
-      {"Boost.Beast and Boost.Asio",
-       {"boost/"},
-       {"clients/dashboard/server_socket.h", "clients/dashboard/web_server.cc",
-        "clients/bridge/inverse/inverse_server.cc"}},
+      {"Boost.Beast and Boost.Asio", {"boost/"}, {"clients/cpp/web/http_server.cc"}},
       {"CHOLMOD", {"cholmod.h", "Eigen/CholmodSupport"}, {"clients/softbody/fem/sparse.cc"}},
       {"CLI11",
        {"CLI/"},
