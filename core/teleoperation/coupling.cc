@@ -13,8 +13,7 @@ namespace tendon {
 
 namespace {
 
-/// Returns the configuration without the values that the method does not use. Throws std::invalid_argument if it is not
-/// valid.
+/// Removes values that are not used by the method. Throws std::invalid_argument if the configuration is not valid.
 CouplingConfig checked(CouplingConfig config) {
   const auto reasons = check(config);
   if (!reasons.empty()) {

@@ -48,12 +48,12 @@ Vec<N> paid_stretch(const Vec<N>& stretch, double stiffness, double energy) noex
 ///
 /// **T_loop** is measured without a common clock, by counting the periods since the sequence that a message answers.
 /// This includes delay, loss and waiting at the other end. Both ends use the larger of the two measurements, because
-/// the forces would differ if the ends used different values of K. T_loop increases immediately. It is the
-/// maximum during the last one to two intervals of `recovery`, so K does not follow the jitter of single messages, and
-/// returns within two seconds after a stall. A longer memory would not be safer, because the limiters and the tank make
-/// the pair passive for every K. K is changed with the time constant kSettling, because an increase of the delay is not
-/// measured at the same time by both ends. Without messages T_loop increases and K decreases; the caller must detect this
-/// loss. If K changes while the spring is stretched by δ, the accounts pay ½ ΔK δ².
+/// the forces would differ if the ends used different values of K. T_loop increases immediately. It is the maximum
+/// during the last one to two intervals of `recovery`, so that K does not follow the jitter of single messages. A
+/// longer interval is not required for passivity, which does not depend on K because of the limiters and the tank. K is
+/// changed with the time constant kSettling, because an increase of the delay is not measured at the same time by both
+/// ends. Without messages T_loop increases and K decreases; the caller must detect this loss. If K changes while the
+/// spring is stretched by δ, the accounts pay ½ ΔK δ².
 ///
 /// **Felt damping** in free motion, for a sine with the peak speed v̂ and the friction b_f, f_c of the follower:
 ///     b_felt = K·T_loop + B_l + B_f + b_f + 4 f_c/(π v̂)

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Each bound of core/PROOFS.md that a coupling uses is sharp. Over links with stalls, bursts, duplicates and reordering
-// (rough_network), hands that first supply energy and then take what they can get must find nothing at the bound, and
-// must find energy if the bound is 2 % too high.
+// These tests check that the bounds of core/PROOFS.md are sharp. The hands first supply energy, and then try to extract
+// more energy than they have supplied. This must fail at the bound, and succeed if the bound is increased by 2 %. The
+// links have stalls, bursts, duplicates and reordering (rough_network).
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -28,7 +28,7 @@ constexpr double kT = 1e-3;
 constexpr int kPeriods = 3000;
 constexpr int kSupply = 1000;  ///< periods in which the hands supply energy
 
-/// J: the energy that both ends have absorbed is never below `least`. They have absorbed `most` at some time.
+/// The energy that was absorbed by both ends, in J.
 struct Absorbed {
   double now = 0;
   double least = 0;
@@ -42,7 +42,7 @@ struct Absorbed {
   bool is_negative() const { return least < -1e-9 * std::max(most, 1e-3); }
 };
 
-/// Section "Wave variables": a wave has no more energy than was sent. Here it has `factor` times as much.
+/// Multiplies the energy of all received waves by `factor` (core/PROOFS.md, "Wave variables").
 Absorbed waves(std::uint64_t seed, double factor) {
   Dice dice(seed);
   const double impedance = dice.decades(-1, 1.5);
@@ -74,8 +74,7 @@ Absorbed waves(std::uint64_t seed, double factor) {
   return absorbed;
 }
 
-/// Section "Two-channel passivity control": no end outputs more energy than the other has reported. Here it outputs
-/// `factor` times as much.
+/// Multiplies all received energies by `factor` (core/PROOFS.md, "Two-channel passivity control").
 Absorbed two_channels(std::uint64_t seed, double factor) {
   Dice dice(seed);
   PassivityLeader<1> leader({.max_damping = 1e9, .period = kPeriod});
@@ -84,8 +83,8 @@ Absorbed two_channels(std::uint64_t seed, double factor) {
   OneWay<FollowerMessage<1>> back(rough_network(dice));
   const double size = dice.decades(-1, 1);
   const double fast = dice.decades(-2, 0);
-  double led = 0;     // m/s, newest velocity at the follower
-  double pushed = 0;  // N, newest force at the leader
+  double led = 0;     // the newest velocity at the follower, m/s
+  double pushed = 0;  // the newest force at the leader, N
   Absorbed absorbed;
   for (int i = 0; i < kPeriods; ++i) {
     const double way = i < kSupply ? -1 : 1;
@@ -111,7 +110,7 @@ Absorbed two_channels(std::uint64_t seed, double factor) {
   return absorbed;
 }
 
-/// Section "Surfaces": with K ≤ 2b/T and the budget E − U, the ledger stays ≥ 0. The factors raise both limits.
+/// Multiplies the budget E − U and the stiffness 2b/T by the factors (core/PROOFS.md, "Surfaces").
 Absorbed surfaces(std::uint64_t seed, double of_budget, double of_stiffness) {
   Dice dice(seed);
   const Friction friction{.coulomb = 0, .viscous = dice.decades(-1, 0.5)};
@@ -143,7 +142,7 @@ Absorbed surfaces(std::uint64_t seed, double of_budget, double of_stiffness) {
   return absorbed;
 }
 
-/// Expects that `run(seed, factor)` never gives out energy at a factor of 1, and does with some seeds at 1.02.
+/// Checks that `run(seed, factor)` does not find energy if the factor is 1, and finds energy if it is 1.02.
 template <class Run>
 void expect_sharp(const char* name, const Run& run) {
   const int cases = property_cases();

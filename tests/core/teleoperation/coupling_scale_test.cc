@@ -48,8 +48,8 @@ TEST(CouplingScale, IsSetByALeaderThatIsNotEngagedAndByNobodyElse) {
   EXPECT_FALSE(Coupling(waves.coupling).set_scale(2, 1)) << "sums of waves have one scale";
 }
 
-/// Moves 20 mm to and fro at 0.5 Hz through a clutch, an end of the act, a fault, a loss and a new peer of the leader, and calls
-/// `look` in each period of the last act.
+/// Runs the pair through a clutch, a disengagement, a fault, a loss, and a new peer. `look` is called in each period of
+/// the last engagement.
 template <class Look>
 void go_through_phases(Ports& ports, const Look& look) {
   ASSERT_TRUE(ports.engage());

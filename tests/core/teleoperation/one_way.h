@@ -33,8 +33,8 @@ struct Network {
   std::function<std::vector<int>(int now)> arrivals{};
 };
 
-/// Draws a network with stalls of 10 to 600 periods, after which all messages arrive at once. Between them, it has a
-/// delay, reordering, loss, and duplicates that arrive up to 1000 periods later.
+/// Returns a random network. It stalls for 10 to 600 periods, and then all messages arrive at once. It also has a delay,
+/// reordering, loss, and duplicates that are up to 1000 periods late.
 inline Network rough_network(Dice& dice) {
   struct State {
     Dice dice;

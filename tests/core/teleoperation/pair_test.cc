@@ -68,12 +68,12 @@ constexpr Limiters kLimiters[] = {
     {0.26, 0.26, 10, 10}, {0.5, 0.5, 10, 10}, {0.26, 1.0, 10, 10}, {0.26, 0.5, 10, 20}, {1.0, 0.3, 20, 5}};
 
 struct Pulled {
-  double slope = 0;  ///< N/m, of the force at the leader
-  double force = 0;  ///< N, at the leader at the end
-  double there = 0;  ///< N, at the follower
+  double slope = 0;  ///< slope of the force at the leader, N/m
+  double force = 0;  ///< force at the leader, N
+  double there = 0;  ///< force at the follower, N
 };
 
-/// The leader moves away from the fixed follower for 2 s, on a spring of `stiffness` (N/m) without a delay.
+/// Moves the leader for 2 s. The follower does not move, and there is no delay.
 Pulled pulled(const Limiters& c, double stiffness, double speed) {
   PairConfig config;
   config.leader.path = [speed](double t) { return speed * t; };
