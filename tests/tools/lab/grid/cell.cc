@@ -205,7 +205,7 @@ Measured GridBench::run(const GridCell& cell, Duration length) const {
   Measured measured{.round_trip = delays.round_trip(), .loss = delays.loss()};
   if (record.empty()) return measured;
   const Outcome result = outcome(record, scene.loop.period);
-  measured.felt_stiffness = felt_stiffness(felt, Vec3::UnitX(), {.above = 0.0});
+  measured.felt_stiffness = felt_stiffness(felt, Vec3::UnitX(), {.above = 0.0, .below = {}});
   measured.least_energy = result.least_energy;
   measured.vibration = result.late_vibration;
   measured.felt_db = result.sensation;
