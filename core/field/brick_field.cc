@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <string>
 
 #include "core/base/expect.h"
@@ -33,6 +32,8 @@ Taps taps(double t) noexcept {
 }
 
 }  // namespace
+
+int BrickField::away(const Cell& cell) noexcept { return std::max<int>(cell.cells, -cell.cells); }
 
 BrickField::BrickField() : bricks_(kMostBricks), cells_(kMostCells) {}
 
@@ -146,8 +147,8 @@ void BrickField::spread(int x, int y, int z, int way) noexcept {
         }
         const Cell& other = cells_[cell_at(i, j, k)];
         if (other.brick < 0 && other.cells == 0) continue;  // unknown
-        const int cells = std::abs(other.cells) + 1;
-        if (cell.cells != 0 && std::abs(cell.cells) <= cells) continue;
+        const int cells = away(other) + 1;
+        if (cell.cells != 0 && away(cell) <= cells) continue;
         bool inside = other.cells < 0;
         if (other.brick >= 0) {  // use the sign of the nearest node
           const auto node = [](int d) { return d == 0 ? kSide / 2 : d > 0 ? 1 : kSide; };
@@ -202,7 +203,7 @@ SurfacePoint BrickField::at(const Vec3& x) const noexcept {
   const Cell& cell = cells_[cell_at(node[0] / kSide, node[1] / kSide, node[2] / kSide)];
   SurfacePoint point;
   if (cell.brick < 0) {
-    const double bound = lattice_.spacing * (1 + kSide * (std::abs(static_cast<double>(cell.cells)) - 1));
+    const double bound = lattice_.spacing * (1 + kSide * (away(cell) - 1.0));
     point.distance = cell.cells < 0 ? -bound : bound + way;
     return point;
   }

@@ -79,6 +79,7 @@ class BrickField {
     std::int16_t cells = 0;  ///< ± c, or 0 in a brick; negative inside the solid
   };
 
+  static int away(const Cell& cell) noexcept;  ///< c
   std::size_t cell_at(int x, int y, int z) const noexcept;
   const Brick* brick_at(int x, int y, int z) const noexcept;
   void fill_apron(Brick& brick) noexcept;

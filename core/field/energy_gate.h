@@ -10,8 +10,8 @@ namespace tendon::field {
 ///     H ≤ H₀ + min(max(E − H₀, 0), P T) + tank
 /// E is the account of the limiter after booking the interval, and H₀ the stored energy with the old law, the old place
 /// of the proxy and the new hand. The tank is filled to `push_j` with `push_w`. Energy from the tank is credited
-/// to the account, so an object can push a hand by at most push_j + push_w t. Several springs can share a gate. H and H₀
-/// are then sums. See core/field/README.md. Realtime-safe: yes.
+/// to the account, so an object can push a hand by at most push_j + push_w t. Several springs can share a gate. H and
+/// H₀ are then sums. See core/field/README.md. Realtime-safe: yes.
 class EnergyGate {
  public:
   struct Config {

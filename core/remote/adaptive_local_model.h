@@ -17,8 +17,7 @@ namespace tendon {
 /// |ΔF · dx| at the next motion. Blending spreads this energy over time, and the limiter accounts for it. If the
 /// environment has not changed, the old and the new model are the same line, and the prediction does not lag. The slow
 /// period is the time between the motions of the two answers, and is limited to `max_blend`. A force without a model is
-/// treated as a model with K = 0. The contact and the table of an answer are ignored, because they cannot be blended,
-/// so a tangential stiffness that models sticking has no friction cone here.
+/// treated as a model with K = 0. The contact and the table of an answer are ignored, because they cannot be blended.
 ///
 /// Source: Barbagli et al., IJRR 24(9), 2005 (recalled). The loop is stable if share · K does not exceed the true
 /// stiffness. K must be the result of `believed` (answer.h). See core/PROOFS.md, "Local models".

@@ -44,7 +44,8 @@ Vec3 within(const LocalModel& model, const Vec3& position) noexcept;
 ///
 /// Friction cone: if a contact has no radius, it is unknown when the tool starts to slide. The norm of the tangential
 /// force is then limited to that of the answer, scaled by N₊/(n·force), because the friction coefficient is at least
-/// that of the answer. If the limit is used, the tangential stiffness is zero.
+/// that of the answer. If the limit is used, the tangential stiffness is zero. AdaptiveLocalModel ignores contacts, and
+/// has no cone.
 ///
 /// Source: this was compared with holding, with extrapolation in time and with secants. The table was best for less
 /// than 50 answers per second, and otherwise the stiffness (tests/tools/lab/experiments/reconstruction_test.cc).
