@@ -21,7 +21,7 @@ struct Field {
   static constexpr std::size_t kMostFixtures = 16;
   static constexpr double kPrimitiveSpacing = 1e-3;  ///< m, the spacing of a field without bricks
 
-  const BrickField* bricks = nullptr;  ///< may be null; not owned
+  const BrickField* bricks = nullptr;  ///< may be null; not owned. An unknown material of a brick is material 0
   std::vector<Primitive> primitives{};
   std::vector<Material> materials{Material{}};
   std::vector<Fixture> fixtures{};

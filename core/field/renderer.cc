@@ -30,6 +30,7 @@ void Renderer::use(const Field* field, LocalTime now) noexcept {
   field_ = field;
   swapped_ = now;
   swapping_ = true;
+  first_tick_.reset();
   if (field == nullptr) {
     started_ = false;
     return;
@@ -47,6 +48,7 @@ void Renderer::use(const Field* field, LocalTime now) noexcept {
 }
 
 bool Renderer::observe(std::uint64_t tick, const Vec3& truth, LocalTime now) noexcept {
+  if (!first_tick_ || tick < *first_tick_) return false;
   return residual_.learn(tick, truth, now, config_.max_stiffness,
                          std::span(materials_).first(config_.learns ? material_count_ : 0));
 }
@@ -159,6 +161,7 @@ void Renderer::render_fixtures(const Pose& pose, const Vec3& x, double period, R
 Renderer::Rendered Renderer::render(const Motion& hand, double account, std::uint64_t tick) noexcept {
   Rendered result;
   if (field_ == nullptr) return result;
+  if (!first_tick_) first_tick_ = tick;
   const Vec3& x = hand.position;
   const double period = started_ ? std::clamp(seconds(hand.at - last_), 0.0, kMostPeriod) : 0;
   last_ = hand.at;

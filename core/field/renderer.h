@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 
 #include "core/base/motion.h"
 #include "core/field/energy_gate.h"
@@ -67,7 +68,8 @@ class Renderer {
   /// See FieldPose::observe.
   bool observe(const TimedPose& pose) noexcept { return pose_.observe(pose); }
 
-  /// Takes the true force (N) that answers step `tick`. See Residual::learn.
+  /// Takes the true force (N) that answers step `tick`. Returns false for a step before the current field, and as
+  /// Residual::learn.
   bool observe(std::uint64_t tick, const Vec3& truth, LocalTime now) noexcept;
 
   /// Performs one step with the finite position `hand` and the account E (J).
@@ -101,6 +103,7 @@ class Renderer {
   bool started_ = false;
   LocalTime last_{};
   LocalTime swapped_{};
+  std::optional<std::uint64_t> first_tick_{};  ///< of the current field
   bool swapping_ = false;
   bool bound_ = false;         ///< a limit after a swap was binding in this step
   Proxy proxy_{};              ///< in the frame of the object

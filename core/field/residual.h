@@ -54,8 +54,6 @@ class Residual {
   /// Returns the held force (N, on the hand) at `hand.position`. Must be called once per haptic step of `period` s.
   Vec3 held(const Motion& hand, double depth, double period) noexcept;
 
-  void forget() noexcept { *this = Residual(); }
-
  private:
   Vec3 faded(const Vec3& x, LocalTime now) const noexcept;
 

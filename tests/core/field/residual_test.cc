@@ -82,6 +82,20 @@ TEST(FieldResidual, AnUnknownStepOrANumberThatIsNotFiniteTeachesNothing) {
   EXPECT_FALSE(residual.learn(5, Vec3::Zero(), at_ms(9), 1500, all)) << "overwritten";
 }
 
+TEST(FieldResidual, ATruthAboutTheFieldBeforeIsRefused) {
+  const Field first = flat(500);
+  const Field second = flat(800);
+  Renderer renderer({});
+  EXPECT_FALSE(renderer.observe(0, Vec3::Zero(), at_ms(0)));
+  renderer.use(&first, at_ms(0));
+  for (int k = 0; k < 20; ++k) {
+    if (k == 10) renderer.use(&second, at_ms(k));
+    renderer.render({.at = at_ms(k)}, kPaid, static_cast<std::uint64_t>(k));
+  }
+  EXPECT_FALSE(renderer.observe(9, Vec3::Zero(), at_ms(20)));
+  EXPECT_TRUE(renderer.observe(10, Vec3::Zero(), at_ms(20)));
+}
+
 TEST(FieldResidual, TheHeldRestFadesAndIsZeroOutOfContact) {
   Residual residual;
   residual.note({.tick = 1, .depth = 0.002, .direction = Vec3::UnitZ()});
