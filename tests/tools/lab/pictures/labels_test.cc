@@ -198,8 +198,9 @@ INSTANTIATE_TEST_SUITE_P(
                    row.p50 = 100 * devices;
                    row.figures = {{"devices", devices}, {"haptic_us", devices}, {"answered_in_time_percent", 100}};
                  }
-                 bench::draw_devices(folder / "devices", {.machine = "machine", .commit = "c0ffee", .command = kLong},
-                                     rows);
+                 bench::Circumstances here;
+                 here.command = kLong;
+                 bench::draw_devices(folder / "devices", here, rows);
                }}),
     [](const auto& of) { return of.param.name; });
 
