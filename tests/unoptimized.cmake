@@ -14,7 +14,7 @@ set(tests_debug_information $<$<CONFIG:RelWithDebInfo>:-g0>)
 # tendon_headers(name LIBS … HEADERS …): declares a set of headers.
 function(tendon_headers name)
   cmake_parse_arguments(PARSE_ARGV 1 ARG "" "" "LIBS;HEADERS")
-  file(WRITE ${CMAKE_CURRENT_BINARY_DIR}/${name}.cc "// Carries the precompiled headers.\n")
+  file(CONFIGURE OUTPUT ${CMAKE_CURRENT_BINARY_DIR}/${name}.cc CONTENT "// Carries the precompiled headers.\n")
   add_library(${name} OBJECT ${CMAKE_CURRENT_BINARY_DIR}/${name}.cc)
   set_target_properties(${name} PROPERTIES UNITY_BUILD OFF)
   target_compile_options(${name} PRIVATE -O0 ${tests_debug_information})
