@@ -61,17 +61,6 @@ TEST(PhaseMachine, GoesFromEachPhaseByEachInputWhereItsTableSays) {
   }
 }
 
-TEST(PhaseMachine, ComesToAnActByAnActAlone) {
-  for (const PortPhase phase : kPhases) {
-    for (std::size_t i = 0; i < kPhaseInputs; ++i) {
-      const auto input = static_cast<PhaseInput>(i);
-      if (!is_in_act(phase) && input != PhaseInput::kAct) {
-        EXPECT_FALSE(is_in_act(next(phase, input))) << to_string(phase) << ", input " << i;
-      }
-    }
-  }
-}
-
 TEST(LossStages, TrustsAStateForLongerWhereGapsAreLong) {
   LossStages stages(1ms);
   const LocalTime start(10s);

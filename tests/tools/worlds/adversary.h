@@ -80,7 +80,6 @@ class AdversaryDevice final : public Device {
   }
 
   Vec3 apply(const Vec3& force) noexcept override {
-    saw_only_finite_forces_ = saw_only_finite_forces_ && force.allFinite();
     force_ = force * config_.more.force;
     if (const double size = force_.norm(); size > config_.clamp) force_ *= config_.clamp / size;
     torque_.setZero();
@@ -103,8 +102,6 @@ class AdversaryDevice final : public Device {
     grip_ = std::clamp(grip_, -grip_clamp, grip_clamp);
     return {.force = force_, .torque = torque_, .grip = grip_};
   }
-
-  bool saw_only_finite_forces() const { return saw_only_finite_forces_; }
 
  private:
   /// rad. Below π, because a larger rotation would be measured in the other direction.
@@ -159,7 +156,6 @@ class AdversaryDevice final : public Device {
   Vec3 force_ = Vec3::Zero();
   Vec3 torque_ = Vec3::Zero();
   double grip_ = 0;
-  bool saw_only_finite_forces_ = true;
 };
 
 }  // namespace tendon::simulation

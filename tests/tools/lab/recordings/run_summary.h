@@ -236,6 +236,4 @@ RunSummary summarise(const Steps& steps) {
   return observer.summary();
 }
 
-constexpr bool is_limit(Reason why) noexcept { return why != Reason::kOverrun && why != Reason::kWatchdog; }
-
 }  // namespace tendon::lab
