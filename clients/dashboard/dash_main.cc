@@ -145,7 +145,7 @@ int run(const Options& options) {
   Board board;
   WebCounts counts;
   BridgeCounts bridge;
-  std::optional<ServerLink> operator_link;  // separate, because the server identifies clients by address
+  std::optional<ServerLink> operator_link;  // separate socket, because the server identifies clients by address
   std::optional<Operator> operates;
   Abilities abilities{.server = options.server.text(), .recordings = recordings.has_value()};
   std::function<std::string(std::uint32_t, Order)> press;

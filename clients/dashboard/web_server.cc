@@ -345,7 +345,7 @@ struct WebServer::State {
   web::Alarm turn_timer;
   web::Alarm tick_timer;
   std::optional<web::Watch> readable{std::in_place, server, link.descriptor()};
-  std::uint64_t watched = 0;  ///< link.changes() when `readable` was made
+  std::uint64_t watched = 0;  ///< the value of link.changes() for `readable`
   bool waiting = false;
   std::function<LocalTime(LocalTime)> turn;
   std::function<void(LocalTime)> tick;
