@@ -24,6 +24,11 @@ constexpr double kOldAnswer = 0.01;    // s: age of an answer with full damping
 constexpr double kSlowHand = 2e-3;     // m/s: the direction of slower motion is unreliable
 constexpr double kMostDamping = 1;     // share of the damped force
 constexpr double kDamperMemory = 0.3;  // s, time constant of the debt of the damper
+constexpr double kDrivenOver = 0.1;    // s, time constant of P and Q
+constexpr double kAgainstDrive = 2.5;  // damping over the negative damping of the object
+constexpr double kSmallDamping = 2;    // in f_s: damping without such a drive
+constexpr double kLetGoOver = 2;       // M/m − 1 with full damping
+constexpr double kCountsAtRest = 1.5;  // one count, whose pulse is higher because the filter is sampled
 constexpr double kCountsAhead = 4;     // a growing force must be able to pay for this number of counts
 constexpr double kEuler = 2.718281828459045;
 
@@ -71,6 +76,7 @@ void check(const typename AolPlus<Blocks, Size>::Config& config) {
     expect_above_zero(seconds(damper->smoothing), "damper.smoothing");
     expect_above_zero(seconds(damper->slow), "damper.slow");
     expect_not_negative(damper->dead_zone, "damper.dead_zone");
+    for (const double mass : damper->mass) expect_not_negative(mass, "damper.mass");
     expect_above_zero(damper->most_owed, "damper.most_owed");
   }
   if (const auto& fading = config.parts.fading_contact) {
@@ -201,10 +207,23 @@ template <int Blocks, int Size>
   if (held <= 0) return;
   const double fast = std::min(1.0, held / smoothing_);
   const double slow = std::min(1.0, held / slowness_);
-  once_smoothed_ += (fast / held) * interval.dx - fast * once_smoothed_;
-  smoothed_ += fast * (once_smoothed_ - smoothed_);
-  slow_ += slow * (smoothed_ - slow_);
+  MotionAndForce now;
+  now.col(0) = interval.dx / held;
+  now.col(1) = interval.applied + damped_;
+  for (Eigen::Index k = 0; k < 2 * kSize; ++k) {  // faster than with matrices
+    once_smoothed_(k) += fast * (now(k) - once_smoothed_(k));
+    smoothed_(k) += fast * (once_smoothed_(k) - smoothed_(k));
+    slow_(k) += slow * (smoothed_(k) - slow_(k));
+  }
   if (!parts_.damper) return;
+  const double recent = std::min(1.0, held / kDrivenOver);
+  const MotionAndForce vibration = smoothed_ - slow_;
+  for (int i = 0; i < Blocks; ++i) {
+    const auto block = static_cast<std::size_t>(i);
+    const auto part = vibration.template middleRows<Size>(i * Size);
+    driven_[block] += recent * (part.col(0).dot(part.col(1)) - driven_[block]);
+    vibrating_[block] += recent * (part.col(0).squaredNorm() - vibrating_[block]);
+  }
   // The debt decays. Any income beyond the debt is lost.
   const double forgotten = std::min(1.0, held / kDamperMemory);
   double earned = damped_.dot(interval.dx);
@@ -263,6 +282,8 @@ void AolPlus<Blocks, Size>::observe_unseen(const Vec<kSize>& applied, Duration a
   once_smoothed_.setZero();
   smoothed_.setZero();
   slow_.setZero();
+  driven_ = {};
+  vibrating_ = {};
   damped_.setZero();
   damped_before_.setZero();
   held_ = 0;
@@ -344,9 +365,10 @@ template <int Blocks, int Size>
 double AolPlus<Blocks, Size>::give_back(const Vec<kSize>& force, double size, double near,
                                         double budget) const noexcept {
   const Thrift& thrift = *parts_.thrift;
-  const double power = force.dot(smoothed_);
+  const double counts = shared_ && robust_ ? kCountsAtRest * parts_.robust_ledger->encoder_step[0] : 0.0;
+  const double power = force.dot(smoothed_.col(0)) - size * counts / (kEuler * smoothing_);
   if (power <= 0 || near <= kThriftFrom || budget >= thrift.energy) return 1;
-  const double away = std::min(1.0, power / (size * (smoothed_.norm() + kSlowHand)));
+  const double away = std::min(1.0, power / (size * (smoothed_.col(0).norm() + kSlowHand)));
   const double close = std::min(1.0, (near - kThriftFrom) / kThriftOver);
   return 1 - thrift.share * away * close * (1 - std::max(budget, 0.0) / thrift.energy);
 }
@@ -370,6 +392,15 @@ double AolPlus<Blocks, Size>::stiff(std::size_t block) const noexcept {
   return force < enough ? force / enough : 1;
 }
 
+/// l, for the force F₁ and the motion w of a group of coordinates.
+template <int Blocks, int Size>
+double AolPlus<Blocks, Size>::let_go(std::size_t block, const Vec<Size>& force, const Vec<Size>& fast) const noexcept {
+  const double along = force.dot(fast);
+  if (along <= 0 || force.dot(smoothed_.col(0).template segment<Size>(static_cast<int>(block) * Size)) <= 0) return 0;
+  const double lighter = parts_.damper->mass[block] * along / (slowness_ * force.squaredNorm());
+  return std::clamp((lighter - 1) / kLetGoOver, 0.0, 1.0);
+}
+
 /// D for a contact with `force`.
 template <int Blocks, int Size>
 auto AolPlus<Blocks, Size>::damping(const Vec<kSize>& force, double near, Duration age) const noexcept -> Vec<kSize> {
@@ -381,8 +412,8 @@ auto AolPlus<Blocks, Size>::damping(const Vec<kSize>& force, double near, Durati
   if (left == 0 || std::max(close, late) <= 0) return damping;
   for (int i = 0; i < Blocks; ++i) {
     const auto block = static_cast<std::size_t>(i);
-    const Vec<Size> slow = slow_.template segment<Size>(i * Size);
-    const Vec<Size> fast = smoothed_.template segment<Size>(i * Size) - slow;
+    const Vec<Size> slow = slow_.col(0).template segment<Size>(i * Size);
+    const Vec<Size> fast = smoothed_.col(0).template segment<Size>(i * Size) - slow;
     const double speed = fast.norm();
     const double step = robust_ ? parts_.robust_ledger->encoder_step[block] : 0.0;
     double quiet = 0;
@@ -393,7 +424,12 @@ auto AolPlus<Blocks, Size>::damping(const Vec<kSize>& force, double near, Durati
     if (speed <= quiet) continue;
     const double active = left * std::clamp(std::max(close, late * stiff(block)), 0.0, 1.0);
     const double size = force.template segment<Size>(i * Size).norm();
-    const double wanted = damper.viscous[block] * active * (1 - quiet / speed) * size / (size + damper.contact[block]);
+    // Q > 0, because ‖w‖ > 0.
+    const double enough =
+        std::max({kAgainstDrive * driven_[block] / vibrating_[block], kSmallDamping * damper.contact[block] / speed,
+                  let_go(block, force.template segment<Size>(i * Size), fast) * damper.viscous[block]});
+    const double viscous = std::min(damper.viscous[block], enough);
+    const double wanted = viscous * active * (1 - quiet / speed) * size / (size + damper.contact[block]);
     damping.template segment<Size>(i * Size) = std::min(wanted, kMostDamping * size / speed) * fast;
   }
   return damping;

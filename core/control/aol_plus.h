@@ -54,19 +54,29 @@ namespace tendon {
 /// The b_v of the papers is K_s T/2. The damper uses the range up to ℓ. A clipped spring rings without it.
 ///
 /// **thrift** reduces the force slightly while it does work on the hand (F₁·u > 0, u below) and Ē < E_s:
-///     F₁ ← F₁ (1 − σ a n (1 − Ē/E_s)),   a = clamp(F₁·u/(‖F₁‖ (‖u‖ + 2 mm/s)), 0, 1),
+///     F₁ ← F₁ (1 − σ a n (1 − Ē/E_s)),   a = clamp((F₁·u/‖F₁‖ − v₁)/(‖u‖ + 2 mm/s), 0, 1),
 ///                                        n = clamp((‖F_wanted‖/f_γ − 0.4)/0.4, 0, 1),   f_γ = γ ‖F_wanted‖
-/// This leaves 0.1 to 0.3 mJ for the next contact. With a robust ledger the force also grows only as far as the account
-/// can pay for its counts, ‖F₁‖ ≤ max(f_c, ‖F_held‖ + Ē/(4Δ)). Otherwise an empty account would stay empty.
+/// This leaves 0.1 to 0.3 mJ for the next contact. v₁ is zero, except that with a shared account and a robust ledger it
+/// is 1.5 Δ/(e τ_v), above the pulse of one count in u. Otherwise a coupled hand would lose its force, because each count
+/// reduces the force for a moment, and the robust ledger pays for both changes. With a robust ledger the force also
+/// grows only as far as the account can pay for its counts, ‖F₁‖ ≤ max(f_c, ‖F_held‖ + Ē/(4Δ)). Otherwise an empty
+/// account would stay empty.
 ///
 /// **damper** damps fast motion in contact, for hands that ring on a late or clipped spring. For each group of
 /// coordinates, with the velocity v of the interval:
 ///     u₁ ← u₁ + (T/τ_v)(v − u₁),   u ← u + (T/τ_v)(u₁ − u),   s ← s + (T/τ_h)(u − s),   w = u − s       m/s
-///     D = min(B h (1 − O/O_most)₊ (1 − v_q/‖w‖)₊ ‖F₁‖/(‖F₁‖ + f_s), ‖F₁‖/‖w‖) w                         N
+///     D = min(B' h (1 − O/O_most)₊ (1 − v_q/‖w‖)₊ ‖F₁‖/(‖F₁‖ + f_s), ‖F₁‖/‖w‖) w                        N
+///     B' = min(B, max(2.5 P₊/Q, 2 f_s/‖w‖, l B))                                                        N·s/m
+///     P ← P + (T/0.1 s)(g·w − P) in N·m/s,   Q ← Q + (T/0.1 s)(‖w‖² − Q) in m²/s²
+///     l = clamp((M/m − 1)/2, 0, 1),   m = τ_h ‖F₁‖²/(F₁·w) in kg,   if F₁·u > 0 and F₁·w > 0, else 0
 ///     v_q = z Δ/(e τ_v) / (1 + (‖s‖ τ_v/Δ)²)                                                            m/s
 ///     h = clamp(max((‖F_wanted‖/f_γ − 0.3)/0.4, age/10 ms · min(1, k/(0.3 K_s))), 0, 1)
 ///     k = ‖F_wanted‖/‖travel since the contact began‖ with energy_cap and shaping, else ∞                 N/m
 ///     O ← max(0, O − O T/0.3 s − D_held·Δx + (Δ/2)‖D_held − D_before‖₁)                                 J
+/// g is the undamped force F₁ after the filters of w. P/Q is thus the negative damping of the object, Kτ for a spring
+/// that is τ late, and the damper takes more energy than the object gives to the vibration. If the object gives none, as
+/// on a hand that is led, or if the learned model compensates τ, D is at most 2 f_s. m is the mass that F₁ would
+/// accelerate as it is measured. If it is hardly more than the handle, the hand has let go, and D is not reduced.
 /// h is zero for a fresh answer well inside the bound, and small for a soft spring. A late spring acts on the hand like
 /// a damper of −k · age N·s/m. The dead zone v_q removes the pulses of single counts, whose cost B Δ²/(e τ_v) would
 /// drain the robust ledger. O is the energy that the damper owes for its counts. The force is never reversed.
@@ -118,6 +128,7 @@ class AolPlus {
     Duration smoothing = std::chrono::microseconds(2200);  ///< τ_v, of the velocity
     Duration slow = std::chrono::milliseconds(20);         ///< τ_h: slower motion is not vibration
     double dead_zone = 0.7;                                ///< z, ≥ 0
+    std::array<double, Blocks> mass{0.3};                  ///< M, kg or kg·m², ≥ 0; 0: the group is never let go
     double most_owed = 3e-4;                               ///< O_most, J, > 0
   };
   struct FadingContact {
@@ -191,6 +202,7 @@ class AolPlus {
   double give_back(const Vec<kSize>& force, double size, double near, double budget) const noexcept;
   double grow(double size, double budget) const noexcept;
   double stiff(std::size_t block) const noexcept;
+  double let_go(std::size_t block, const Vec<Size>& force, const Vec<Size>& fast) const noexcept;
   Vec<kSize> damping(const Vec<kSize>& force, double near, Duration age) const noexcept;
   void shape(Duration age, double near, double budget, LimitedForce<kSize>& result) noexcept;
   void use(std::size_t block, const Friction& friction) noexcept;
@@ -213,15 +225,18 @@ class AolPlus {
   bool acceleration_holds_ = false;
   std::uint64_t broken_ = 0;
 
-  Vec<kSize> once_smoothed_ = Vec<kSize>::Zero();  ///< u₁, m/s
-  Vec<kSize> smoothed_ = Vec<kSize>::Zero();       ///< u, m/s
-  Vec<kSize> slow_ = Vec<kSize>::Zero();           ///< s, m/s
-  Vec<kSize> damped_ = Vec<kSize>::Zero();         ///< N, the damping in the current force
-  Vec<kSize> damped_before_ = Vec<kSize>::Zero();  ///< N, the damping in the previous force
-  double damper_owes_ = 0;                         ///< O, J
-  double held_ = 0;                                ///< N, ‖F_held‖, for thrift
-  double smoothing_ = 0;                           ///< τ_v in s, also used without a damper
-  double slowness_ = 0;                            ///< τ_h, s
+  using MotionAndForce = Eigen::Matrix<double, kSize, 2>;  ///< m/s, and N of the undamped force
+  MotionAndForce once_smoothed_ = MotionAndForce::Zero();  ///< column 0: u₁
+  MotionAndForce smoothed_ = MotionAndForce::Zero();       ///< column 0: u
+  MotionAndForce slow_ = MotionAndForce::Zero();           ///< column 0: s
+  std::array<double, Blocks> driven_{};                    ///< P, N·m/s
+  std::array<double, Blocks> vibrating_{};                 ///< Q, m²/s²
+  Vec<kSize> damped_ = Vec<kSize>::Zero();                 ///< N, the damping in the current force
+  Vec<kSize> damped_before_ = Vec<kSize>::Zero();          ///< N, the damping in the previous force
+  double damper_owes_ = 0;                                 ///< O, J
+  double held_ = 0;                                        ///< N, ‖F_held‖, for thrift
+  double smoothing_ = 0;                                   ///< τ_v in s, also used without a damper
+  double slowness_ = 0;                                    ///< τ_h, s
 
   std::array<double, kMostHolds> under_way_{};  ///< J, the reserve for each force
   std::size_t next_under_way_ = 0;

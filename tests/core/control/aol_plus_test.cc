@@ -74,6 +74,7 @@ Case<Blocks, Size> random_case(Dice& dice, const std::string& listed) {
     damper.smoothing = dice.milliseconds(0.5, 5);
     damper.dead_zone = dice.chance(0.3) ? 0.0 : dice.within(0, 1);
     damper.most_owed = dice.decades(-5, -2);
+    damper.mass.fill(dice.chance(0.3) ? 0.0 : dice.decades(-2, 1));
   }
   if (has('o')) parts.fading_contact.emplace().memory = dice.milliseconds(1, 1000);
   if (has('f')) parts.adaptive_friction.emplace().rise = milliseconds(50);
