@@ -365,8 +365,12 @@ template <int Blocks, int Size>
 double AolPlus<Blocks, Size>::give_back(const Vec<kSize>& force, double size, double near,
                                         double budget) const noexcept {
   const Thrift& thrift = *parts_.thrift;
-  const double counts = shared_ && robust_ ? kCountsAtRest * parts_.robust_ledger->encoder_step[0] : 0.0;
-  const double power = force.dot(smoothed_.col(0)) - size * counts / (kEuler * smoothing_);
+  double ignored = 0;  // v₁
+  if (const double step = shared_ && robust_ ? parts_.robust_ledger->encoder_step[0] : 0.0; step > 0) {
+    const double counts = slow_.col(0).norm() * slowness_ / step;
+    ignored = kCountsAtRest * step / (kEuler * smoothing_ * (1 + counts * counts));
+  }
+  const double power = force.dot(smoothed_.col(0)) - size * ignored;
   if (power <= 0 || near <= kThriftFrom || budget >= thrift.energy) return 1;
   const double away = std::min(1.0, power / (size * (smoothed_.col(0).norm() + kSlowHand)));
   const double close = std::min(1.0, (near - kThriftFrom) / kThriftOver);

@@ -57,10 +57,10 @@ namespace tendon {
 ///     F₁ ← F₁ (1 − σ a n (1 − Ē/E_s)),   a = clamp((F₁·u/‖F₁‖ − v₁)/(‖u‖ + 2 mm/s), 0, 1),
 ///                                        n = clamp((‖F_wanted‖/f_γ − 0.4)/0.4, 0, 1),   f_γ = γ ‖F_wanted‖
 /// This leaves 0.1 to 0.3 mJ for the next contact. v₁ is zero, except that with a shared account and a robust ledger it
-/// is 1.5 Δ/(e τ_v), above the pulse of one count in u. Otherwise a coupled hand would lose its force, because each count
-/// reduces the force for a moment, and the robust ledger pays for both changes. With a robust ledger the force also
-/// grows only as far as the account can pay for its counts, ‖F₁‖ ≤ max(f_c, ‖F_held‖ + Ē/(4Δ)). Otherwise an empty
-/// account would stay empty.
+/// is 1.5 Δ/(e τ_v)/(1 + (‖s‖ τ_h/Δ)²): above the pulse of one count in u if the hand is at rest (s and τ_h below).
+/// Otherwise a coupled hand would lose its force, because each count reduces the force for a moment, and the robust
+/// ledger pays for both changes. With a robust ledger the force also grows only as far as the account can pay for its
+/// counts, ‖F₁‖ ≤ max(f_c, ‖F_held‖ + Ē/(4Δ)). Otherwise an empty account would stay empty.
 ///
 /// **damper** damps fast motion in contact, for hands that ring on a late or clipped spring. For each group of
 /// coordinates, with the velocity v of the interval:
