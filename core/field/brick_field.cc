@@ -31,6 +31,12 @@ Taps taps(double t) noexcept {
   return {.value = {0.5 * below * below, 0.75 - t * t, 0.5 * above * above}, .slope = {-below, -2 * t, above}};
 }
 
+/// The index of a weight of a brick with its apron. The apron has the indices 0 and kSide + 1.
+std::size_t weight_at(int i, int j, int k) noexcept {
+  constexpr std::size_t kWide = BrickField::kSide + 2;
+  return (static_cast<std::size_t>(k) * kWide + static_cast<std::size_t>(j)) * kWide + static_cast<std::size_t>(i);
+}
+
 }  // namespace
 
 int BrickField::away(const Cell& cell) noexcept { return std::max<int>(cell.cells, -cell.cells); }
@@ -91,9 +97,7 @@ const BrickField::Brick* BrickField::brick_at(int x, int y, int z) const noexcep
 }
 
 void BrickField::fill_apron(Brick& brick) noexcept {
-  const auto index = [](const std::array<int, 3>& n) {
-    return static_cast<std::size_t>(((n[2] + 1) * kWide + n[1] + 1) * kWide + n[0] + 1);
-  };
+  const auto index = [](const std::array<int, 3>& n) { return weight_at(n[0] + 1, n[1] + 1, n[2] + 1); };
   // The order is faces, edges, corners. Missing weights are extrapolated along the first axis that leaves the brick.
   for (int leaving = 1; leaving <= 3; ++leaving) {
     std::array<int, 3> n{};
@@ -153,7 +157,7 @@ void BrickField::spread(int x, int y, int z, int way) noexcept {
         if (other.brick >= 0) {  // use the sign of the nearest node
           const auto node = [](int d) { return d == 0 ? kSide / 2 : d > 0 ? 1 : kSide; };
           const Brick& brick = bricks_[static_cast<std::size_t>(other.brick)];
-          inside = brick.weights[static_cast<std::size_t>((node(dz) * kWide + node(dy)) * kWide + node(dx))] < 0;
+          inside = brick.weights[weight_at(node(dx), node(dy), node(dz))] < 0;
         }
         cell.cells = static_cast<std::int16_t>(inside ? -cells : cells);
       }
@@ -196,7 +200,7 @@ SurfacePoint BrickField::at(const Vec3& x) const noexcept {
     const double s = place[static_cast<Eigen::Index>(a)];
     const double inside = std::clamp(s, 0.0, lattice_.bricks[a] * kSide - 1.0);
     beyond += (s - inside) * (s - inside);
-    node[a] = static_cast<int>(inside + 0.5);
+    node[a] = static_cast<int>(inside + 0.5);  // NOLINT(bugprone-incorrect-roundings): not negative
     tap[a] = taps(inside - node[a]);
   }
   const double way = beyond > 0 ? std::sqrt(beyond) * lattice_.spacing : 0;
@@ -208,8 +212,7 @@ SurfacePoint BrickField::at(const Vec3& x) const noexcept {
     return point;
   }
   const Brick& brick = bricks_[static_cast<std::size_t>(cell.brick)];
-  const auto corner = static_cast<std::size_t>(((node[2] % kSide) * kWide + node[1] % kSide) * kWide +
-                                               node[0] % kSide);  // one node before the middle one
+  const std::size_t corner = weight_at(node[0] % kSide, node[1] % kSide, node[2] % kSide);  // before the middle node
   double value = 0;
   double along_x = 0;
   double along_y = 0;
@@ -282,8 +285,9 @@ void sample(const std::function<double(const Vec3&)>& signed_distance, const Vec
       for (std::uint16_t i = 0; i < lattice.bricks[0]; ++i) {
         bool near = false;
         for (int n = 0; n < static_cast<int>(BrickField::kNodes) && !near; ++n) {
-          const Vec3 node(i * BrickField::kSide + n % 8, j * BrickField::kSide + n / 8 % 8,
-                          k * BrickField::kSide + n / 64);
+          const std::array<int, 3> in_brick{n % 8, n / 8 % 8, n / 64};
+          const Vec3 node(i * BrickField::kSide + in_brick[0], j * BrickField::kSide + in_brick[1],
+                          k * BrickField::kSide + in_brick[2]);
           near = std::abs(signed_distance(low + spacing * node)) < BrickField::kBand * spacing;
         }
         if (near) field.put({i, j, k}, weights_of(signed_distance, lattice, {i, j, k}));
