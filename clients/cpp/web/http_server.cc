@@ -57,10 +57,10 @@ asio::steady_timer::duration waiting_time(Duration d) {
 }  // namespace
 
 struct Stream {
-  explicit Stream(tcp::socket socket) : tcp(std::move(socket)) {}
-  tcp::socket& socket() { return web_socket ? web_socket->next_layer().socket() : tcp.socket(); }
+  explicit Stream(tcp::socket socket) : plain(std::move(socket)) {}
+  tcp::socket& socket() { return web_socket ? web_socket->next_layer().socket() : plain.socket(); }
 
-  beast::tcp_stream tcp;
+  beast::tcp_stream plain;  ///< moved into the WebSocket when it is accepted
   beast::flat_buffer request_buffer;
   std::optional<http::request_parser<http::empty_body>> parser;
   std::optional<websocket::stream<beast::tcp_stream>> web_socket;
@@ -203,8 +203,8 @@ void HttpConnection::read_request() {
   auto& parser = stream_->parser.emplace();
   parser.header_limit(limits_.max_request);
   parser.body_limit(0);
-  stream_->tcp.expires_after(waiting_time(limits_.request_patience));
-  http::async_read(stream_->tcp, stream_->request_buffer, parser, with([this](error_code error, std::size_t) {
+  stream_->plain.expires_after(waiting_time(limits_.request_patience));
+  http::async_read(stream_->plain, stream_->request_buffer, parser, with([this](error_code error, std::size_t) {
                      if (error == http::error::end_of_stream || error == beast::error::timeout ||
                          error == asio::error::connection_reset) {
                        return close();
@@ -220,8 +220,8 @@ void HttpConnection::reply(std::string head, Then then) {
 }
 
 void HttpConnection::write_piece() {
-  stream_->tcp.expires_after(waiting_time(limits_.reply_patience));
-  asio::async_write(stream_->tcp, asio::buffer(text_), with([this](error_code error, std::size_t) {
+  stream_->plain.expires_after(waiting_time(limits_.reply_patience));
+  asio::async_write(stream_->plain, asio::buffer(text_), with([this](error_code error, std::size_t) {
                       if (error) return close();
                       text_ = next_piece();
                       if (closed_) return;
@@ -235,18 +235,18 @@ void HttpConnection::write_piece() {
 void HttpConnection::linger() {
   error_code gone;
   stream_->socket().shutdown(tcp::socket::shutdown_send, gone);
-  stream_->tcp.expires_after(waiting_time(kLinger));
+  stream_->plain.expires_after(waiting_time(kLinger));
   text_.resize(kMaxLingered);
-  asio::async_read(stream_->tcp, asio::buffer(text_), with([this](error_code, std::size_t) { close(); }));
+  asio::async_read(stream_->plain, asio::buffer(text_), with([this](error_code, std::size_t) { close(); }));
 }
 
 void HttpConnection::accept(const WebSocket& options) {
-  stream_->tcp.expires_never();
+  stream_->plain.expires_never();
   if (options.send_buffer_size > 0) {
     error_code gone;
     stream_->socket().set_option(asio::socket_base::send_buffer_size(options.send_buffer_size), gone);
   }
-  auto& web_socket = stream_->web_socket.emplace(std::move(stream_->tcp));
+  auto& web_socket = stream_->web_socket.emplace(std::move(stream_->plain));
   websocket::stream_base::timeout timeout{};
   timeout.handshake_timeout = waiting_time(options.patience);
   timeout.idle_timeout = waiting_time(options.silence);
