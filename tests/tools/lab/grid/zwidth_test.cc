@@ -46,8 +46,10 @@ TEST(ZWidth, TheLimitsDecideWhatIsQuietAndPassive) {
 }
 
 TEST(ZWidth, BothPicturesCarryTheirCommand) {
-  const Origin origin{
-      .command = "tendon-lab sweep <a&b>.toml", .scene_sha256 = std::string(64, 'a'), .commit = "c0ffee"};
+  const Origin origin{.command = "tendon-lab sweep <a&b>.toml",
+                      .scene_sha256 = std::string(64, 'a'),
+                      .commit = "c0ffee",
+                      .arithmetic = "beef"};
   const auto stem = std::filesystem::path(::testing::TempDir()) / "zwidth";
   const auto files = draw_zwidth(stem, {row("aol", "far", 100, 1, wall(0.1, 50))}, {}, origin);
   ASSERT_EQ(files.size(), 2U);
