@@ -26,7 +26,8 @@ it("shows the server live, pauses when told to, and goes on", async (test) => {
   await page.locator("#pause[aria-pressed=true]").waitFor();
   await page.locator(".scrubber").waitFor();
   const coming = await shown(page);
-  const still = await picture(page, "[data-chart=position] canvas");
+  let still = "";
+  await until("the last frame is drawn", async () => still === (still = await picture(page, "[data-chart=position] canvas")));
   await until("states come all the same", async () => (await shown(page)) > coming + 200);
   assert.equal(await picture(page, "[data-chart=position] canvas"), still);
   await page.click("#zoom-in");
