@@ -21,9 +21,12 @@ std::string rounded(double value, int significant) {
   return {text.data(), end};
 }
 
+std::string not_expected(std::string_view field, double value, std::string_view expected) {
+  return std::string(field) + " = " + shortest(value) + ": expected " + std::string(expected);
+}
+
 void expect(bool holds, std::string_view field, double value, std::string_view expected) {
-  if (holds) return;
-  throw std::invalid_argument(std::string(field) + " = " + shortest(value) + ": expected " + std::string(expected));
+  if (!holds) throw std::invalid_argument(not_expected(field, value, expected));
 }
 
 void expect_above_zero(double value, std::string_view field) {

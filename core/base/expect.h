@@ -8,8 +8,11 @@
 
 namespace tendon {
 
-/// If `holds` is false, throws std::invalid_argument "`field` = `value`: expected `expected`". Write `holds` so that it
-/// is false for NaN (`x > 0`, not `!(x <= 0)`).
+/// Returns "`field` = `value`: expected `expected`".
+std::string not_expected(std::string_view field, double value, std::string_view expected);
+
+/// If `holds` is false, throws std::invalid_argument with the text of not_expected(). Write `holds` so that it is false
+/// for NaN (`x > 0`, not `!(x <= 0)`).
 void expect(bool holds, std::string_view field, double value, std::string_view expected);
 
 void expect_finite(const Vec3& value, std::string_view field);

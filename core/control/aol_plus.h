@@ -128,7 +128,7 @@ class AolPlus {
     Duration smoothing = std::chrono::microseconds(2200);  ///< τ_v, of the velocity
     Duration slow = std::chrono::milliseconds(20);         ///< τ_h: slower motion is not vibration
     double dead_zone = 0.7;                                ///< z, ≥ 0
-    std::array<double, Blocks> mass{0.3};                  ///< M, kg or kg·m², ≥ 0; 0: the group is never let go
+    std::array<double, Blocks> mass{0.3};                  ///< M, kg or kg·m², ≥ 0; 0 sets l = 0
     double most_owed = 3e-4;                               ///< O_most, J, > 0
   };
   struct FadingContact {

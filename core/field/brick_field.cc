@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
 #include <string>
 
 #include "core/base/expect.h"
@@ -43,23 +44,31 @@ int BrickField::away(const Cell& cell) noexcept { return std::max<int>(cell.cell
 
 BrickField::BrickField() : bricks_(kMostBricks), cells_(kMostCells) {}
 
-void BrickField::reset(const Lattice& lattice) {
-  expect_finite(lattice.origin, "origin");
-  expect(lattice.spacing >= kLeastSpacing && lattice.spacing <= kMostSpacing, "spacing", lattice.spacing,
-         "0.00025 … 0.008 m");
-  expect(lattice.scale > 0 && lattice.scale * kBiggestWeight <= kMostExtent, "scale", lattice.scale,
-         "a number above 0, and at most 2 m in 32767");
-  double cells = 1;
+std::string BrickField::Lattice::refused() const {
   for (std::size_t i = 0; i < 3; ++i) {
-    const double extent = lattice.bricks[i] * kSide * lattice.spacing;
-    expect(lattice.bricks[i] > 0 && extent <= kMostExtent, std::string("bricks.") + kAxes[i], lattice.bricks[i],
-           "1 or more, and at most 2 m");
-    cells *= lattice.bricks[i];
+    const double along = origin[static_cast<Eigen::Index>(i)];
+    if (!(std::abs(along) <= kMostOrigin)) return not_expected(std::string("origin.") + kAxes[i], along, "±1e12 m");
   }
-  expect(cells <= kMostCells, "bricks", cells, "at most " + std::to_string(kMostCells) + " cells");
+  if (!(spacing >= kLeastSpacing && spacing <= kMostSpacing)) {
+    return not_expected("spacing", spacing, "0.00025 … 0.008 m");
+  }
+  if (!(scale > 0 && scale * kBiggestWeight <= kMostExtent)) {
+    return not_expected("scale", scale, "above 0, and at most 2 m in 32767");
+  }
+  for (std::size_t i = 0; i < 3; ++i) {
+    if (bricks[i] == 0 || bricks[i] * kSide * spacing > kMostExtent) {
+      return not_expected(std::string("lattice.") + kAxes[i], bricks[i], "1 or more, and at most 2 m");
+    }
+  }
+  if (cells() <= kMostCells) return {};
+  return not_expected("lattice", static_cast<double>(cells()), "at most " + std::to_string(kMostCells) + " cells");
+}
+
+void BrickField::reset(const Lattice& lattice) {
+  if (const std::string why = lattice.refused(); !why.empty()) throw std::invalid_argument(why);
   lattice_ = lattice;
   used_ = 0;
-  std::fill(cells_.begin(), cells_.begin() + static_cast<std::ptrdiff_t>(cells), Cell{});
+  std::fill(cells_.begin(), cells_.begin() + static_cast<std::ptrdiff_t>(lattice.cells()), Cell{});
 }
 
 void BrickField::put(const Place& place, const Weights& weights, std::uint8_t material) {

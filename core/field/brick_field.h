@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <string>
 #include <vector>
 
 #include "core/field/primitives.h"
@@ -33,9 +34,10 @@ class BrickField {
   static constexpr std::size_t kMostBricks = 1023;
   static constexpr std::size_t kMostCells = 65536;
   static constexpr double kBand = 2.5;
-  static constexpr double kLeastSpacing = 0.25e-3;
-  static constexpr double kMostSpacing = 8e-3;
-  static constexpr double kMostExtent = 2;  ///< m
+  static constexpr double kLeastSpacing = 0.25e-3;  ///< m
+  static constexpr double kMostSpacing = 8e-3;      ///< m
+  static constexpr double kMostExtent = 2;          ///< m, of the lattice, and of a distance
+  static constexpr double kMostOrigin = 1e12;       ///< m
 
   using Place = std::array<std::uint16_t, 3>;        ///< number of a brick along x, y and z
   using Weights = std::array<std::int16_t, kNodes>;  ///< x fastest, then y, then z
@@ -45,11 +47,16 @@ class BrickField {
     double spacing = 1e-3;       ///< h, m
     double scale = 1e-7;         ///< m per unit of a weight, > 0; 32767 units are at most kMostExtent
     Place bricks{1, 1, 1};       ///< along x, y and z
+
+    /// The number of places, at most kMostCells.
+    std::size_t cells() const noexcept { return std::size_t{bricks[0]} * bricks[1] * bricks[2]; }
+    /// Returns an error message for the first number that is out of its range, or an empty string.
+    std::string refused() const;
   };
 
   BrickField();
 
-  /// Removes all bricks. Throws std::invalid_argument with the name of the field if a number is out of its range.
+  /// Removes all bricks. Throws std::invalid_argument with the text of `lattice.refused()`.
   void reset(const Lattice& lattice);
 
   /// Adds a brick. Throws std::invalid_argument if the place is outside the lattice or taken, or if there are
@@ -57,10 +64,10 @@ class BrickField {
   void put(const Place& place, const Weights& weights, std::uint8_t material = 0);
 
   /// Must be called after the last brick: fills the aprons and the coarse lattice. An apron without a neighbour
-  /// continues the brick linearly.
+  /// extrapolates the weights of the brick linearly.
   void finish() noexcept;
 
-  /// Realtime-safe: yes, about 80 additions and multiplications.
+  /// Realtime-safe: yes. Needs about 80 additions and multiplications.
   SurfacePoint at(const Vec3& x) const noexcept;
 
   const Lattice& lattice() const noexcept { return lattice_; }

@@ -10,13 +10,13 @@
 
 #include "core/base/bytes.h"
 #include "core/base/expect.h"
-#include "protocol/limits.h"
+#include "core/field/field.h"
 
 namespace tendon {
 namespace {
 
-constexpr double kBrickSide = 8;
-constexpr double kGreatestWeight = 32767;
+using field::BrickField;
+
 constexpr std::array<std::string_view, 3> kAxisNames = {".x", ".y", ".z"};
 
 double f64_at(std::span<const std::byte> bytes, std::size_t at) noexcept {
@@ -26,9 +26,6 @@ std::uint16_t u16_at(std::span<const std::byte> bytes, std::size_t at) noexcept 
   return get_little_endian<std::uint16_t>(bytes.data() + at);
 }
 
-std::string not_expected(std::string_view name, double value, std::string_view expected) {
-  return std::string(name) + " = " + shortest(value) + ": expected " + std::string(expected);
-}
 std::string of_brick(std::size_t i, std::string_view part) {
   return "bricks[" + std::to_string(i) + "]." + std::string(part);
 }
@@ -36,7 +33,7 @@ std::string of_brick(std::size_t i, std::string_view part) {
 }  // namespace
 
 std::vector<std::byte> encode_manifest(const FieldLattice& lattice, std::span<const PlacedBrick> bricks) {
-  if (bricks.size() > limits::kMaxFieldBricks) {
+  if (bricks.size() > BrickField::kMostBricks) {
     throw std::invalid_argument(not_expected("bricks", static_cast<double>(bricks.size()), "1 … 1023"));
   }
   std::vector<std::byte> bytes(FieldManifest::kHead + bricks.size() * FieldManifest::kEntry);
@@ -69,30 +66,9 @@ std::vector<std::byte> encode_manifest(const FieldLattice& lattice, std::span<co
 }
 
 std::string FieldManifest::refused_head() const {
-  const FieldLattice its = lattice();
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    const double along = its.origin[static_cast<Eigen::Index>(axis)];
-    if (!(std::abs(along) <= limits::kMaxValue)) {
-      return not_expected("origin" + std::string(kAxisNames[axis]), along, "±1e12 m");
-    }
-  }
-  if (!(its.spacing >= limits::kMinFieldSpacing && its.spacing <= limits::kMaxFieldSpacing)) {
-    return not_expected("spacing", its.spacing, "0.00025 … 0.008 m");
-  }
-  if (!(its.scale > 0 && its.scale * kGreatestWeight <= limits::kMaxFieldExtent)) {
-    return not_expected("scale", its.scale, "above 0, and at most 2 m in 32767");
-  }
-  std::size_t cells = 1;
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    const std::uint16_t along = its.bricks[axis];
-    if (along == 0 || along * kBrickSide * its.spacing > limits::kMaxFieldExtent) {
-      return not_expected("lattice" + std::string(kAxisNames[axis]), along, "1 or more, and at most 2 m");
-    }
-    cells *= along;  // at most 1000 each
-  }
-  if (cells > limits::kMaxFieldCells) return not_expected("lattice", static_cast<double>(cells), "at most 65536 cells");
+  if (std::string why = lattice().refused(); !why.empty()) return why;
   const std::size_t count = bricks();
-  if (count == 0 || count > limits::kMaxFieldBricks) {
+  if (count == 0 || count > BrickField::kMostBricks) {
     return not_expected("bricks", static_cast<double>(count), "1 … 1023");
   }
   return {};
@@ -106,7 +82,7 @@ std::string FieldManifest::refused() const {
     return not_expected("manifest", static_cast<double>(bytes_.size()), std::to_string(expected) + " bytes");
   }
   const auto along = lattice().bricks;
-  std::bitset<limits::kMaxFieldCells> taken;
+  std::bitset<BrickField::kMostCells> taken;
   for (std::size_t i = 0; i < bricks(); ++i) {
     const PlacedBrick one = brick(i);
     std::size_t cell = 0;
@@ -119,7 +95,7 @@ std::string FieldManifest::refused() const {
     }
     if (taken.test(cell)) return of_brick(i, "place") + ": expected a place without a brick";
     taken.set(cell);
-    if (one.material >= limits::kMaxFieldMaterials)
+    if (one.material >= field::Field::kMostMaterials)
       return not_expected(of_brick(i, "material"), one.material, "0 … 31");
   }
   return {};

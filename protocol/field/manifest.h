@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "core/base/motion.h"
+#include "core/field/brick_field.h"
 
 // Defines the encoding of a signed distance field. The field is stored in bricks of 8³ weights (int16, little-endian, x
 // is the fastest index). A brick is identified by its BLAKE2b-128 hash. The manifest contains the lattice and the list of
@@ -17,15 +17,8 @@
 
 namespace tendon::limits {
 
-inline constexpr std::size_t kBrickBytes = 1024;  ///< 512 int16; fits into a datagram
-/// A status has 1024 bits: one for each brick, and the last one for the manifest.
-inline constexpr std::size_t kMaxFieldBricks = 1023;
-inline constexpr std::size_t kMaxFieldCells = 65'536;  ///< number of possible places in the lattice
-inline constexpr double kMinFieldSpacing = 0.25e-3;    ///< m, between two weights
-inline constexpr double kMaxFieldSpacing = 8e-3;       ///< m
-inline constexpr double kMaxFieldExtent = 2;           ///< m, size of the lattice and maximum distance
-inline constexpr unsigned kMaxFieldMaterials = 32;
-inline constexpr std::size_t kMaxFieldPart = 1000;  ///< bytes; a request with a part fits into a datagram of its own
+inline constexpr std::size_t kBrickBytes = sizeof(field::BrickField::Weights);  ///< fits into a datagram
+inline constexpr std::size_t kMaxFieldPart = 1000;  ///< bytes, so that each part fits into a datagram
 
 }  // namespace tendon::limits
 
@@ -35,13 +28,7 @@ using BrickBytes = std::array<std::byte, limits::kBrickBytes>;
 using BrickHash = std::array<std::byte, 16>;
 using FieldName = std::array<std::byte, 32>;
 
-/// The place of weight w(i, j, k) of the brick at p is origin + spacing (8 p + (i, j, k)), in the frame of the object.
-struct FieldLattice {
-  Vec3 origin = Vec3::Zero();                    ///< m
-  double spacing = 1e-3;                         ///< m
-  double scale = 1e-7;                           ///< m per unit of a weight
-  std::array<std::uint16_t, 3> bricks{1, 1, 1};  ///< along x, y and z
-};
+using FieldLattice = field::BrickField::Lattice;
 
 struct PlacedBrick {
   std::array<std::int32_t, 3> place{};  ///< in bricks
@@ -60,7 +47,7 @@ class FieldManifest {
  public:
   static constexpr std::size_t kHead = 48;
   static constexpr std::size_t kEntry = 23;
-  static constexpr std::size_t kMost = kHead + limits::kMaxFieldBricks * kEntry;
+  static constexpr std::size_t kMost = kHead + field::BrickField::kMostBricks * kEntry;
 
   explicit FieldManifest(std::span<const std::byte> bytes) noexcept : bytes_(bytes) {}
 

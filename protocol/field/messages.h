@@ -32,7 +32,7 @@ struct FieldBrick {
 /// server → client, unreliable, 20 times per second; the newest one wins. Bit i % 8 of byte i / 8 is set if brick i is
 /// missing. The last bit is set if the manifest is not complete. In this case, the bits of unknown bricks are 0.
 struct FieldStatus {
-  static constexpr std::size_t kManifest = limits::kMaxFieldBricks;
+  static constexpr std::size_t kManifest = field::BrickField::kMostBricks;
 
   FieldName field{};
   std::array<std::byte, 128> missing{};

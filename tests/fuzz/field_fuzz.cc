@@ -81,14 +81,14 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         }
         break;
       }
-      case 2: {  // the next part of a correct client
+      case 2: {  // a correct client sends its next part
         if (const auto part = client.next_part(now)) {
           client.part_sent();
           refused = server.take(now, *part);
         }
         break;
       }
-      case 3: {  // the next brick of a correct client, which may be lost
+      case 3: {  // a correct client sends its next brick, which may be lost
         const auto brick = client.next_brick(now);
         if (!brick || (choice & 0x20U) != 0) break;
         fuzz::require(brick->hash == crypto::blake2b_128(brick->bytes));

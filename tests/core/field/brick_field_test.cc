@@ -139,9 +139,9 @@ TEST(BrickField, AWrongManifestIsRefused) {
   EXPECT_NE(refusal({.scale = std::numeric_limits<double>::quiet_NaN()}), "");
   EXPECT_NE(refusal({.scale = 1e12}), "");
   EXPECT_NE(refusal({.origin = {0, std::numeric_limits<double>::infinity(), 0}}), "");
-  EXPECT_EQ(refusal({.bricks = {1, 0, 1}}), "bricks.y = 0: expected 1 or more, and at most 2 m");
+  EXPECT_EQ(refusal({.bricks = {1, 0, 1}}), "lattice.y = 0: expected 1 or more, and at most 2 m");
   EXPECT_NE(refusal({.bricks = {1, 300, 1}}), "");
-  EXPECT_EQ(refusal({.bricks = {100, 100, 100}}), "bricks = 1e+06: expected at most 65536 cells");
+  EXPECT_EQ(refusal({.bricks = {100, 100, 100}}), "lattice = 1e+06: expected at most 65536 cells");
   EXPECT_EQ(refusal({}), "");
 }
 

@@ -13,7 +13,7 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-constexpr std::size_t kAll = limits::kMaxFieldBricks;
+constexpr std::size_t kAll = field::BrickField::kMostBricks;
 constexpr Weather kFar{.delay = milliseconds(95), .jitter = milliseconds(10), .loss = 0.05, .duplicate = 0.05};
 const Weather kCalm = perfect(milliseconds(100));
 

@@ -97,7 +97,7 @@ class Upload {
 
   void turn() {
     receive(to_server_);
-    while (const Control* const request = answering_.next()) {  // a request stands for the part at `hz`
+    while (const Control* const request = answering_.next()) {  // `hz` is the offset of the part
       const std::size_t at = std::get<SetStateRate>(*request->request).hz;
       const auto manifest = sender.manifest();
       note(receiver.take(

@@ -69,7 +69,7 @@ EchoTimes measure_echo(const Load& load, const std::function<void(EchoSetup&)>& 
   const SharedMemory<EchoSetup> setup;
   setup->number = ::getpid();
   setup->reply_delay = load.reply_delay;
-  const AtPriority high(load.priority);  // also of the server and of all later threads
+  const AtPriority high(load.priority);  // the server and all later threads inherit it
   const OtherProcess other([&] { serve(*setup); });
   struct Killer {
     const OtherProcess& process;

@@ -21,8 +21,8 @@ TEST(Compare, AolPlusGivesOutNothingInASampleOfTheGrid) {
   }
 }
 
-/// The whole grid is 100 % passive, 99.7 % within 8 mm/s, 97 % within 3 mm/s, 62 % within 1.5 mm/s. The error is 17.0
-/// %.
+/// In the whole grid, all cells are passive, and 99.7, 97 and 62 % vibrate by at most 8, 3 and 1.5 mm/s. The median error
+/// is 17.0 %.
 TEST(Compare, ThePresetIsPassiveQuietAndTrueInASampleOfTheGrid) {
   const auto grid = comparison_grid();
   std::size_t within3 = 0;
