@@ -92,6 +92,25 @@ struct Message {
   alignas(cmsghdr) std::array<char, local_address::kControlBytes> control_{};
 };
 
+/// Receives a datagram without waiting, like recvfrom(). If `local` is not null, it is set to the local address of the
+/// datagram. This requires recvmsg(), which takes longer.
+ssize_t take(int fd, std::span<std::byte> buffer, udp::endpoint& from, std::optional<AskedAt::Ip>* local) {
+  if (local == nullptr) {
+    auto length = static_cast<socklen_t>(from.capacity());
+    const ssize_t size = ::recvfrom(fd, buffer.data(), buffer.size(), MSG_TRUNC | MSG_DONTWAIT, from.data(), &length);
+    if (size >= 0) from.resize(length);
+    return size;
+  }
+  Message message(buffer, from, from.capacity());
+  message.ask_for_local();
+  const ssize_t size = ::recvmsg(fd, &message.header, MSG_TRUNC | MSG_DONTWAIT);
+  if (size >= 0) {
+    from.resize(message.header.msg_namelen);
+    *local = message.local();
+  }
+  return size;
+}
+
 void share_address(int fd) { set(fd, SO_REUSEPORT, int{1}); }
 
 /// The filter is described at UdpLink::several. For short datagrams, it returns 0, which is the first socket.
@@ -204,17 +223,13 @@ std::size_t UdpLink::receive(Address& from, std::span<std::byte> buffer) {
 std::size_t UdpLink::receive_from_network(Address& from, std::span<std::byte> buffer) {
   udp::endpoint endpoint;
   for (int i = 0; i < kMaxEmptyDatagrams; ++i) {
-    Message message(buffer, endpoint, endpoint.capacity());
-    if (asked_at_) message.ask_for_local();
-    const ssize_t size = ::recvmsg(fd_, &message.header, MSG_TRUNC | MSG_DONTWAIT);
+    std::optional<AskedAt::Ip> local;
+    const ssize_t size = take(fd_, buffer, endpoint, asked_at_ ? &local : nullptr);
     if (size == 0 || (size < 0 && errno == EINTR)) continue;
     if (size < 0) return 0;
-    endpoint.resize(message.header.msg_namelen);
     from = to_address(endpoint);
     if (UnixSocket::is_peer(from)) continue;  // spoofed: port 0 is not valid
-    if (asked_at_) {
-      if (const auto local = message.local()) asked_at_->put(from, *local);
-    }
+    if (local) asked_at_->put(from, *local);
     return static_cast<std::size_t>(size);
   }
   return 0;
