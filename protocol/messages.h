@@ -63,6 +63,9 @@ inline constexpr std::string_view kFeatureStateColumns = "state-columns";
 /// An engine names its solver paths, and each force indicates which one was used.
 inline constexpr std::string_view kFeatureWays = "ways";
 
+/// The client can upload fields (OfferField), which the server renders at its own rate (UseField).
+inline constexpr std::string_view kFeatureFields = "fields";
+
 /// For observers only: requested forces and statistics of loops and engines (DeviceReport, PeerReport).
 inline constexpr std::string_view kFeatureDiagnostics = "diagnostics";
 

@@ -18,6 +18,8 @@
 namespace tendon {
 namespace {
 
+constexpr std::size_t kMostStatuses = 8;
+
 /// The newest value of each stream. A stream consists of the states or reports of a device or channel, so the codec
 /// limits the number of streams to kMaxDevices or kMaxDevices · kMaxChannels. `Told` is the event that wraps a value,
 /// or void. Memory is only allocated for the first value of a stream and for the text of a report.
@@ -75,6 +77,7 @@ class Newest {
   static Order order_of(const ForceCommand& force) noexcept { return {0, force.sequence}; }
   static Order order_of(const PortFrame& port) noexcept { return {port.epoch, port.sequence}; }
   static Order order_of(const PeerReport& report) noexcept { return {0, report.link.number}; }
+  static Order order_of(const FieldPose& pose) noexcept { return {0, pose.sequence}; }
   static Order order_of(const auto& report) noexcept { return {0, report.number}; }
 
   static const Value& in(const Value& kept) noexcept { return kept; }
@@ -98,6 +101,7 @@ class Newest {
   static bool same(const PortFrame& a, const PortFrame& b) noexcept {
     return a.device == b.device && a.channel == b.channel && a.of_peer == b.of_peer;
   }
+  static bool same(const FieldStatus& a, const FieldStatus& b) noexcept { return a.field == b.field; }
   static bool same(const auto& a, const auto& b) noexcept { return a.device == b.device && a.channel == b.channel; }
   typename std::vector<Stream>::const_iterator next_waiting() const noexcept {
     return std::find_if(streams_.begin(), streams_.end(), [](const Stream& s) { return s.waiting; });
@@ -106,6 +110,11 @@ class Newest {
     const auto found =
         std::find_if(streams_.begin(), streams_.end(), [&](const Stream& s) { return same(in(s.value), value); });
     if (found != streams_.end()) return *found;
+    if constexpr (std::is_same_v<Value, FieldStatus>) {  // the number of names has no limit
+      const auto unused = std::ranges::find(streams_, false, &Stream::waiting);
+      if (unused != streams_.end()) return *unused;
+      if (streams_.size() == kMostStatuses) return streams_.front();
+    }
     if constexpr (std::is_void_v<Told>) {
       return streams_.emplace_back(Stream{.value = value});
     } else {
@@ -115,6 +124,20 @@ class Newest {
 
   std::vector<Stream> streams_;
   std::size_t waiting_ = 0;
+};
+
+/// The newest brick. Memory is only allocated for the first one.
+struct NewestBrick {
+  bool waiting = false;
+  decltype(FieldBrick::hash) hash{};
+  std::vector<std::byte> weights;
+
+  void put(const FieldBrick& brick) {
+    waiting = true;
+    hash = brick.hash;
+    weights.assign(brick.weights.begin(), brick.weights.end());
+  }
+  FieldBrick value() const noexcept { return {.hash = hash, .weights = weights}; }
 };
 
 template <class... Newests>
@@ -160,8 +183,9 @@ struct Session::State {
   std::uint64_t next_packet = 0;
   std::optional<LocalTime> last_sent;
   Streams<Newest<DeviceState>, Newest<ForceCommand>, Newest<PortFrame>, Newest<LinkReport>, Newest<DeviceReport>,
-          Newest<PeerReport>>
+          Newest<PeerReport>, Newest<FieldPose>, Newest<FieldStatus>>
       to_send;
+  NewestBrick brick_to_send;
   OutgoingRequests asked;
   Bye bye;
   int byes_left = 0;
@@ -180,8 +204,10 @@ struct Session::State {
   // Pending events, in the order of next_event().
   Streams<Newest<ForceCommand, ForceArrived>, Newest<PortFrame, PortArrived>, Newest<LinkReport, ReportArrived>,
           Newest<DeviceReport, DeviceReportArrived>, Newest<PeerReport, PeerReportArrived>,
-          Newest<DeviceState, StateArrived>>
+          Newest<DeviceState, StateArrived>, Newest<FieldPose, FieldPoseArrived>,
+          Newest<FieldStatus, FieldStatusArrived>>
       arrived;
+  NewestBrick brick;  ///< that has arrived
   std::optional<Closed> closed;
   bool untold = false;  ///< some event may be pending
   Event rare;           ///< other events returned by next_event()
@@ -203,6 +229,11 @@ struct Session::State {
   void take(const Control& control, bool /*newest*/) { stats.invalid += news().answering.take(control) ? 0 : 1; }
   void take(const ControlAck& ack, bool /*newest*/) { stats.invalid += news().asked.acknowledge(ack) ? 0 : 1; }
   void take(const Bye& said, bool newest);
+  void take(const FieldBrick& arrived_brick, bool /*newest*/) { brick.put(arrived_brick); }
+  void take(const FieldStatus& status, bool newest) {
+    if (newest) return of<FieldStatus>(arrived).put(status);
+    ++stats.stale;
+  }
 
   bool silent_too_long(LocalTime now) const noexcept { return !last_sent || now - *last_sent >= config.keep_alive; }
   /// Must be called before data to be sent are changed.
@@ -212,7 +243,9 @@ struct Session::State {
   }
   bool something_to_say(LocalTime now) noexcept {
     if (now < silent_until) return false;
-    if (!to_send.empty() || answering.next_due() || asked.next_due(now) || silent_too_long(now)) return true;
+    if (!to_send.empty() || brick_to_send.waiting || answering.next_due() || asked.next_due(now) ||
+        silent_too_long(now))
+      return true;
     silent_until = std::min(*last_sent + config.keep_alive, asked.next_due_time());
     return false;
   }
@@ -362,6 +395,13 @@ void Session::send(const LinkReport& report) { state_->send(report); }
 void Session::send(const DeviceReport& report) { state_->send(report); }
 void Session::send(const PeerReport& report) { state_->send(report); }
 void Session::send(const PortFrame& port) { state_->send(port); }
+void Session::send(const FieldStatus& status) { state_->send(status); }
+void Session::send(const FieldPose& pose) { state_->send(pose); }
+bool Session::send(const FieldBrick& brick) {
+  if (state_->brick_to_send.waiting) return false;
+  state_->news().brick_to_send.put(brick);
+  return true;
+}
 
 std::optional<std::uint32_t> Session::request(const Request& request) { return state_->news().asked.add(request); }
 
@@ -450,10 +490,11 @@ void Session::State::fill_with() {
   (add(of<Value>(to_send)), ...);
 }
 
-/// Adds as much as possible, most urgent first, and the rest to the next datagram. A state and a force always fit.
+/// Adds as much as possible, most urgent first, and the rest to the next datagram. A state fits in any case,
+/// and so does a force with a pose.
 void Session::State::fill(LocalTime now) {
   if (config.states_in_columns) fill_columns();
-  fill_with<DeviceState, PortFrame, ForceCommand>();
+  fill_with<DeviceState, PortFrame, ForceCommand, FieldPose>();
   for (const ControlAck* ack = answering.next_due(); ack && writer.add(*ack); ack = answering.next_due()) {
     answering.sent(ack->id);
   }
@@ -461,7 +502,8 @@ void Session::State::fill(LocalTime now) {
   for (const Control* due = asked.next_due(now); due && writer.add(*due); due = asked.next_due(now)) {
     asked.sent(due->id, now, timeout);
   }
-  fill_with<LinkReport, DeviceReport, PeerReport>();
+  fill_with<LinkReport, DeviceReport, PeerReport, FieldStatus>();
+  if (brick_to_send.waiting && writer.add(brick_to_send.value())) brick_to_send.waiting = false;
 }
 
 std::size_t Session::next_datagram(LocalTime now, std::span<std::byte, kMaxDatagram> buffer) {
@@ -511,6 +553,7 @@ const Session::Event* Session::State::tell() {
                                 .handle = std::move(ack.handle)});
   }
   if (const Event* const event = arrived.take()) return event;
+  if (std::exchange(brick.waiting, false)) return keep(BrickArrived{brick.value()});
   if (closed) return keep(*std::exchange(closed, std::nullopt));
   return nullptr;
 }

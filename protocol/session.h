@@ -41,8 +41,8 @@ struct LinkStats {
 /// A conversation between a client and a server, used by both. It has no sockets, clocks, threads or random numbers.
 /// Its inputs are bytes and times, and its owner pulls bytes and events.
 ///
-/// All queues are bounded: one state and one report per device, one force, port and report per channel, one link
-/// report, and limits::kRequestWindow requests in each direction. If an event was not pulled in time, a newer one of
+/// All queues are bounded: one state and one report per device, one force, port, pose and report per channel, one link
+/// report, one brick, eight FieldStatus, and limits::kRequestWindow requests in each direction. If an event was not pulled in time, a newer one of
 /// the same stream replaces it.
 ///
 /// Call `receive` with each datagram and `tick` when `next_tick()` is due. Then pull `next_event` and `next_datagram`
@@ -98,6 +98,15 @@ class Session {
   struct PortArrived {
     PortFrame port;
   };
+  struct BrickArrived {
+    FieldBrick brick;
+  };
+  struct FieldStatusArrived {
+    FieldStatus status;
+  };
+  struct FieldPoseArrived {
+    FieldPose pose;
+  };
   struct RequestArrived {
     std::uint32_t id;
     Request request;
@@ -114,8 +123,9 @@ class Session {
     Code code;  ///< of the peer's Bye, or kTimedOut or kExpired
     std::string reason;
   };
-  using Event = std::variant<StateArrived, ForceArrived, ReportArrived, DeviceReportArrived, PeerReportArrived,
-                             PortArrived, RequestArrived, RequestAnswered, Closed>;
+  using Event =
+      std::variant<StateArrived, ForceArrived, ReportArrived, DeviceReportArrived, PeerReportArrived, PortArrived,
+                   BrickArrived, FieldStatusArrived, FieldPoseArrived, RequestArrived, RequestAnswered, Closed>;
 
   // Input.
   /// Handles a datagram. Malformed or foreign datagrams are counted and dropped. Returns true if this is the newest
@@ -127,6 +137,10 @@ class Session {
   void send(const DeviceReport& report);
   void send(const PeerReport& report);
   void send(const PortFrame& port);
+  void send(const FieldStatus& status);
+  void send(const FieldPose& pose);
+  /// Copies the brick. Returns false if the previous one was not written to a datagram yet.
+  bool send(const FieldBrick& brick);
   /// Queues a reliable request and returns its id, or nullopt if limits::kRequestWindow requests are pending. A request
   /// remains pending until its RequestAnswered has been pulled.
   std::optional<std::uint32_t> request(const Request& request);

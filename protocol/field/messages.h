@@ -2,47 +2,29 @@
 #pragma once
 
 #include <algorithm>
-#include <array>
 #include <cstddef>
-#include <cstdint>
-#include <span>
+#include <tuple>
 
 #include "core/base/expect.h"
 #include "core/base/time.h"
 #include "protocol/field/manifest.h"
+#include "protocol/messages.h"
 
-// The messages of an upload as plain values. The spans refer to the memory of the sender, or to the datagram.
+// The messages of an upload (OfferField, FieldBrick, FieldStatus) are generated from tendon.proto.
 
 namespace tendon {
 
-/// client → server, reliable and in order: bytes offset … offset + bytes.size() − 1 of a manifest of `size` bytes.
-struct FieldPart {
-  FieldName field{};
-  std::uint32_t size = 0;
-  std::uint32_t offset = 0;
-  std::span<const std::byte> bytes{};  ///< at most limits::kMaxFieldPart
-};
+/// The bit of FieldStatus::missing for the manifest.
+inline constexpr std::size_t kManifestBit = field::BrickField::kMostBricks;
+static_assert(kManifestBit / 8 == std::tuple_size_v<decltype(FieldStatus::missing)> - 1);
 
-/// client → server, unreliable.
-struct FieldBrick {
-  BrickHash hash{};
-  std::span<const std::byte> bytes{};  ///< limits::kBrickBytes
-};
-
-/// server → client, unreliable, 20 times per second; the newest one wins. Bit i % 8 of byte i / 8 is set if brick i is
-/// missing. The last bit is set if the manifest is not complete. In this case, the bits of unknown bricks are 0.
-struct FieldStatus {
-  static constexpr std::size_t kManifest = field::BrickField::kMostBricks;
-
-  FieldName field{};
-  std::array<std::byte, 128> missing{};
-
-  bool misses(std::size_t i) const noexcept { return (missing[i / 8] >> (i % 8) & std::byte{1}) != std::byte{}; }
-  void miss(std::size_t i) noexcept { missing[i / 8] |= std::byte{1} << (i % 8); }
-  bool complete() const noexcept {
-    return std::ranges::all_of(missing, [](std::byte bits) { return bits == std::byte{}; });
-  }
-};
+inline bool misses(const FieldStatus& status, std::size_t i) noexcept {
+  return (status.missing[i / 8] >> (i % 8) & std::byte{1}) != std::byte{};
+}
+inline void miss(FieldStatus& status, std::size_t i) noexcept { status.missing[i / 8] |= std::byte{1} << (i % 8); }
+inline bool is_complete(const FieldStatus& status) noexcept {
+  return std::ranges::all_of(status.missing, [](std::byte bits) { return bits == std::byte{}; });
+}
 
 /// Limits the rate of bricks (the generic cell rate algorithm of ATM, ITU-T I.371).
 class BrickPace {

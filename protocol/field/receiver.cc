@@ -42,7 +42,7 @@ FieldReceiver::FieldReceiver(const Config& config, BrickStore& store)
   for (Offer& offer : offers_) offer.bytes.resize(FieldManifest::kMost);
 }
 
-std::optional<FieldRefusal> FieldReceiver::take(LocalTime now, const FieldPart& part) {
+std::optional<FieldRefusal> FieldReceiver::take(LocalTime now, const OfferField& part) {
   expire(now);
   if (auto refused = refuse_part(part)) return refused;
   Offer* offer = offer_of(offers_, part.field);
@@ -62,8 +62,8 @@ std::optional<FieldRefusal> FieldReceiver::take(LocalTime now, const FieldPart& 
     return {};
   }
   const bool had_head = offer->manifest().has_head();
-  std::ranges::copy(part.bytes, offer->bytes.begin() + static_cast<std::ptrdiff_t>(offer->received));
-  offer->received += part.bytes.size();
+  std::ranges::copy(part.part, offer->bytes.begin() + static_cast<std::ptrdiff_t>(offer->received));
+  offer->received += part.part.size();
   offer->progress = now;
   std::optional<Refusal> refused;
   if (!had_head && offer->manifest().has_head()) refused = refuse_head(*offer);
@@ -75,7 +75,7 @@ std::optional<FieldRefusal> FieldReceiver::take(LocalTime now, const FieldPart& 
   return {};
 }
 
-std::optional<FieldRefusal> FieldReceiver::refuse_part(const FieldPart& part) const {
+std::optional<FieldRefusal> FieldReceiver::refuse_part(const OfferField& part) const {
   const auto refuse = [&](const char* name, std::size_t value, const std::string& expected) {
     return refuse_field(part.field, Code::kInvalid, number_of(name, value, expected));
   };
@@ -85,8 +85,8 @@ std::optional<FieldRefusal> FieldReceiver::refuse_part(const FieldPart& part) co
   }
   if (part.offset >= part.size) return refuse("offset", part.offset, "below " + std::to_string(part.size));
   const std::size_t most = std::min<std::size_t>(limits::kMaxFieldPart, part.size - part.offset);
-  if (part.bytes.empty() || part.bytes.size() > most) {
-    return refuse("bytes", part.bytes.size(), "1 … " + std::to_string(most));
+  if (part.part.empty() || part.part.size() > most) {
+    return refuse("part", part.part.size(), "1 … " + std::to_string(most));
   }
   const Offer* const offer = offer_of(offers_, part.field);
   if (offer != nullptr && part.size != offer->size) return refuse("size", part.size, std::to_string(offer->size));
@@ -130,8 +130,8 @@ std::optional<FieldRefusal> FieldReceiver::refuse_whole(const Offer& offer) cons
 
 std::optional<FieldRefusal> FieldReceiver::take(LocalTime now, const FieldBrick& brick) {
   expire(now);
-  if (brick.bytes.size() != limits::kBrickBytes) {
-    return refuse_brick(brick, Code::kInvalid, number_of("bytes", brick.bytes.size(), "1024"));
+  if (brick.weights.size() != limits::kBrickBytes) {
+    return refuse_brick(brick, Code::kInvalid, number_of("weights", brick.weights.size(), "1024"));
   }
   if (!pace_.pass(now)) {  // checked first because it is cheap
     return refuse_brick(brick, Code::kBusy, "expected at most " + shortest(config_.bytes_per_s) + " bytes per second");
@@ -150,9 +150,9 @@ std::optional<FieldRefusal> FieldReceiver::take(LocalTime now, const FieldBrick&
   for_each_place([&](const Offer&) { offered = true; });
   if (!offered) return refuse_brick(brick, Code::kInvalid, "expected a brick of an offered field");
   if (known) return {};
-  const auto hash = crypto::blake2b_128(brick.bytes);
+  const auto hash = crypto::blake2b_128(brick.weights);
   if (hash != brick.hash) return refuse_brick(brick, Code::kInvalid, "the bytes have the hash " + short_name(hash));
-  store_.put(config_.owner, brick.hash, brick.bytes.first<limits::kBrickBytes>());
+  store_.put(config_.owner, brick.hash, brick.weights.first<limits::kBrickBytes>());
   for_each_place([&](Offer& offer) {
     offer.progress = now;
     offer.missing -= offer.missing > 0 ? 1 : 0;
@@ -165,16 +165,16 @@ std::optional<FieldStatus> FieldReceiver::next_status(LocalTime now) {
   expire(now);
   for (Offer& offer : offers_) {
     if (!offer.open || offer.status_due > now) continue;
-    FieldStatus status{.field = offer.field, .missing = {}};
+    FieldStatus status{.field = offer.field};
     const FieldManifest manifest = offer.manifest();
     offer.missing = 0;
     for (std::size_t i = 0; i < manifest.known(); ++i) {
       if (store_.use(config_.owner, manifest.hash(i))) continue;  // and keep it
-      status.miss(i);
+      miss(status, i);
       ++offer.missing;
     }
-    if (!offer.whole()) status.miss(FieldStatus::kManifest);
-    offer.ready = status.complete();
+    if (!offer.whole()) miss(status, kManifestBit);
+    offer.ready = is_complete(status);
     if (offer.ready) offer.progress = now;
     offer.told = offer.ready ? std::min(offer.told + 1, kReadyCopies) : 0;
     offer.status_due = now + (offer.told < kReadyCopies ? config_.period : kReadyPeriod);

@@ -40,7 +40,7 @@ class FieldReceiver {
   FieldReceiver(const Config& config, BrickStore& store);
 
   /// Parts must be in order, and copies are ignored. If the manifest is invalid, the field is dropped.
-  std::optional<Refusal> take(LocalTime now, const FieldPart& part);
+  std::optional<Refusal> take(LocalTime now, const OfferField& part);
   std::optional<Refusal> take(LocalTime now, const FieldBrick& brick);
 
   /// Returns the status of the next field if it is due: each `period` while something is missing, then each second.
@@ -73,7 +73,7 @@ class FieldReceiver {
   };
 
   void expire(LocalTime now) noexcept;
-  std::optional<Refusal> refuse_part(const FieldPart& part) const;
+  std::optional<Refusal> refuse_part(const OfferField& part) const;
   std::optional<Refusal> refuse_head(const Offer& offer) const;
   std::optional<Refusal> refuse_whole(const Offer& offer) const;
 

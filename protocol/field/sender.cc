@@ -26,7 +26,7 @@ FieldSender::FieldSender(const Config& config, const FieldLattice& lattice, std:
   field_ = crypto::blake2b_256(manifest_);
 }
 
-std::optional<FieldPart> FieldSender::next_part(LocalTime now) noexcept {
+std::optional<OfferField> FieldSender::next_part(LocalTime now) {
   if (heard_ == kNever) heard_ = now;
   if (offered_ == manifest_.size() && !complete_ && now - heard_ >= config_.silence) {
     offered_ = 0;
@@ -34,10 +34,11 @@ std::optional<FieldPart> FieldSender::next_part(LocalTime now) noexcept {
   }
   const std::size_t length = std::min(manifest_.size() - offered_, limits::kMaxFieldPart);
   if (length == 0) return {};
-  return FieldPart{.field = field_,
-                   .size = static_cast<std::uint32_t>(manifest_.size()),
-                   .offset = static_cast<std::uint32_t>(offered_),
-                   .bytes = std::span(manifest_).subspan(offered_, length)};
+  const auto part = std::span<const std::byte>(manifest_).subspan(offered_, length);
+  return OfferField{.field = field_,
+                    .size = static_cast<std::uint32_t>(manifest_.size()),
+                    .offset = static_cast<std::uint32_t>(offered_),
+                    .part = {part.begin(), part.end()}};
 }
 
 void FieldSender::part_sent() noexcept { offered_ += std::min(manifest_.size() - offered_, limits::kMaxFieldPart); }
@@ -47,7 +48,7 @@ bool FieldSender::take(LocalTime now, const FieldStatus& status, Duration round_
   status_ = status;
   heard_ = now;
   arrived_before_ = now - round_trip - round_trip / 8 - kJitterOfStatus;
-  complete_ = status.complete();
+  complete_ = is_complete(status);
   return true;
 }
 
@@ -57,7 +58,7 @@ std::optional<std::size_t> FieldSender::choice() const noexcept {
   std::optional<std::size_t> lost;
   std::optional<std::size_t> fresh;
   for (std::size_t i = 0; i < bricks_.size(); ++i) {
-    if (!status_->misses(i) || sent_at_[i] >= arrived_before_) continue;
+    if (!misses(*status_, i) || sent_at_[i] >= arrived_before_) continue;
     auto& found = sent_at_[i] == kNever ? fresh : lost;
     if (!found || sent_at_[i] < sent_at_[*found]) found = i;
   }
@@ -71,7 +72,7 @@ std::optional<FieldBrick> FieldSender::next_brick(LocalTime now) noexcept {
   pace_.pass(now);
   sent_at_[*i] = now;
   ++sent_;
-  FieldBrick brick{.hash = {}, .bytes = bricks_[*i].bytes};
+  FieldBrick brick{.hash = {}, .weights = bricks_[*i].bytes};
   std::ranges::copy(FieldManifest(manifest_).hash(*i), brick.hash.begin());
   return brick;
 }

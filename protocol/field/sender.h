@@ -16,7 +16,7 @@ namespace tendon {
 /// Uploads a field to a server. It sends the manifest, waits for a status, and sends the missing bricks at a limited
 /// rate. If a brick was sent more than a round trip before a status and is still missing, it is lost and has the highest
 /// priority. If the server already has all bricks, only the manifest is sent.
-/// Only the constructor allocates memory. Thread-safe: no. Realtime-safe: yes, except the constructor.
+/// Only the constructor and next_part() allocate memory. Thread-safe: no. Realtime-safe: yes, except these two.
 class FieldSender {
  public:
   struct Brick {
@@ -39,7 +39,7 @@ class FieldSender {
   std::span<const std::byte> manifest() const noexcept { return manifest_; }
 
   /// Returns the next part of the offer, or nullopt if all were sent. Call part_sent() if the session has accepted it.
-  std::optional<FieldPart> next_part(LocalTime now) noexcept;
+  std::optional<OfferField> next_part(LocalTime now);
   void part_sent() noexcept;
 
   /// `round_trip` is the smoothed round trip of the session. Returns false if this is the status of another field.

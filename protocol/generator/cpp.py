@@ -26,7 +26,7 @@ _ENUMS_FROM_0 = ("PortRole",)
 
 _SHAPES = {
     "bool": "kFlag", "uint32": "kCount32", "uint64": "kCount64", "sint64": "kCount64", "fixed32": "kBits32",
-    "sfixed64": "kBits64", "double": "kBits64", "float": "kBits32", "string": "kText",
+    "sfixed64": "kBits64", "double": "kBits64", "float": "kBits32", "string": "kText", "bytes": "kBytes",
 }  # fmt: skip
 
 
@@ -74,7 +74,8 @@ class _List:
 
     def __init__(self, wire: Wire, message: Message):
         self.wire, self.message = wire, message
-        self.value = _words(message.name)[-1].lower()
+        last = _words(message.name)[-1].lower()
+        self.value = "wanted" if last == "field" else last  # `field` is a template
         self.members = message.members(CPP)
         self.late = self._checked_late()
 
@@ -139,12 +140,13 @@ class _List:
         if one.repeated:
             return [] if index else [f"way.{part.name}({numbers}, {self._told(first.field)}, {whole});"]
         verb = "part" if part.part.there == "any" or index == 0 else "rest"
-        line = self._line(one, inner, f"{part.name}.{inner.name}").replace("way.number(", "way.present(")
-        return [f"way.{verb}({self._place(one)}, {whole}, [&](auto& {part.name}) TENDON_INLINE {{ {line} }});"]
+        line = self._line(one, inner, f"part.{inner.name}")
+        line = line.replace("way.number(", "way.present(") if one.explicit else line
+        return [f"way.{verb}({self._place(one)}, {whole}, [&](auto& part) TENDON_INLINE {{ {line} }});"]
 
     def _place(self, one: Field) -> str:
         """Returns a field with its wire type, so that the Reader can ask for it."""
-        kind = "kFixed64" if one.type == "double" else "kFixed32" if one.type == "fixed32" else "kLength"
+        kind = {"double": "kFixed64", "fixed32": "kFixed32", "uint32": "kVarint"}.get(one.type, "kLength")
         return f"field<{one.number}, {kind}>"
 
     def _line(self, one: Field, member: Member, to: str) -> str:
@@ -164,6 +166,8 @@ class _List:
         if one.kind == "text":
             most = (bound.bytes.most if bound.bytes else None) or ""
             return ["texts", self._entries(one), most] if one.repeated else ["text", most]
+        if one.kind == "bytes":
+            return ["bytes", "Entries{{{}, {}}}".format(*one.size)]
         if one.kind == "bool":
             return ["flag"]
         if one.is_matrix:
@@ -191,7 +195,7 @@ class _List:
                 return ["rotation"]
             if one.name in self.message.values.get("plain", {}).get(CPP, []):
                 return ["vector_unless_zero"]
-            return ["normal" if one.is_unit_vector and self.message.name == "Contact" else "vector"]
+            return ["normal" if one.is_unit_vector and self.message.name != "PortSurface" else "vector"]
         list_of = f"k{one.type}Fields"
         return ["messages", self._entries(one), list_of] if one.repeated else ["message", list_of]
 

@@ -29,7 +29,8 @@ _ZEROS = {"bool": "false", "double": "0", "std::uint32_t": "0", "std::uint64_t":
 _ZEROS |= {kind: f"{kind}::Zero()" for kind in ("Vec3", "Mat3")}
 
 _STANDARD = {
-    "array": r"std::array", "cstdint": r"std::uint", "optional": r"std::optional", "string": r"std::string",
+    "array": r"std::array", "cstddef": r"std::byte", "cstdint": r"std::uint", "optional": r"std::optional", "span": r"std::span",
+    "string": r"std::string",
     "variant": r"std::variant", "vector": r"std::vector",
 }  # fmt: skip
 
@@ -131,6 +132,11 @@ class _Values:
         if one is None:
             assert member.part is not None
             return member.part.type.rsplit("::", 1)[-1]
+        if hint := self._wire.messages[one.message].hint(one.name, CPP):
+            return hint
+        if one.kind == "bytes":
+            least, most = one.size
+            return f"std::array<std::byte, {most}>" if least == most else "std::vector<std::byte>"
         if one.is_matrix:
             return "Mat3"
         if one.is_time and not one.repeated:
@@ -223,6 +229,9 @@ def _bound(one: Field) -> str:
         least, most = one.bound.entries
         said = f"at most {most}" if least == 0 else f"{least} … {most}"
         return f"{said} of at most {one.bound.bytes.most} bytes" if one.bound.bytes else said
+    if one.kind == "bytes":
+        least, most = one.size
+        return f"{least} bytes" if least == most else f"{least} … {most} bytes"
     if one.bound.bytes:
         return f"at most {one.bound.bytes.most} bytes"
     if one.is_unit_vector:

@@ -47,7 +47,7 @@ class Range:
 @dataclass(frozen=True)
 class Bound:
     value: Range | None = None  # of the value, or of each entry
-    bytes: Range | None = None  # of the text, or of each entry
+    bytes: Range | None = None  # of the text or the bytes, or of each entry
     entries: tuple[int, int] | frozenset[int] | None = None  # least and most, or the numbers that are allowed
 
 
@@ -93,7 +93,7 @@ def split_comment(comment: str) -> tuple[Bound, str]:
 
 _UNITS = {
     "m": "m", "mps": "m/s", "n": "N", "npm": "N/m", "j": "J", "rad": "rad", "radps": "rad/s", "nm": "N·m",
-    "nmprad": "N·m/rad", "nspm": "N·s/m", "nmsprad": "N·m·s/rad", "per_s": "1/s",
+    "nmprad": "N·m/rad", "nspm": "N·s/m", "nmsprad": "N·m·s/rad", "per_s": "1/s", "s": "s",
 }  # fmt: skip
 _TIMES = {"ns": "ns", "us": "µs", "ms": "ms"}
 
@@ -157,7 +157,7 @@ class Field:
     name: str
     number: int
     type: str  # "double", "uint32", …; the name of the message or of the enum
-    kind: str  # "number", "integer", "bool", "text", "message" or "enum"
+    kind: str  # "number", "integer", "bool", "text", "bytes", "message" or "enum"
     repeated: bool
     packed: bool
     explicit: bool  # a scalar with a presence of its own: `optional`
@@ -190,6 +190,12 @@ class Field:
     def is_matrix(self) -> bool:
         """Returns True for a 3 × 3 matrix, which has 1, 3 or 9 entries."""
         return isinstance(self.bound.entries, frozenset) and self.bound.entries >= {1, 3, 9}
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Returns the least and the most bytes."""
+        assert self.bound.bytes and self.bound.bytes.most
+        return int(self.bound.bytes.least), int(self.bound.bytes.most)
 
     @property
     def is_unit_vector(self) -> bool:
@@ -436,9 +442,8 @@ def load(proto: Path = PROTO, values: Path = VALUES) -> Wire:
                 kind, type_name = "enum", each.type_name.rsplit(".", 1)[1]
             else:
                 type_name = _TYPES[each.type]
-                kind = {"double": "number", "float": "number", "bool": "bool", "string": "text", "bytes": "text"}.get(
-                    type_name, "integer"
-                )
+                kinds = {"double": "number", "float": "number", "string": "text", "bool": "bool", "bytes": "bytes"}
+                kind = kinds.get(type_name, "integer")
             repeated = each.label == each.LABEL_REPEATED
             packed = repeated and kind in ("number", "integer", "bool", "enum")
             chosen = each.HasField("oneof_index") and not each.proto3_optional

@@ -110,7 +110,10 @@ class _Tables:
             said.append(f"{known[0].number} … {known[-1].number}")
         if bound.entries is not None:
             said.append(_entries(bound.entries))
-        if bound.bytes is not None:
+        if field.kind == "bytes":
+            least, most = field.size
+            said.append(f"{number(str(most), field)} bytes" if least == most else f"{least} … {most} bytes")
+        elif bound.bytes is not None:
             said.append(f"{'each ' if field.repeated else ''}≤ {number(bound.bytes.most or '', field)} bytes")
         said.append(range_of(bound.value, field, field.unit))
         for check in message.checks:

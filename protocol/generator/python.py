@@ -65,7 +65,7 @@ def type_of(field: Field, wire: Wire) -> str:
     """Returns the type of a member that is not None."""
     if field.is_matrix:
         return "Mat3"
-    inner = {"integer": "int", "number": "float", "bool": "bool", "text": "str"}.get(field.kind)
+    inner = {"integer": "int", "number": "float", "bool": "bool", "text": "str", "bytes": "bytes"}.get(field.kind)
     if inner is None:
         inner = wire.messages[field.type].type_name(PYTHON) if field.type in wire.messages else field.type
     return f"Sequence[{inner}]" if field.repeated else inner
@@ -81,7 +81,7 @@ def zero_of(field: Field, wire: Wire) -> str | None:
     if field.kind == "enum":
         zero = next((value for value in wire.enums[field.type].known if value.number == 0), None)
         return f"{field.type}.{zero.short}" if zero else None
-    return {"integer": "0", "number": "0.0", "bool": "False", "text": '""'}.get(field.kind)
+    return {"integer": "0", "number": "0.0", "bool": "False", "text": '""', "bytes": 'b""'}.get(field.kind)
 
 
 def call(head: str, arguments: list[str], indent: str = "    ", tail: str = ")") -> list[str]:
@@ -296,6 +296,12 @@ class _Codec:
             assert bound.bytes and bound.bytes.most
             self._lines.append(f'    {name} = read_text("{name}", m.{name}, {bound.bytes.most})')
             return name
+        if field.kind == "bytes":
+            least, most = field.size
+            within = f"len({name}) == {most}" if least == most else f"{least} <= len({name}) <= {most}"
+            outside = f"len({name}) > {most}" if least == 0 else f"not {within}"
+            self._lines += [f"    {name} = m.{name}", *_refused(outside, name)]
+            return name
         default = message.default(name, PYTHON) if field.has_presence and not empty else None
         outside = self._outside(field, name)
         if empty or default:
@@ -375,6 +381,8 @@ class _Codec:
             zero = {name for name, field in zip(names, fields) if field and field.type == "Vec3"}
             inner = [f"{name} or ZERO" if name in zero else name for name in names]
             return f"None if {absent} else {part.type}({', '.join(inner)})"
+        if fields[0] is not None and not fields[0].is_optional:
+            return f"{value} if {first} else None"
         return f"None if {first} is None else {value}"
 
     def _read_oneof(self, message: Message, oneof: str) -> None:
@@ -437,6 +445,8 @@ class _Codec:
         elif field.kind == "text":
             assert field.bound.bytes
             self._lines.append(f"{indent}{target} = clip({value}, {field.bound.bytes.most})")
+        elif field.kind == "bytes":
+            self._lines.append(f"{indent}{target} = {value}[:{field.size[1]}]")
         elif field.kind == "enum":
             self._lines.append(f"{indent}{target} = {value}  # type: ignore[assignment]")
         else:

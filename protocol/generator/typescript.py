@@ -173,7 +173,7 @@ class _Values:
         elif field.kind == "message" and not _is_vector(field):
             kind = self._wire.messages[field.type].type_name(TYPESCRIPT)
         else:
-            kind = {"number": "number", "bool": "boolean", "text": "string"}.get(field.kind, field.type)
+            kind = {"number": "number", "bool": "boolean", "text": "string", "bytes": "Uint8Array"}.get(field.kind, field.type)
         return f"readonly {kind}[]" if field.repeated else kind
 
     def _unions(self) -> None:
@@ -304,6 +304,12 @@ class _Codec:
         if field.kind == "text":
             assert bound.bytes
             return f"!isText({value}, {bound.bytes.most})"
+        if field.kind == "bytes":
+            least, most = field.size
+            if least == most:
+                return f"{value}.length !== {most}"
+            below = f"{value}.length < {least} || " if least > 0 else ""
+            return f"{below}{value}.length > {most}"
         if bound.value is None:
             return ""
         there = f"{value} !== undefined && " if field.explicit else ""
@@ -449,6 +455,8 @@ class _Codec:
         elif field.kind == "text":
             assert field.bound.bytes
             told = f"""clip({value}{' ?? ""' if may_be_absent else ''}, {field.bound.bytes.most})"""
+        elif field.kind == "bytes":
+            told = f"{value}.subarray(0, {field.size[1]})"
         else:
             zero = {"bool": "false"}.get(field.kind, "0n" if _is_wide(field) else "0")
             own = " as number" if field.kind == "enum" and _is_own(self._wire.enums[field.type]) else ""

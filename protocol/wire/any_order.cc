@@ -32,6 +32,7 @@ unsigned type_of(Shape shape) noexcept {
     case Shape::kBits64s:
       return kFixed64;
     case Shape::kText:
+    case Shape::kBytes:
     case Shape::kMessage:
     case Shape::kTexts:
     case Shape::kMessages:
@@ -163,7 +164,7 @@ bool AnyOrder::write_message(const FieldShape& field, std::size_t from, std::siz
 bool AnyOrder::write_text(const FieldShape& field, const Found& found) {
   const auto size = static_cast<std::size_t>(found.piece.end - found.piece.at);
   const std::string_view text(reinterpret_cast<const char*>(found.piece.at), size);
-  if (clipped(text, size).size() != size) return false;
+  if (field.shape != Shape::kBytes && clipped(text, size).size() != size) return false;
   put_tag(field, kLength);
   put_varint(size);
   out_.insert(out_.end(), found.piece.at, found.piece.end);
@@ -218,6 +219,7 @@ bool AnyOrder::write(const FieldShape& field, std::size_t place, std::size_t fro
         out_.insert(out_.end(), found.piece.at, found.piece.end);
         break;
       case Shape::kText:
+      case Shape::kBytes:
         out_.resize(whole);
         if (!write_text(field, found)) return false;
         break;

@@ -19,6 +19,7 @@ enum class Shape : std::uint8_t {
   kBits32,   ///< 4 bytes
   kBits64,   ///< 8 bytes
   kText,
+  kBytes,
   kMessage,
   // Repeated:
   kCount32s,

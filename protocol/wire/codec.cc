@@ -120,7 +120,10 @@ bool read_frame(const Reader& bytes, DataContent& content) {
       take<5>(frame, content, good, wire::kByeFields, [] { return Bye{}; }) ||
       take<6>(frame, content, good, wire::kLinkReportFields, [] { return LinkReport{}; }) ||
       take<7>(frame, content, good, wire::kDeviceReportFields, [] { return DeviceReport{}; }) ||
-      take<8>(frame, content, good, wire::kPeerReportFields, [] { return PeerReport{}; });
+      take<8>(frame, content, good, wire::kPeerReportFields, [] { return PeerReport{}; }) ||
+      take<11>(frame, content, good, wire::kFieldBrickFields, [] { return FieldBrick{}; }) ||
+      take<12>(frame, content, good, wire::kFieldStatusFields, [] { return FieldStatus{}; }) ||
+      take<13>(frame, content, good, wire::kFieldPoseFields, [] { return FieldPose{}; });
   static_cast<void>(known);  // frames of newer peers are empty after AnyOrder
   return good && frame.done();
 }
@@ -229,6 +232,11 @@ bool DataWriter::add(const DeviceReport& report) {
   return add_frame<7, 6>(report, kMostFrame, wire::kDeviceReportFields);
 }
 bool DataWriter::add(const PeerReport& report) { return add_frame<8, 6>(report, kMostFrame, wire::kPeerReportFields); }
+bool DataWriter::add(const FieldBrick& brick) { return add_frame<11, 6>(brick, kMostFrame, wire::kFieldBrickFields); }
+bool DataWriter::add(const FieldStatus& status) {
+  return add_frame<12, 6>(status, kMostFrame, wire::kFieldStatusFields);
+}
+bool DataWriter::add(const FieldPose& pose) { return add_frame<13, 6>(pose, kMostOfAStep, wire::kFieldPoseFields); }
 
 std::size_t DataWriter::add(std::span<const DeviceState* const> states) {
   if (frames_ == limits::kMaxFrames) return 0;

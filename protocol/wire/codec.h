@@ -42,6 +42,9 @@ class DataWriter {
   bool add(const DeviceReport& report);
   bool add(const PeerReport& report);
   bool add(const PortFrame& port);
+  bool add(const FieldBrick& brick);
+  bool add(const FieldStatus& status);
+  bool add(const FieldPose& pose);
 
   /// Appends as many of the first states as possible, using one frame in columns, and returns their number. The states
   /// must have the same tick and time, be sorted by device, and satisfy fits_columns(). At most kMaxDevices.
@@ -64,7 +67,8 @@ std::string message_of(const PeerReport& report);
 struct DataContent {
   PeerTime sent{};
   std::optional<IncomingEcho> echo;
-  std::vector<Frame> frames;  ///< in order, within bounds; columns are split into states
+  /// In order, within bounds. Columns are split into states. The weights of a brick refer to the body or to the reader.
+  std::vector<Frame> frames;
   /// The number of frames and echoes with values out of bounds. They are dropped, except for requests (see
   /// Control::invalid) and answers (see Code::kInvalid) with a valid id.
   std::uint32_t invalid = 0;

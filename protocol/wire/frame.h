@@ -28,7 +28,7 @@ struct Control {
   std::string_view invalid{};        ///< field that is out of bounds (static storage)
 };
 
-using Frame =
-    std::variant<DeviceState, ForceCommand, Control, ControlAck, Bye, LinkReport, DeviceReport, PeerReport, PortFrame>;
+using Frame = std::variant<DeviceState, ForceCommand, Control, ControlAck, Bye, LinkReport, DeviceReport, PeerReport,
+                           PortFrame, FieldBrick, FieldStatus, FieldPose>;
 
 }  // namespace tendon

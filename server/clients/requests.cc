@@ -207,6 +207,11 @@ Outcome set_output(LocalTime /*now*/, const Asker& asker, const SetOutput& wante
   return {};
 }
 
+template <class Wanted>
+Outcome no_fields(LocalTime /*now*/, const Asker& /*asker*/, const Wanted& /*wanted*/) {
+  return {.code = Code::kUnsupported, .detail = "this server does not support the feature fields"};
+}
+
 enum class From : std::uint8_t {
   kAnybody,
   kControllers,  ///< controllers of a channel of the device, even if it is held by another client
@@ -268,6 +273,9 @@ constexpr std::array kRequests = {
     row<Disengage, From::kControllers, disengage>("disengage a coupling"),
     row<SetScale, From::kControllers, set_scale>("set the scales of a coupling"),
     row<SetShare, From::kControllers, set_share>("set the share of a leader"),
+    row<OfferField, From::kAnybody, no_fields<OfferField>>("offer a field"),
+    row<UseField, From::kAnybody, no_fields<UseField>>("use a field"),
+    row<DropField, From::kAnybody, no_fields<DropField>>("drop a field"),
 };
 static_assert(kRequests.size() == std::variant_size_v<Request>);
 constexpr bool in_order() {

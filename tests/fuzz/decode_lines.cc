@@ -102,6 +102,31 @@ void print(Line& line, const DeviceState& state) {
     line << "joints" << static_cast<std::uint32_t>(joints->count);
     for (std::size_t i = 0; i < joints->count; ++i) line << joints->angle[i] << joints->velocity[i];
   }
+  if (const auto& field = state.field) line << "field" << field->generation << field->depth << field->proxy;
+}
+
+void print(Line& line, const FieldBrick& brick) {
+  line << "brick" << std::span<const std::byte>(brick.hash) << brick.weights;
+}
+
+void print(Line& line, const FieldStatus& status) {
+  line << "field-status" << std::span<const std::byte>(status.field) << std::span<const std::byte>(status.missing);
+}
+
+void print(Line& line, const FieldPose& pose) {
+  line << "pose" << pose.device << pose.channel << pose.sequence << pose.time.time_since_epoch() << pose.position
+       << pose.orientation << pose.velocity << pose.angular_velocity;
+}
+
+void print(Line& line, const UseField& use) {
+  line << "use-field" << use.device << use.channel << use.generation << std::span<const std::byte>(use.field);
+  for (const FieldMaterial& one : use.materials) {
+    line << "material" << one.stiffness << one.branch_stiffness << one.relaxation << one.friction;
+  }
+  for (const FieldFixture& one : use.fixtures) {
+    line << "fixture" << one.kind << one.at << one.normal << one.stiffness;
+    if (one.most_force) line << *one.most_force;
+  }
 }
 
 void print(Line& line, const LocalModel& model) {
@@ -126,6 +151,7 @@ void print(Line& line, const ForceCommand& force) {
   }
   if (force.grip_force) line << "grip-force" << *force.grip_force;
   if (force.way > 0) line << "way" << force.way;
+  if (force.field > 0) line << "field" << force.field;
 }
 
 void print(Line& line, const Control& control) {
@@ -157,6 +183,13 @@ void print(Line& line, const Control& control) {
     line << "scale" << scale->device << scale->position_scale << scale->force_scale;
   } else if (const auto* share = std::get_if<SetShare>(&*control.request)) {
     line << "share" << share->device << share->channel << share->share;
+  } else if (const auto* offer = std::get_if<OfferField>(&*control.request)) {
+    line << "offer-field" << std::span<const std::byte>(offer->field) << offer->size << offer->offset
+         << std::span<const std::byte>(offer->part);
+  } else if (const auto* use = std::get_if<UseField>(&*control.request)) {
+    print(line, *use);
+  } else if (const auto* drop = std::get_if<DropField>(&*control.request)) {
+    line << "drop-field" << std::span<const std::byte>(drop->field);
   } else if (const auto* wanted = std::get_if<SetOutput>(&*control.request)) {
     line << "output" << wanted->device << wanted->output;
     if (const auto* lamp = std::get_if<LampColour>(&wanted->setting)) line << "rgb" << lamp->rgb;

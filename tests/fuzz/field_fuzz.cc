@@ -62,10 +62,11 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         const std::size_t offset = input.byte();
         const auto from = std::span(manifest).subspan(std::min(offset, manifest.size()));
         const std::size_t whole = (choice & 0x40U) != 0 ? input.byte() : manifest.size();
-        refused = server.take(now, FieldPart{.field = name,
-                                             .size = static_cast<std::uint32_t>(whole),
-                                             .offset = static_cast<std::uint32_t>(offset),
-                                             .bytes = from.first(std::min<std::size_t>(from.size(), input.byte()))});
+        const auto part = from.first(std::min<std::size_t>(from.size(), input.byte()));
+        refused = server.take(now, OfferField{.field = name,
+                                              .size = static_cast<std::uint32_t>(whole),
+                                              .offset = static_cast<std::uint32_t>(offset),
+                                              .part = {part.begin(), part.end()}});
         break;
       }
       case 1: {  // an invented brick
@@ -74,7 +75,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         const BrickHash hash = crypto::blake2b_128(bytes);
         if (const std::uint8_t change = input.byte(); change > 200) bytes[change] ^= std::byte{1};
         const std::size_t length = (choice & 0x20U) != 0 ? input.byte() : bytes.size();
-        refused = server.take(now, FieldBrick{.hash = hash, .bytes = std::span(bytes).first(length)});
+        refused = server.take(now, FieldBrick{.hash = hash, .weights = std::span(bytes).first(length)});
         if (!refused) {
           fuzz::require(length == limits::kBrickBytes && (bytes == brick.bytes || uploaded[who].contains(hash)));
           uploaded[who].insert(hash);
@@ -91,7 +92,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       case 3: {  // a correct client sends its next brick, which may be lost
         const auto brick = client.next_brick(now);
         if (!brick || (choice & 0x20U) != 0) break;
-        fuzz::require(brick->hash == crypto::blake2b_128(brick->bytes));
+        fuzz::require(brick->hash == crypto::blake2b_128(brick->weights));
         refused = server.take(now, *brick);
         if (!refused) uploaded[who].insert(brick->hash);
         break;
@@ -105,7 +106,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       case 6:
         fuzz::require(server.due() == LocalTime::max() || server.offers() > 0);
         while (const auto status = server.next_status(now)) {
-          fuzz::require(status->complete() == server.ready(status->field).has_value());
+          fuzz::require(is_complete(*status) == server.ready(status->field).has_value());
           client.take(now, *status, std::chrono::milliseconds(input.byte()));
         }
         break;

@@ -30,8 +30,16 @@ __all__ = [
     "DeviceState",
     "Disarm",
     "Disengage",
+    "DropField",
     "Echo",
     "Engage",
+    "FieldBrick",
+    "FieldFixture",
+    "FieldFixtureKind",
+    "FieldMaterial",
+    "FieldPose",
+    "FieldState",
+    "FieldStatus",
     "ForceCommand",
     "ForceTable",
     "GiveLease",
@@ -47,6 +55,7 @@ __all__ = [
     "LocalModel",
     "Mat3",
     "Mode",
+    "OfferField",
     "OutputDescription",
     "OutputKind",
     "PeerReport",
@@ -73,6 +82,7 @@ __all__ = [
     "TakeLease",
     "Torque",
     "Turning",
+    "UseField",
     "Vec3",
     "Vibration",
     "Welcome",
@@ -98,6 +108,14 @@ class Mode(IntEnum):
     DECAYING = 4  # the old force fades
     SAFE_STOP = 5  # the force is zero until a fresh force arrives
     FAULT = 6  # latched: the force is zero until a Rearm
+
+
+class FieldFixtureKind(IntEnum):
+    """The shape that a fixture pulls to."""
+
+    POINT = 1
+    LINE = 2
+    PLANE = 3
 
 
 class PortRole(IntEnum):
@@ -235,6 +253,17 @@ class Joints:
 
 
 @dataclass(frozen=True, slots=True)
+class FieldState:
+    """The field that is rendered."""
+
+    # The generation of the rendered field (UseField.generation). If several channels use fields, this is the first one
+    # with contact, or else the first one.
+    generation: int
+    depth: float = 0.0  # m, the distance from the proxy to the hand, or 0 if there is no contact
+    proxy: Vec3 = ZERO  # m, the position of the proxy, which is ignored if there is no field
+
+
+@dataclass(frozen=True, slots=True)
 class DeviceState:
     """The state of a device at one haptic step. Server → client, unreliable; for each device the highest tick wins."""
 
@@ -272,6 +301,7 @@ class DeviceState:
     # N. The force of the hand ON THE HANDLE, as measured by a force sensor. None if there is no force sensor
     hand_force: Vec3 | None = None
     joints: Joints | None = None  # None if the device does not report joints
+    field: FieldState | None = None  # None if no field is rendered
 
 
 @dataclass(frozen=True, slots=True)
@@ -352,6 +382,96 @@ class ForceCommand:
     # The way in which the engine has computed this force, as an index in Hello.ways that starts at 1, or 0 if it is
     # unknown. Servers treat an index that is larger than the number of ways as 0
     way: int = 0
+    # With the feature "fields" only:
+    # If it is not 0, force is not rendered. It is the true force at the state `based_on_tick`, from which the server
+    # learns the error of the field with this generation (UseField.generation). The model is ignored
+    field: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class OfferField:
+    """A part of the manifest of a field, which lists its bricks and primitives. Parts are sent in order."""
+
+    field: bytes  # the BLAKE2b-256 of the manifest, which is the name of the field
+    size: int  # the size of the whole manifest in bytes
+    offset: int  # the place of the first byte of `part` in the manifest
+    part: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class FieldMaterial:
+    """A spring, beside a spring in series with a damper, with Coulomb friction (core/field/material.h)."""
+
+    stiffness: float  # N/m
+    branch_stiffness: float = 0.0  # N/m, of the spring in series with the damper, or 0 if there is none
+    relaxation: float = 0.0  # s, the time constant of the damper; ignored without this spring
+    friction: float = 0.0  # the coefficient of friction
+
+
+@dataclass(frozen=True, slots=True)
+class FieldFixture:
+    """A spring from the hand to the nearest position on a point, a line or a plane, in the frame of the object
+    (core/field/fixture.h)."""
+
+    kind: FieldFixtureKind
+    at: Vec3  # m, the point, or a point of the line or plane
+    normal: Vec3  # the direction of the line, or the normal of the plane; any for a point
+    stiffness: float  # N/m
+    most_force: float | None = None  # N, the largest force. None if the force is not limited
+
+
+@dataclass(frozen=True, slots=True)
+class UseField:
+    """Renders a field in a channel from now on, instead of the field that the channel has used. The server must have
+    the whole field (FieldStatus), and the client must hold the lease of the channel, as for a ForceCommand."""
+
+    device: int
+    channel: int
+    generation: int  # increases with each UseField of a session, device and channel
+    field: bytes  # the name of the field
+    materials: Sequence[FieldMaterial]  # the materials that the manifest refers to, from number 0
+    fixtures: Sequence[FieldFixture] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class DropField:
+    """Forgets a field. A channel that uses it stops. Its bricks stay in the cache of the server."""
+
+    field: bytes  # the name of the field
+
+
+@dataclass(frozen=True, slots=True)
+class FieldBrick:
+    """The weights of a brick (core/field/brick_field.h). Client → server, unreliable."""
+
+    hash: bytes  # the BLAKE2b-128 of the weights
+    weights: bytes  # 8³ int16, little-endian, x fastest
+
+
+@dataclass(frozen=True, slots=True)
+class FieldStatus:
+    """What a server still needs of a field. Bit i % 8 of byte i / 8 is set if brick i of the manifest is missing. The
+    last of the 1024 bits is set if the manifest is not complete; the bits of unknown bricks are then 0. Absent bytes
+    are 0. Server → client, unreliable; for each field the newest one wins."""
+
+    field: bytes  # the name of the field
+    missing: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class FieldPose:
+    """The pose of the object of a channel, in the base frame of the device. It should be the pose that the engine
+    expects for the time of its arrival. The server extrapolates it with its velocities for at most 50 ms. Client →
+    server, unreliable; for each device and channel the highest sequence wins."""
+
+    device: int
+    channel: int
+    sequence: int  # 1, 2, 3 … per session, device and channel
+    time_ns: int  # The time that the pose is for, on the clock of the SERVER, like DeviceState.sampled_ns
+    position: Vec3  # m, of the origin of the object. A server only accepts positions within 10 m
+    orientation: Quat  # the rotation from the frame of the object to the base frame
+    velocity: Vec3 = ZERO  # m/s, of the origin of the object
+    angular_velocity: Vec3 = ZERO  # rad/s, the angular velocity in the axes of the base frame
 
 
 @dataclass(frozen=True, slots=True)
@@ -878,9 +998,24 @@ Request = Union[
     Disengage,
     SetScale,
     SetShare,
+    OfferField,
+    UseField,
+    DropField,
 ]
 
-PlainFrame = Union[DeviceState, ForceCommand, ControlAck, Bye, LinkReport, DeviceReport, PeerReport, PortState]
+PlainFrame = Union[
+    DeviceState,
+    ForceCommand,
+    ControlAck,
+    Bye,
+    LinkReport,
+    DeviceReport,
+    PeerReport,
+    PortState,
+    FieldBrick,
+    FieldStatus,
+    FieldPose,
+]
 """Every frame but Control."""
 
 Answer = Union[Welcome, Refused]

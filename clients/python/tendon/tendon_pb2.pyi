@@ -27,6 +27,10 @@ COUPLING_METHOD_SURFACE: CouplingMethod
 COUPLING_METHOD_UNSPECIFIED: CouplingMethod
 COUPLING_METHOD_WAVES: CouplingMethod
 DESCRIPTOR: _descriptor.FileDescriptor
+FIELD_FIXTURE_KIND_LINE: FieldFixtureKind
+FIELD_FIXTURE_KIND_PLANE: FieldFixtureKind
+FIELD_FIXTURE_KIND_POINT: FieldFixtureKind
+FIELD_FIXTURE_KIND_UNSPECIFIED: FieldFixtureKind
 HAND_ANY: Hand
 HAND_LEFT: Hand
 HAND_RIGHT: Hand
@@ -113,15 +117,17 @@ class Contact(_message.Message):
     def __init__(self, normal: _Optional[_Union[Vec3, _Mapping]] = ..., gap_m: _Optional[float] = ..., table: _Optional[_Union[ForceTable, _Mapping]] = ...) -> None: ...
 
 class Control(_message.Message):
-    __slots__ = ["couple", "describe", "disarm", "disengage", "engage", "give_lease", "id", "lease_lost", "rearm", "set_output", "set_scale", "set_share", "set_state_deadband", "set_state_rate", "take_lease"]
+    __slots__ = ["couple", "describe", "disarm", "disengage", "drop_field", "engage", "give_lease", "id", "lease_lost", "offer_field", "rearm", "set_output", "set_scale", "set_share", "set_state_deadband", "set_state_rate", "take_lease", "use_field"]
     COUPLE_FIELD_NUMBER: _ClassVar[int]
     DESCRIBE_FIELD_NUMBER: _ClassVar[int]
     DISARM_FIELD_NUMBER: _ClassVar[int]
     DISENGAGE_FIELD_NUMBER: _ClassVar[int]
+    DROP_FIELD_FIELD_NUMBER: _ClassVar[int]
     ENGAGE_FIELD_NUMBER: _ClassVar[int]
     GIVE_LEASE_FIELD_NUMBER: _ClassVar[int]
     ID_FIELD_NUMBER: _ClassVar[int]
     LEASE_LOST_FIELD_NUMBER: _ClassVar[int]
+    OFFER_FIELD_FIELD_NUMBER: _ClassVar[int]
     REARM_FIELD_NUMBER: _ClassVar[int]
     SET_OUTPUT_FIELD_NUMBER: _ClassVar[int]
     SET_SCALE_FIELD_NUMBER: _ClassVar[int]
@@ -129,14 +135,17 @@ class Control(_message.Message):
     SET_STATE_DEADBAND_FIELD_NUMBER: _ClassVar[int]
     SET_STATE_RATE_FIELD_NUMBER: _ClassVar[int]
     TAKE_LEASE_FIELD_NUMBER: _ClassVar[int]
+    USE_FIELD_FIELD_NUMBER: _ClassVar[int]
     couple: Couple
     describe: Describe
     disarm: Disarm
     disengage: Disengage
+    drop_field: DropField
     engage: Engage
     give_lease: GiveLease
     id: int
     lease_lost: LeaseLost
+    offer_field: OfferField
     rearm: Rearm
     set_output: SetOutput
     set_scale: SetScale
@@ -144,7 +153,8 @@ class Control(_message.Message):
     set_state_deadband: SetStateDeadband
     set_state_rate: SetStateRate
     take_lease: TakeLease
-    def __init__(self, id: _Optional[int] = ..., set_state_rate: _Optional[_Union[SetStateRate, _Mapping]] = ..., rearm: _Optional[_Union[Rearm, _Mapping]] = ..., describe: _Optional[_Union[Describe, _Mapping]] = ..., take_lease: _Optional[_Union[TakeLease, _Mapping]] = ..., give_lease: _Optional[_Union[GiveLease, _Mapping]] = ..., set_state_deadband: _Optional[_Union[SetStateDeadband, _Mapping]] = ..., disarm: _Optional[_Union[Disarm, _Mapping]] = ..., set_output: _Optional[_Union[SetOutput, _Mapping]] = ..., couple: _Optional[_Union[Couple, _Mapping]] = ..., engage: _Optional[_Union[Engage, _Mapping]] = ..., disengage: _Optional[_Union[Disengage, _Mapping]] = ..., set_scale: _Optional[_Union[SetScale, _Mapping]] = ..., set_share: _Optional[_Union[SetShare, _Mapping]] = ..., lease_lost: _Optional[_Union[LeaseLost, _Mapping]] = ...) -> None: ...
+    use_field: UseField
+    def __init__(self, id: _Optional[int] = ..., set_state_rate: _Optional[_Union[SetStateRate, _Mapping]] = ..., rearm: _Optional[_Union[Rearm, _Mapping]] = ..., describe: _Optional[_Union[Describe, _Mapping]] = ..., take_lease: _Optional[_Union[TakeLease, _Mapping]] = ..., give_lease: _Optional[_Union[GiveLease, _Mapping]] = ..., set_state_deadband: _Optional[_Union[SetStateDeadband, _Mapping]] = ..., disarm: _Optional[_Union[Disarm, _Mapping]] = ..., set_output: _Optional[_Union[SetOutput, _Mapping]] = ..., couple: _Optional[_Union[Couple, _Mapping]] = ..., engage: _Optional[_Union[Engage, _Mapping]] = ..., disengage: _Optional[_Union[Disengage, _Mapping]] = ..., set_scale: _Optional[_Union[SetScale, _Mapping]] = ..., set_share: _Optional[_Union[SetShare, _Mapping]] = ..., lease_lost: _Optional[_Union[LeaseLost, _Mapping]] = ..., offer_field: _Optional[_Union[OfferField, _Mapping]] = ..., use_field: _Optional[_Union[UseField, _Mapping]] = ..., drop_field: _Optional[_Union[DropField, _Mapping]] = ...) -> None: ...
 
 class ControlAck(_message.Message):
     __slots__ = ["code", "detail", "device", "handle", "id", "wait_ms"]
@@ -293,12 +303,15 @@ class DeviceReport(_message.Message):
     def __init__(self, number: _Optional[int] = ..., until_ns: _Optional[int] = ..., span_ns: _Optional[int] = ..., device: _Optional[int] = ..., steps: _Optional[int] = ..., missed: _Optional[int] = ..., overruns: _Optional[int] = ..., unseen: _Optional[int] = ..., lateness_us_log2: _Optional[_Iterable[int]] = ..., safety: _Optional[_Union[Safety, str]] = ..., fault: _Optional[str] = ..., degraded: _Optional[str] = ...) -> None: ...
 
 class DeviceState(_message.Message):
-    __slots__ = ["angular_velocity_radps", "buttons", "channel", "device", "energy_j", "force_age_ns", "force_applied_n", "force_sequence", "force_wanted_n", "gripper_force_applied_n", "gripper_rad", "gripper_velocity_radps", "hand_force_n", "joint_rad", "joint_velocity_radps", "mode", "orientation", "permitted_force_n", "position_m", "reasons", "sampled_ns", "stiffness_wanted_npm", "tick", "torque_applied_nm", "velocity_mps"]
+    __slots__ = ["angular_velocity_radps", "buttons", "channel", "device", "energy_j", "field", "field_depth_m", "field_proxy_m", "force_age_ns", "force_applied_n", "force_sequence", "force_wanted_n", "gripper_force_applied_n", "gripper_rad", "gripper_velocity_radps", "hand_force_n", "joint_rad", "joint_velocity_radps", "mode", "orientation", "permitted_force_n", "position_m", "reasons", "sampled_ns", "stiffness_wanted_npm", "tick", "torque_applied_nm", "velocity_mps"]
     ANGULAR_VELOCITY_RADPS_FIELD_NUMBER: _ClassVar[int]
     BUTTONS_FIELD_NUMBER: _ClassVar[int]
     CHANNEL_FIELD_NUMBER: _ClassVar[int]
     DEVICE_FIELD_NUMBER: _ClassVar[int]
     ENERGY_J_FIELD_NUMBER: _ClassVar[int]
+    FIELD_DEPTH_M_FIELD_NUMBER: _ClassVar[int]
+    FIELD_FIELD_NUMBER: _ClassVar[int]
+    FIELD_PROXY_M_FIELD_NUMBER: _ClassVar[int]
     FORCE_AGE_NS_FIELD_NUMBER: _ClassVar[int]
     FORCE_APPLIED_N_FIELD_NUMBER: _ClassVar[int]
     FORCE_SEQUENCE_FIELD_NUMBER: _ClassVar[int]
@@ -324,6 +337,9 @@ class DeviceState(_message.Message):
     channel: int
     device: int
     energy_j: float
+    field: int
+    field_depth_m: float
+    field_proxy_m: Vec3
     force_age_ns: int
     force_applied_n: Vec3
     force_sequence: int
@@ -344,7 +360,7 @@ class DeviceState(_message.Message):
     tick: int
     torque_applied_nm: Vec3
     velocity_mps: Vec3
-    def __init__(self, tick: _Optional[int] = ..., sampled_ns: _Optional[int] = ..., position_m: _Optional[_Union[Vec3, _Mapping]] = ..., velocity_mps: _Optional[_Union[Vec3, _Mapping]] = ..., force_applied_n: _Optional[_Union[Vec3, _Mapping]] = ..., energy_j: _Optional[float] = ..., permitted_force_n: _Optional[float] = ..., reasons: _Optional[int] = ..., force_sequence: _Optional[int] = ..., force_age_ns: _Optional[int] = ..., mode: _Optional[_Union[Mode, str]] = ..., device: _Optional[int] = ..., channel: _Optional[int] = ..., force_wanted_n: _Optional[_Union[Vec3, _Mapping]] = ..., orientation: _Optional[_Union[Quat, _Mapping]] = ..., angular_velocity_radps: _Optional[_Union[Vec3, _Mapping]] = ..., buttons: _Optional[int] = ..., torque_applied_nm: _Optional[_Union[Vec3, _Mapping]] = ..., gripper_rad: _Optional[float] = ..., gripper_velocity_radps: _Optional[float] = ..., gripper_force_applied_n: _Optional[float] = ..., hand_force_n: _Optional[_Union[Vec3, _Mapping]] = ..., joint_rad: _Optional[_Iterable[float]] = ..., joint_velocity_radps: _Optional[_Iterable[float]] = ..., stiffness_wanted_npm: _Optional[_Iterable[float]] = ...) -> None: ...
+    def __init__(self, tick: _Optional[int] = ..., sampled_ns: _Optional[int] = ..., position_m: _Optional[_Union[Vec3, _Mapping]] = ..., velocity_mps: _Optional[_Union[Vec3, _Mapping]] = ..., force_applied_n: _Optional[_Union[Vec3, _Mapping]] = ..., energy_j: _Optional[float] = ..., permitted_force_n: _Optional[float] = ..., reasons: _Optional[int] = ..., force_sequence: _Optional[int] = ..., force_age_ns: _Optional[int] = ..., mode: _Optional[_Union[Mode, str]] = ..., device: _Optional[int] = ..., channel: _Optional[int] = ..., force_wanted_n: _Optional[_Union[Vec3, _Mapping]] = ..., orientation: _Optional[_Union[Quat, _Mapping]] = ..., angular_velocity_radps: _Optional[_Union[Vec3, _Mapping]] = ..., buttons: _Optional[int] = ..., torque_applied_nm: _Optional[_Union[Vec3, _Mapping]] = ..., gripper_rad: _Optional[float] = ..., gripper_velocity_radps: _Optional[float] = ..., gripper_force_applied_n: _Optional[float] = ..., hand_force_n: _Optional[_Union[Vec3, _Mapping]] = ..., joint_rad: _Optional[_Iterable[float]] = ..., joint_velocity_radps: _Optional[_Iterable[float]] = ..., stiffness_wanted_npm: _Optional[_Iterable[float]] = ..., field: _Optional[int] = ..., field_depth_m: _Optional[float] = ..., field_proxy_m: _Optional[_Union[Vec3, _Mapping]] = ...) -> None: ...
 
 class DeviceStates(_message.Message):
     __slots__ = ["buttons", "channel", "devices", "energy_j", "force_age_ns", "force_applied_n", "force_sequence", "mode", "permitted_force_n", "position_m", "reasons", "sampled_ns", "tick", "velocity_mps"]
@@ -390,6 +406,12 @@ class Disengage(_message.Message):
     device: int
     def __init__(self, device: _Optional[int] = ...) -> None: ...
 
+class DropField(_message.Message):
+    __slots__ = ["field"]
+    FIELD_FIELD_NUMBER: _ClassVar[int]
+    field: bytes
+    def __init__(self, field: _Optional[bytes] = ...) -> None: ...
+
 class Echo(_message.Message):
     __slots__ = ["peer_packet_number", "peer_tx_time_ns", "received_mask", "rx_time_ns"]
     PEER_PACKET_NUMBER_FIELD_NUMBER: _ClassVar[int]
@@ -408,12 +430,75 @@ class Engage(_message.Message):
     device: int
     def __init__(self, device: _Optional[int] = ...) -> None: ...
 
+class FieldBrick(_message.Message):
+    __slots__ = ["hash", "weights"]
+    HASH_FIELD_NUMBER: _ClassVar[int]
+    WEIGHTS_FIELD_NUMBER: _ClassVar[int]
+    hash: bytes
+    weights: bytes
+    def __init__(self, hash: _Optional[bytes] = ..., weights: _Optional[bytes] = ...) -> None: ...
+
+class FieldFixture(_message.Message):
+    __slots__ = ["at_m", "kind", "most_force_n", "normal", "stiffness_npm"]
+    AT_M_FIELD_NUMBER: _ClassVar[int]
+    KIND_FIELD_NUMBER: _ClassVar[int]
+    MOST_FORCE_N_FIELD_NUMBER: _ClassVar[int]
+    NORMAL_FIELD_NUMBER: _ClassVar[int]
+    STIFFNESS_NPM_FIELD_NUMBER: _ClassVar[int]
+    at_m: Vec3
+    kind: FieldFixtureKind
+    most_force_n: float
+    normal: Vec3
+    stiffness_npm: float
+    def __init__(self, kind: _Optional[_Union[FieldFixtureKind, str]] = ..., at_m: _Optional[_Union[Vec3, _Mapping]] = ..., normal: _Optional[_Union[Vec3, _Mapping]] = ..., stiffness_npm: _Optional[float] = ..., most_force_n: _Optional[float] = ...) -> None: ...
+
+class FieldMaterial(_message.Message):
+    __slots__ = ["branch_stiffness_npm", "friction", "relaxation_s", "stiffness_npm"]
+    BRANCH_STIFFNESS_NPM_FIELD_NUMBER: _ClassVar[int]
+    FRICTION_FIELD_NUMBER: _ClassVar[int]
+    RELAXATION_S_FIELD_NUMBER: _ClassVar[int]
+    STIFFNESS_NPM_FIELD_NUMBER: _ClassVar[int]
+    branch_stiffness_npm: float
+    friction: float
+    relaxation_s: float
+    stiffness_npm: float
+    def __init__(self, stiffness_npm: _Optional[float] = ..., branch_stiffness_npm: _Optional[float] = ..., relaxation_s: _Optional[float] = ..., friction: _Optional[float] = ...) -> None: ...
+
+class FieldPose(_message.Message):
+    __slots__ = ["angular_velocity_radps", "channel", "device", "orientation", "position_m", "sequence", "time_ns", "velocity_mps"]
+    ANGULAR_VELOCITY_RADPS_FIELD_NUMBER: _ClassVar[int]
+    CHANNEL_FIELD_NUMBER: _ClassVar[int]
+    DEVICE_FIELD_NUMBER: _ClassVar[int]
+    ORIENTATION_FIELD_NUMBER: _ClassVar[int]
+    POSITION_M_FIELD_NUMBER: _ClassVar[int]
+    SEQUENCE_FIELD_NUMBER: _ClassVar[int]
+    TIME_NS_FIELD_NUMBER: _ClassVar[int]
+    VELOCITY_MPS_FIELD_NUMBER: _ClassVar[int]
+    angular_velocity_radps: Vec3
+    channel: int
+    device: int
+    orientation: Quat
+    position_m: Vec3
+    sequence: int
+    time_ns: int
+    velocity_mps: Vec3
+    def __init__(self, device: _Optional[int] = ..., channel: _Optional[int] = ..., sequence: _Optional[int] = ..., time_ns: _Optional[int] = ..., position_m: _Optional[_Union[Vec3, _Mapping]] = ..., orientation: _Optional[_Union[Quat, _Mapping]] = ..., velocity_mps: _Optional[_Union[Vec3, _Mapping]] = ..., angular_velocity_radps: _Optional[_Union[Vec3, _Mapping]] = ...) -> None: ...
+
+class FieldStatus(_message.Message):
+    __slots__ = ["field", "missing"]
+    FIELD_FIELD_NUMBER: _ClassVar[int]
+    MISSING_FIELD_NUMBER: _ClassVar[int]
+    field: bytes
+    missing: bytes
+    def __init__(self, field: _Optional[bytes] = ..., missing: _Optional[bytes] = ...) -> None: ...
+
 class ForceCommand(_message.Message):
-    __slots__ = ["based_on_tick", "channel", "device", "error_n", "force_n", "gripper_force_n", "model", "rotation_model", "sequence", "topology_changed", "torque_nm", "valid_for_us", "way"]
+    __slots__ = ["based_on_tick", "channel", "device", "error_n", "field", "force_n", "gripper_force_n", "model", "rotation_model", "sequence", "topology_changed", "torque_nm", "valid_for_us", "way"]
     BASED_ON_TICK_FIELD_NUMBER: _ClassVar[int]
     CHANNEL_FIELD_NUMBER: _ClassVar[int]
     DEVICE_FIELD_NUMBER: _ClassVar[int]
     ERROR_N_FIELD_NUMBER: _ClassVar[int]
+    FIELD_FIELD_NUMBER: _ClassVar[int]
     FORCE_N_FIELD_NUMBER: _ClassVar[int]
     GRIPPER_FORCE_N_FIELD_NUMBER: _ClassVar[int]
     MODEL_FIELD_NUMBER: _ClassVar[int]
@@ -427,6 +512,7 @@ class ForceCommand(_message.Message):
     channel: int
     device: int
     error_n: float
+    field: int
     force_n: Vec3
     gripper_force_n: float
     model: LocalModel
@@ -436,7 +522,7 @@ class ForceCommand(_message.Message):
     torque_nm: Vec3
     valid_for_us: int
     way: int
-    def __init__(self, sequence: _Optional[int] = ..., based_on_tick: _Optional[int] = ..., force_n: _Optional[_Union[Vec3, _Mapping]] = ..., model: _Optional[_Union[LocalModel, _Mapping]] = ..., valid_for_us: _Optional[int] = ..., device: _Optional[int] = ..., channel: _Optional[int] = ..., topology_changed: bool = ..., error_n: _Optional[float] = ..., torque_nm: _Optional[_Union[Vec3, _Mapping]] = ..., gripper_force_n: _Optional[float] = ..., rotation_model: _Optional[_Union[RotationModel, _Mapping]] = ..., way: _Optional[int] = ...) -> None: ...
+    def __init__(self, sequence: _Optional[int] = ..., based_on_tick: _Optional[int] = ..., force_n: _Optional[_Union[Vec3, _Mapping]] = ..., model: _Optional[_Union[LocalModel, _Mapping]] = ..., valid_for_us: _Optional[int] = ..., device: _Optional[int] = ..., channel: _Optional[int] = ..., topology_changed: bool = ..., error_n: _Optional[float] = ..., torque_nm: _Optional[_Union[Vec3, _Mapping]] = ..., gripper_force_n: _Optional[float] = ..., rotation_model: _Optional[_Union[RotationModel, _Mapping]] = ..., way: _Optional[int] = ..., field: _Optional[int] = ...) -> None: ...
 
 class ForceTable(_message.Message):
     __slots__ = ["first_depth_m", "force_n", "step_m"]
@@ -449,11 +535,14 @@ class ForceTable(_message.Message):
     def __init__(self, first_depth_m: _Optional[float] = ..., step_m: _Optional[float] = ..., force_n: _Optional[_Iterable[float]] = ...) -> None: ...
 
 class Frame(_message.Message):
-    __slots__ = ["bye", "control", "control_ack", "device_report", "force", "peer_report", "port_state", "report", "state", "states"]
+    __slots__ = ["bye", "control", "control_ack", "device_report", "field_brick", "field_pose", "field_status", "force", "peer_report", "port_state", "report", "state", "states"]
     BYE_FIELD_NUMBER: _ClassVar[int]
     CONTROL_ACK_FIELD_NUMBER: _ClassVar[int]
     CONTROL_FIELD_NUMBER: _ClassVar[int]
     DEVICE_REPORT_FIELD_NUMBER: _ClassVar[int]
+    FIELD_BRICK_FIELD_NUMBER: _ClassVar[int]
+    FIELD_POSE_FIELD_NUMBER: _ClassVar[int]
+    FIELD_STATUS_FIELD_NUMBER: _ClassVar[int]
     FORCE_FIELD_NUMBER: _ClassVar[int]
     PEER_REPORT_FIELD_NUMBER: _ClassVar[int]
     PORT_STATE_FIELD_NUMBER: _ClassVar[int]
@@ -464,13 +553,16 @@ class Frame(_message.Message):
     control: Control
     control_ack: ControlAck
     device_report: DeviceReport
+    field_brick: FieldBrick
+    field_pose: FieldPose
+    field_status: FieldStatus
     force: ForceCommand
     peer_report: PeerReport
     port_state: PortState
     report: LinkReport
     state: DeviceState
     states: DeviceStates
-    def __init__(self, state: _Optional[_Union[DeviceState, _Mapping]] = ..., force: _Optional[_Union[ForceCommand, _Mapping]] = ..., control: _Optional[_Union[Control, _Mapping]] = ..., control_ack: _Optional[_Union[ControlAck, _Mapping]] = ..., bye: _Optional[_Union[Bye, _Mapping]] = ..., report: _Optional[_Union[LinkReport, _Mapping]] = ..., device_report: _Optional[_Union[DeviceReport, _Mapping]] = ..., peer_report: _Optional[_Union[PeerReport, _Mapping]] = ..., port_state: _Optional[_Union[PortState, _Mapping]] = ..., states: _Optional[_Union[DeviceStates, _Mapping]] = ...) -> None: ...
+    def __init__(self, state: _Optional[_Union[DeviceState, _Mapping]] = ..., force: _Optional[_Union[ForceCommand, _Mapping]] = ..., control: _Optional[_Union[Control, _Mapping]] = ..., control_ack: _Optional[_Union[ControlAck, _Mapping]] = ..., bye: _Optional[_Union[Bye, _Mapping]] = ..., report: _Optional[_Union[LinkReport, _Mapping]] = ..., device_report: _Optional[_Union[DeviceReport, _Mapping]] = ..., peer_report: _Optional[_Union[PeerReport, _Mapping]] = ..., port_state: _Optional[_Union[PortState, _Mapping]] = ..., states: _Optional[_Union[DeviceStates, _Mapping]] = ..., field_brick: _Optional[_Union[FieldBrick, _Mapping]] = ..., field_status: _Optional[_Union[FieldStatus, _Mapping]] = ..., field_pose: _Optional[_Union[FieldPose, _Mapping]] = ...) -> None: ...
 
 class GiveLease(_message.Message):
     __slots__ = ["channel", "device"]
@@ -609,6 +701,18 @@ class LocalModel(_message.Message):
     stiffness_npm: _containers.RepeatedScalarFieldContainer[float]
     valid_radius_m: float
     def __init__(self, at_m: _Optional[_Union[Vec3, _Mapping]] = ..., stiffness_npm: _Optional[_Iterable[float]] = ..., valid_radius_m: _Optional[float] = ..., contact: _Optional[_Union[Contact, _Mapping]] = ...) -> None: ...
+
+class OfferField(_message.Message):
+    __slots__ = ["field", "offset", "part", "size"]
+    FIELD_FIELD_NUMBER: _ClassVar[int]
+    OFFSET_FIELD_NUMBER: _ClassVar[int]
+    PART_FIELD_NUMBER: _ClassVar[int]
+    SIZE_FIELD_NUMBER: _ClassVar[int]
+    field: bytes
+    offset: int
+    part: bytes
+    size: int
+    def __init__(self, field: _Optional[bytes] = ..., size: _Optional[int] = ..., offset: _Optional[int] = ..., part: _Optional[bytes] = ...) -> None: ...
 
 class OutputDescription(_message.Message):
     __slots__ = ["kind", "name"]
@@ -844,6 +948,22 @@ class TakeLease(_message.Message):
     device: int
     def __init__(self, device: _Optional[int] = ..., channel: _Optional[int] = ...) -> None: ...
 
+class UseField(_message.Message):
+    __slots__ = ["channel", "device", "field", "fixtures", "generation", "materials"]
+    CHANNEL_FIELD_NUMBER: _ClassVar[int]
+    DEVICE_FIELD_NUMBER: _ClassVar[int]
+    FIELD_FIELD_NUMBER: _ClassVar[int]
+    FIXTURES_FIELD_NUMBER: _ClassVar[int]
+    GENERATION_FIELD_NUMBER: _ClassVar[int]
+    MATERIALS_FIELD_NUMBER: _ClassVar[int]
+    channel: int
+    device: int
+    field: bytes
+    fixtures: _containers.RepeatedCompositeFieldContainer[FieldFixture]
+    generation: int
+    materials: _containers.RepeatedCompositeFieldContainer[FieldMaterial]
+    def __init__(self, device: _Optional[int] = ..., channel: _Optional[int] = ..., generation: _Optional[int] = ..., field: _Optional[bytes] = ..., materials: _Optional[_Iterable[_Union[FieldMaterial, _Mapping]]] = ..., fixtures: _Optional[_Iterable[_Union[FieldFixture, _Mapping]]] = ...) -> None: ...
+
 class Vec3(_message.Message):
     __slots__ = ["x", "y", "z"]
     X_FIELD_NUMBER: _ClassVar[int]
@@ -889,6 +1009,9 @@ class Welcome(_message.Message):
     def __init__(self, version: _Optional[int] = ..., features: _Optional[_Iterable[str]] = ..., role: _Optional[_Union[Role, str]] = ..., device_name: _Optional[str] = ..., max_force_n: _Optional[float] = ..., position_resolution_m: _Optional[float] = ..., loop_hz: _Optional[int] = ..., timeout_ms: _Optional[int] = ..., server: _Optional[str] = ..., grants: _Optional[_Iterable[_Union[Grant, _Mapping]]] = ...) -> None: ...
 
 class Mode(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+    __slots__ = []
+
+class FieldFixtureKind(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
     __slots__ = []
 
 class PortRole(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):

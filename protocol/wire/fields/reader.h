@@ -5,6 +5,7 @@
 #include <array>
 #include <bit>
 #include <concepts>
+#include <cstddef>
 #include <cstring>
 #include <span>
 #include <string>
@@ -238,6 +239,24 @@ class Reader {
     }
     require(name, size >= bound.least && size <= bound.most);
   }
+  /// An array is filled up with zeros. A span refers to the memory of this Reader.
+  template <unsigned kField, class Bytes>
+  void bytes(Field<kField> /*unused*/, Name name, Bytes& value, Entries bound) {
+    std::span<const std::byte> all;
+    inside<kField>([&]() TENDON_INLINE {
+      all = {reinterpret_cast<const std::byte*>(at_), static_cast<std::size_t>(end_ - at_)};
+      at_ = end_;
+    });
+    const bool fits = all.size() >= bound.least && all.size() <= bound.most;
+    require(name, fits);
+    if (!fits) all = {};
+    if constexpr (requires { value.fill({}); }) {
+      std::copy(all.begin(), all.end(), value.begin());
+      std::fill(value.begin() + static_cast<std::ptrdiff_t>(all.size()), value.end(), std::byte{0});
+    } else {
+      value = Bytes(all.begin(), all.end());
+    }
+  }
   template <unsigned kField, class Value, class List>
   void messages(Field<kField> /*unused*/, Name name, std::vector<Value>& value, Entries bound, List list) {
     std::size_t size = 0;
@@ -269,10 +288,17 @@ class Reader {
                                     const Within& bound = {}) noexcept {
     if (next_is<kField, kFixed64>()) present(f, name, value.emplace(), bound);
   }
-  /// The part is present if this field is present.
+  /// The part is present if this field is present and, if it is a varint, not 0.
   template <unsigned kField, unsigned kType, class Value, class Fields>
   [[gnu::always_inline]] void part(Field<kField, kType> /*unused*/, std::optional<Value>& value, Fields fields) {
-    if (next_is<kField, kType>()) fields(value ? *value : made(value));
+    if (!next_is<kField, kType>()) return;
+    if constexpr (kType == kVarint) {
+      if (is_zero<kField>()) {
+        at_ += Tag<kField, kType>::kSize + 1;
+        return;
+      }
+    }
+    fields(value ? *value : made(value));
   }
   /// Only checks the bound if the part is absent.
   template <unsigned kField, unsigned kType, class Value, class Fields>
@@ -367,6 +393,12 @@ class Reader {
 
  private:
   void stop() noexcept { good_ = false; }
+  /// Requires that this varint is next.
+  template <unsigned kField>
+  bool is_zero() const noexcept {
+    constexpr std::ptrdiff_t kTag = Tag<kField, kVarint>::kSize;
+    return end_ - at_ > kTag && at_[kTag] == 0;
+  }
   [[gnu::always_inline]] std::uint64_t length_of_it() noexcept {
     if (at_ != end_ && *at_ < 0x80) return *at_++;
     std::uint64_t length = 0;

@@ -5,9 +5,11 @@
 #include <array>
 #include <bit>
 #include <concepts>
+#include <cstddef>
 #include <cstring>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "core/base/bytes.h"
@@ -169,6 +171,13 @@ class Writer {
   void texts(Field<kField> f, Name /*name*/, const std::vector<std::string>& value, Entries bound,
              std::size_t most) noexcept {
     for (std::size_t i = 0; i < std::min(value.size(), bound.most); ++i) entry(f, clipped(value[i], most));
+  }
+  /// Omits trailing zeros if any number of bytes is allowed.
+  template <unsigned kField>
+  void bytes(Field<kField> f, Name /*name*/, std::span<const std::byte> value, Entries bound) noexcept {
+    std::size_t size = std::min(value.size(), bound.most);
+    while (bound.least == 0 && size > 0 && value[size - 1] == std::byte{0}) --size;
+    if (size > 0) entry(f, {reinterpret_cast<const char*>(value.data()), size});
   }
   template <unsigned kField, class Value, class List>
   void messages(Field<kField> f, Name name, const std::vector<Value>& value, Entries bound, List list) noexcept {

@@ -33,20 +33,25 @@ inline constexpr auto kDeviceStateFields = [](auto& way, auto& state) TENDON_INL
   way.count(field<13>, "channel", state.channel, Counts{.most = 7});
   way.maybe(field<14>, "force_wanted_n", state.force_wanted);
   way.part(field<15, kLength>, state.turning,
-           [&](auto& turning) TENDON_INLINE { way.rotation(field<15>, "orientation", turning.orientation); });
-  way.rest(field<16, kLength>, state.turning, [&](auto& turning) TENDON_INLINE {
-    way.vector(field<16>, "angular_velocity_radps", turning.angular_velocity);
-  });
+           [&](auto& part) TENDON_INLINE { way.rotation(field<15>, "orientation", part.orientation); });
+  way.rest(field<16, kLength>, state.turning,
+           [&](auto& part) TENDON_INLINE { way.vector(field<16>, "angular_velocity_radps", part.angular_velocity); });
   way.bits(field<17>, "buttons", state.buttons);
   way.maybe(field<18>, "torque_applied_nm", state.torque_applied);
   way.part(field<19, kFixed64>, state.grip,
-           [&](auto& grip) TENDON_INLINE { way.present(field<19>, "gripper_rad", grip.opening); });
+           [&](auto& part) TENDON_INLINE { way.present(field<19>, "gripper_rad", part.opening); });
   way.rest(field<20, kFixed64>, state.grip,
-           [&](auto& grip) TENDON_INLINE { way.present(field<20>, "gripper_velocity_radps", grip.velocity); });
+           [&](auto& part) TENDON_INLINE { way.present(field<20>, "gripper_velocity_radps", part.velocity); });
   way.maybe(field<21>, "gripper_force_applied_n", state.grip_applied);
   way.maybe(field<22>, "hand_force_n", state.hand_force);
   way.joints(field<23>, field<24>, "joint_rad", state.joints);
   way.matrix(field<25>, "stiffness_wanted_npm", state.stiffness_wanted);
+  way.part(field<26, kVarint>, state.field,
+           [&](auto& part) TENDON_INLINE { way.count(field<26>, "field", part.generation); });
+  way.rest(field<27, kFixed64>, state.field,
+           [&](auto& part) TENDON_INLINE { way.number(field<27>, "field_depth_m", part.depth, Within{.least = 0}); });
+  way.rest(field<28, kLength>, state.field,
+           [&](auto& part) TENDON_INLINE { way.vector(field<28>, "field_proxy_m", part.proxy); });
 };
 
 inline constexpr auto kForceTableFields = [](auto& way, auto& table) TENDON_INLINE {
@@ -84,12 +89,13 @@ inline constexpr auto kForceCommandFields = [](auto& way, auto& command) TENDON_
   way.flag(field<8>, "topology_changed", command.topology_changed);
   way.maybe(field<9>, "error_n", command.error, Within{.least = 0});
   way.part(field<10, kLength>, command.torque,
-           [&](auto& torque) TENDON_INLINE { way.vector(field<10>, "torque_nm", torque.torque); });
+           [&](auto& part) TENDON_INLINE { way.vector(field<10>, "torque_nm", part.torque); });
   way.maybe(field<11>, "gripper_force_n", command.grip_force);
-  way.part(field<14, kLength>, command.torque, [&](auto& torque) TENDON_INLINE {
-    way.message(field<14>, "rotation_model", torque.model, kRotationModelFields);
+  way.part(field<14, kLength>, command.torque, [&](auto& part) TENDON_INLINE {
+    way.message(field<14>, "rotation_model", part.model, kRotationModelFields);
   });
   way.count(field<15>, "way", command.way, Counts{.most = 8});
+  way.count(field<16>, "field", command.field);
 };
 
 inline constexpr auto kDelaysFields = [](auto& way, auto& delays) TENDON_INLINE {
@@ -207,6 +213,27 @@ inline constexpr auto kPortStateFields = [](auto& way, auto& state) TENDON_INLIN
   way.number(field<27>, "position_scale", state.position_scale, Within{.least = 0.01, .most = 100, .zero = true});
   way.number(field<28>, "force_scale", state.force_scale, Within{.least = 0.01, .most = 100, .zero = true});
   way.flag(field<29>, "of_peer", state.of_peer);
+};
+
+inline constexpr auto kFieldBrickFields = [](auto& way, auto& brick) TENDON_INLINE {
+  way.bytes(field<1>, "hash", brick.hash, Entries{16, 16});
+  way.bytes(field<2>, "weights", brick.weights, Entries{1024, 1024});
+};
+
+inline constexpr auto kFieldStatusFields = [](auto& way, auto& status) TENDON_INLINE {
+  way.bytes(field<1>, "field", status.field, Entries{32, 32});
+  way.bytes(field<2>, "missing", status.missing, Entries{0, 128});
+};
+
+inline constexpr auto kFieldPoseFields = [](auto& way, auto& pose) TENDON_INLINE {
+  way.count(field<1>, "device", pose.device, Counts{.most = 15});
+  way.count(field<2>, "channel", pose.channel, Counts{.most = 7});
+  way.count(field<3>, "sequence", pose.sequence, Counts{.least = 1});
+  way.time(field<4>, "time_ns", pose.time);
+  way.vector(field<5>, "position_m", pose.position);
+  way.rotation(field<6>, "orientation", pose.orientation);
+  way.vector(field<7>, "velocity_mps", pose.velocity);
+  way.vector(field<8>, "angular_velocity_radps", pose.angular_velocity);
 };
 
 }  // namespace tendon::wire

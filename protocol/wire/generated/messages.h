@@ -3,8 +3,10 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <variant>
 #include <vector>
@@ -22,6 +24,13 @@
 // The messages of tendon.proto as plain values. An empty member stands for an absent field.
 
 namespace tendon {
+
+/// The shape that a fixture pulls to. Part of the wire: never renumber.
+enum class FieldFixtureKind : std::uint8_t {
+  kPoint = 1,
+  kLine = 2,
+  kPlane = 3,
+};
 
 /// The hand that is used for holding a device. Part of the wire: never renumber.
 enum class Hand : std::uint8_t {
@@ -59,6 +68,15 @@ enum class Code : std::uint8_t {
 enum class Role : std::uint8_t {
   kObserver = 1,    ///< receives device states
   kController = 2,  ///< also sends forces; one per channel
+};
+
+/// The field that is rendered.
+struct FieldState {
+  /// The generation of the rendered field (UseField::generation). If several channels use fields, this is the first one
+  /// with contact, or else the first one.
+  std::uint32_t generation = 0;
+  double depth = 0;           ///< m, ≥ 0: the distance from the proxy to the hand, or 0 if there is no contact
+  Vec3 proxy = Vec3::Zero();  ///< m, the position of the proxy, which is ignored if there is no field
 };
 
 /// The state of a device at one haptic step. Server → client, unreliable; for each device the highest tick wins.
@@ -102,6 +120,8 @@ struct DeviceState {
   /// the joints that carry the handle, in the order of HandleDescription::joints; empty if the device does not report
   /// joints
   std::optional<Joints> joints{};
+  // With the feature "fields" only:
+  std::optional<FieldState> field{};  ///< the field that is rendered; empty if no field is rendered
 };
 
 /// The force that is requested by a physics engine in response to a state. Client → server, unreliable; for each device
@@ -126,6 +146,80 @@ struct ForceCommand {
   /// 0 … 8. The way in which the engine has computed this force, as an index in Hello::ways that starts at 1, or 0 if
   /// it is unknown. Servers treat an index that is larger than the number of ways as 0
   std::uint32_t way = 0;
+  // With the feature "fields" only:
+  /// If it is not 0, force is not rendered. It is the true force at the state `based_on_tick`, from which the server
+  /// learns the error of the field with this generation (UseField::generation). The model is ignored
+  std::uint32_t field = 0;
+};
+
+/// A part of the manifest of a field, which lists its bricks and primitives. Parts are sent in order.
+struct OfferField {
+  std::array<std::byte, 32> field{};  ///< 32 bytes: the BLAKE2b-256 of the manifest, which is the name of the field
+  std::uint32_t size = 0;             ///< 1 … 65 535: the size of the whole manifest in bytes
+  std::uint32_t offset = 0;           ///< 0 … 65 535: the place of the first byte of `part` in the manifest
+  std::vector<std::byte> part{};      ///< 1 … 1000 bytes
+};
+
+/// A spring, beside a spring in series with a damper, with Coulomb friction (core/field/material.h).
+struct FieldMaterial {
+  double stiffness = 0;         ///< N/m, > 0
+  double branch_stiffness = 0;  ///< N/m, ≥ 0: of the spring in series with the damper, or 0 if there is none
+  double relaxation = 0;        ///< s, 0.01 … 10 or 0: the time constant of the damper; ignored without this spring
+  double friction = 0;          ///< 0 … 2: the coefficient of friction
+};
+
+/// A spring from the hand to the nearest position on a point, a line or a plane, in the frame of the object
+/// (core/field/fixture.h).
+struct FieldFixture {
+  FieldFixtureKind kind = FieldFixtureKind::kPoint;
+  Vec3 at = Vec3::Zero();       ///< m, the point, or a point of the line or plane
+  Vec3 normal = Vec3::UnitZ();  ///< unit vector: the direction of the line, or the normal of the plane; any for a point
+  double stiffness = 0;         ///< N/m, > 0
+  std::optional<double> most_force{};  ///< N, > 0: the largest force. Empty if the force is not limited
+};
+
+/// Renders a field in a channel from now on, instead of the field that the channel has used. The server must have the
+/// whole field (FieldStatus), and the client must hold the lease of the channel, as for a ForceCommand.
+struct UseField {
+  std::uint32_t device = 0;                ///< 0 … 15
+  std::uint32_t channel = 0;               ///< 0 … 7
+  std::uint32_t generation = 0;            ///< ≥ 1: increases with each UseField of a session, device and channel
+  std::array<std::byte, 32> field{};       ///< 32 bytes: the name of the field
+  std::vector<FieldMaterial> materials{};  ///< 1 … 16: the materials that the manifest refers to, from number 0
+  std::vector<FieldFixture> fixtures{};    ///< at most 4
+};
+
+/// Forgets a field. A channel that uses it stops. Its bricks stay in the cache of the server.
+struct DropField {
+  std::array<std::byte, 32> field{};  ///< 32 bytes: the name of the field
+};
+
+/// The weights of a brick (core/field/brick_field.h). Client → server, unreliable.
+struct FieldBrick {
+  std::array<std::byte, 16> hash{};      ///< 16 bytes: the BLAKE2b-128 of the weights
+  std::span<const std::byte> weights{};  ///< 1024 bytes: 8³ int16, little-endian, x fastest
+};
+
+/// What a server still needs of a field. Bit i % 8 of byte i / 8 is set if brick i of the manifest is missing. The last
+/// of the 1024 bits is set if the manifest is not complete; the bits of unknown bricks are then 0. Absent bytes are 0.
+/// Server → client, unreliable; for each field the newest one wins.
+struct FieldStatus {
+  std::array<std::byte, 32> field{};     ///< 32 bytes: the name of the field
+  std::array<std::byte, 128> missing{};  ///< 0 … 128 bytes
+};
+
+/// The pose of the object of a channel, in the base frame of the device. It should be the pose that the engine expects
+/// for the time of its arrival. The server extrapolates it with its velocities for at most 50 ms. Client → server,
+/// unreliable; for each device and channel the highest sequence wins.
+struct FieldPose {
+  std::uint32_t device = 0;    ///< 0 … 15
+  std::uint32_t channel = 0;   ///< 0 … 7
+  std::uint64_t sequence = 0;  ///< 1, 2, 3 … per session, device and channel
+  PeerTime time{};             ///< The time that the pose is for, on the clock of the SERVER, like DeviceState::sampled
+  Vec3 position = Vec3::Zero();  ///< m, of the origin of the object. A server only accepts positions within 10 m
+  Quat orientation{};            ///< the rotation from the frame of the object to the base frame
+  Vec3 velocity = Vec3::Zero();  ///< m/s, of the origin of the object
+  Vec3 angular_velocity = Vec3::Zero();  ///< rad/s, the angular velocity in the axes of the base frame
 };
 
 /// Sets the number of states of a device that are sent to the client per second. Before the first request of this type,
@@ -499,7 +593,7 @@ struct Refused {
 
 /// Reliable: the content of a Control.
 using Request = std::variant<SetStateRate, Rearm, Describe, TakeLease, GiveLease, LeaseLost, SetStateDeadband, Disarm,
-                             SetOutput, Couple, Engage, Disengage, SetScale, SetShare>;
+                             SetOutput, Couple, Engage, Disengage, SetScale, SetShare, OfferField, UseField, DropField>;
 
 /// To a Hello.
 using Answer = std::variant<Welcome, Refused>;
@@ -507,7 +601,7 @@ using Answer = std::variant<Welcome, Refused>;
 /// Returns true if DeviceStates can carry the state, because all other members are empty or 0.
 inline bool fits_columns(const DeviceState& state) noexcept {
   return !state.force_wanted && !state.stiffness_wanted && !state.turning && !state.torque_applied && !state.grip &&
-         !state.grip_applied && !state.hand_force && !state.joints;
+         !state.grip_applied && !state.hand_force && !state.joints && !state.field;
 }
 
 }  // namespace tendon

@@ -120,6 +120,41 @@ inline constexpr auto kSetShareFields = [](auto& way, auto& share) TENDON_INLINE
   way.number(field<3>, "share", share.share, Within{0, 1});
 };
 
+inline constexpr auto kOfferFieldFields = [](auto& way, auto& wanted) TENDON_INLINE {
+  way.bytes(field<1>, "field", wanted.field, Entries{32, 32});
+  way.count(field<2>, "size", wanted.size, Counts{.least = 1, .most = 65535});
+  way.count(field<3>, "offset", wanted.offset, Counts{.most = 65535});
+  way.bytes(field<4>, "part", wanted.part, Entries{1, 1000});
+};
+
+inline constexpr auto kFieldMaterialFields = [](auto& way, auto& material) TENDON_INLINE {
+  way.number(field<1>, "materials.stiffness_npm", material.stiffness, Within{.least = 0, .beyond = true});
+  way.number(field<2>, "materials.branch_stiffness_npm", material.branch_stiffness, Within{.least = 0});
+  way.number(field<3>, "materials.relaxation_s", material.relaxation, Within{.least = 0.01, .most = 10, .zero = true});
+  way.number(field<4>, "materials.friction", material.friction, Within{0, 2});
+};
+
+inline constexpr auto kFieldFixtureFields = [](auto& way, auto& fixture) TENDON_INLINE {
+  way.choice(field<1>, "fixtures.kind", fixture.kind, FieldFixtureKind::kPoint, FieldFixtureKind::kPlane);
+  way.vector(field<2>, "fixtures.at_m", fixture.at);
+  way.normal(field<3>, "fixtures.normal", fixture.normal);
+  way.number(field<4>, "fixtures.stiffness_npm", fixture.stiffness, Within{.least = 0, .beyond = true});
+  way.maybe(field<5>, "fixtures.most_force_n", fixture.most_force, Within{.least = 0, .beyond = true});
+};
+
+inline constexpr auto kUseFieldFields = [](auto& way, auto& wanted) TENDON_INLINE {
+  way.count(field<1>, "device", wanted.device, Counts{.most = 15});
+  way.count(field<2>, "channel", wanted.channel, Counts{.most = 7});
+  way.count(field<3>, "generation", wanted.generation, Counts{.least = 1});
+  way.bytes(field<4>, "field", wanted.field, Entries{32, 32});
+  way.messages(field<5>, "materials", wanted.materials, Entries{1, 16}, kFieldMaterialFields);
+  way.messages(field<6>, "fixtures", wanted.fixtures, Entries{0, 4}, kFieldFixtureFields);
+};
+
+inline constexpr auto kDropFieldFields = [](auto& way, auto& wanted) TENDON_INLINE {
+  way.bytes(field<1>, "field", wanted.field, Entries{32, 32});
+};
+
 inline constexpr auto kControlFields = [](auto& way, auto& control) TENDON_INLINE {
   way.count(field<1>, "id", control.id, Counts{.least = 1});
   static_cast<void>(
@@ -137,7 +172,10 @@ inline constexpr auto kControlFields = [](auto& way, auto& control) TENDON_INLIN
       way.arm(field<12, kLength>, "engage", kind<Engage>, control.request, kEngageFields) ||
       way.arm(field<13, kLength>, "disengage", kind<Disengage>, control.request, kDisengageFields) ||
       way.arm(field<14, kLength>, "set_scale", kind<SetScale>, control.request, kSetScaleFields) ||
-      way.arm(field<15, kLength>, "set_share", kind<SetShare>, control.request, kSetShareFields));
+      way.arm(field<15, kLength>, "set_share", kind<SetShare>, control.request, kSetShareFields) ||
+      way.arm(field<16, kLength>, "offer_field", kind<OfferField>, control.request, kOfferFieldFields) ||
+      way.arm(field<17, kLength>, "use_field", kind<UseField>, control.request, kUseFieldFields) ||
+      way.arm(field<18, kLength>, "drop_field", kind<DropField>, control.request, kDropFieldFields));
 };
 
 inline constexpr auto kChannelDescriptionFields = [](auto& way, auto& description) TENDON_INLINE {

@@ -35,7 +35,8 @@ inline constexpr std::array kDeviceStateShapes = {
     FieldShape{19, Shape::kBits64},          FieldShape{20, Shape::kBits64},
     FieldShape{21, Shape::kBits64},          FieldShape{22, Shape::kMessage, &kVec3},
     FieldShape{23, Shape::kBits64s},         FieldShape{24, Shape::kBits64s},
-    FieldShape{25, Shape::kBits64s}};
+    FieldShape{25, Shape::kBits64s},         FieldShape{26, Shape::kCount32},
+    FieldShape{27, Shape::kBits64},          FieldShape{28, Shape::kMessage, &kVec3}};
 inline constexpr Schema kDeviceState{kDeviceStateShapes};
 
 inline constexpr std::array kForceTableShapes = {FieldShape{1, Shape::kBits64}, FieldShape{2, Shape::kBits64},
@@ -62,7 +63,7 @@ inline constexpr std::array kForceCommandShapes = {
     FieldShape{7, Shape::kCount32},         FieldShape{8, Shape::kFlag},
     FieldShape{9, Shape::kBits64},          FieldShape{10, Shape::kMessage, &kVec3},
     FieldShape{11, Shape::kBits64},         FieldShape{14, Shape::kMessage, &kRotationModel},
-    FieldShape{15, Shape::kCount32}};
+    FieldShape{15, Shape::kCount32},        FieldShape{16, Shape::kCount32}};
 inline constexpr Schema kForceCommand{kForceCommandShapes};
 
 inline constexpr std::array kSetStateRateShapes = {FieldShape{1, Shape::kCount32}, FieldShape{2, Shape::kCount32}};
@@ -141,6 +142,30 @@ inline constexpr std::array kSetShareShapes = {FieldShape{1, Shape::kCount32}, F
                                                FieldShape{3, Shape::kBits64}};
 inline constexpr Schema kSetShare{kSetShareShapes};
 
+inline constexpr std::array kOfferFieldShapes = {FieldShape{1, Shape::kBytes}, FieldShape{2, Shape::kCount32},
+                                                 FieldShape{3, Shape::kCount32}, FieldShape{4, Shape::kBytes}};
+inline constexpr Schema kOfferField{kOfferFieldShapes};
+
+inline constexpr std::array kFieldMaterialShapes = {FieldShape{1, Shape::kBits64}, FieldShape{2, Shape::kBits64},
+                                                    FieldShape{3, Shape::kBits64}, FieldShape{4, Shape::kBits64}};
+inline constexpr Schema kFieldMaterial{kFieldMaterialShapes};
+
+inline constexpr std::array kFieldFixtureShapes = {
+    FieldShape{1, Shape::kCount32}, FieldShape{2, Shape::kMessage, &kVec3}, FieldShape{3, Shape::kMessage, &kVec3},
+    FieldShape{4, Shape::kBits64}, FieldShape{5, Shape::kBits64}};
+inline constexpr Schema kFieldFixture{kFieldFixtureShapes};
+
+inline constexpr std::array kUseFieldShapes = {FieldShape{1, Shape::kCount32},
+                                               FieldShape{2, Shape::kCount32},
+                                               FieldShape{3, Shape::kCount32},
+                                               FieldShape{4, Shape::kBytes},
+                                               FieldShape{5, Shape::kMessages, &kFieldMaterial},
+                                               FieldShape{6, Shape::kMessages, &kFieldFixture}};
+inline constexpr Schema kUseField{kUseFieldShapes};
+
+inline constexpr std::array kDropFieldShapes = {FieldShape{1, Shape::kBytes}};
+inline constexpr Schema kDropField{kDropFieldShapes};
+
 inline constexpr std::array kControlShapes = {FieldShape{1, Shape::kCount32},
                                               FieldShape{2, Shape::kMessage, &kSetStateRate, true},
                                               FieldShape{3, Shape::kMessage, &kRearm, true},
@@ -155,7 +180,10 @@ inline constexpr std::array kControlShapes = {FieldShape{1, Shape::kCount32},
                                               FieldShape{12, Shape::kMessage, &kEngage, true},
                                               FieldShape{13, Shape::kMessage, &kDisengage, true},
                                               FieldShape{14, Shape::kMessage, &kSetScale, true},
-                                              FieldShape{15, Shape::kMessage, &kSetShare, true}};
+                                              FieldShape{15, Shape::kMessage, &kSetShare, true},
+                                              FieldShape{16, Shape::kMessage, &kOfferField, true},
+                                              FieldShape{17, Shape::kMessage, &kUseField, true},
+                                              FieldShape{18, Shape::kMessage, &kDropField, true}};
 inline constexpr Schema kControl{kControlShapes};
 
 inline constexpr std::array kChannelDescriptionShapes = {FieldShape{1, Shape::kText}, FieldShape{2, Shape::kCount32},
@@ -301,12 +329,27 @@ inline constexpr std::array kDeviceStatesShapes = {
     FieldShape{13, Shape::kCount32s}, FieldShape{14, Shape::kCount32s}};
 inline constexpr Schema kDeviceStates{kDeviceStatesShapes};
 
+inline constexpr std::array kFieldBrickShapes = {FieldShape{1, Shape::kBytes}, FieldShape{2, Shape::kBytes}};
+inline constexpr Schema kFieldBrick{kFieldBrickShapes};
+
+inline constexpr std::array kFieldStatusShapes = {FieldShape{1, Shape::kBytes}, FieldShape{2, Shape::kBytes}};
+inline constexpr Schema kFieldStatus{kFieldStatusShapes};
+
+inline constexpr std::array kFieldPoseShapes = {
+    FieldShape{1, Shape::kCount32},         FieldShape{2, Shape::kCount32},
+    FieldShape{3, Shape::kCount64},         FieldShape{4, Shape::kBits64},
+    FieldShape{5, Shape::kMessage, &kVec3}, FieldShape{6, Shape::kMessage, &kQuat},
+    FieldShape{7, Shape::kMessage, &kVec3}, FieldShape{8, Shape::kMessage, &kVec3}};
+inline constexpr Schema kFieldPose{kFieldPoseShapes};
+
 inline constexpr std::array kFrameShapes = {
     FieldShape{1, Shape::kMessage, &kDeviceState, true},  FieldShape{2, Shape::kMessage, &kForceCommand, true},
     FieldShape{3, Shape::kMessage, &kControl, true},      FieldShape{4, Shape::kMessage, &kControlAck, true},
     FieldShape{5, Shape::kMessage, &kBye, true},          FieldShape{6, Shape::kMessage, &kLinkReport, true},
     FieldShape{7, Shape::kMessage, &kDeviceReport, true}, FieldShape{8, Shape::kMessage, &kPeerReport, true},
-    FieldShape{9, Shape::kMessage, &kPortState, true},    FieldShape{10, Shape::kMessage, &kDeviceStates, true}};
+    FieldShape{9, Shape::kMessage, &kPortState, true},    FieldShape{10, Shape::kMessage, &kDeviceStates, true},
+    FieldShape{11, Shape::kMessage, &kFieldBrick, true},  FieldShape{12, Shape::kMessage, &kFieldStatus, true},
+    FieldShape{13, Shape::kMessage, &kFieldPose, true}};
 inline constexpr Schema kFrame{kFrameShapes};
 
 inline constexpr std::array kDatagramShapes = {FieldShape{1, Shape::kBits64}, FieldShape{2, Shape::kMessage, &kEcho},

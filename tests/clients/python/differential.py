@@ -30,12 +30,17 @@ from tendon.messages import (
     DeviceState,
     Disarm,
     Disengage,
+    DropField,
     Engage,
+    FieldBrick,
+    FieldPose,
+    FieldStatus,
     ForceCommand,
     Frame,
     LampColour,
     LinkReport,
     Mat3,
+    OfferField,
     PeerReport,
     PortGrip,
     PortState,
@@ -48,6 +53,7 @@ from tendon.messages import (
     SetShare,
     SetStateDeadband,
     SetStateRate,
+    UseField,
     Vec3,
     Welcome,
 )
@@ -65,6 +71,10 @@ def _vector(vector: Vec3) -> list[object]:
 
 def _text(text: str) -> str:
     return "x" + text.encode().hex()
+
+
+def _bytes(value: bytes) -> str:
+    return "x" + value.hex()
 
 
 def _report(report: LinkReport) -> list[object]:
@@ -99,6 +109,8 @@ def _handle_of(state: DeviceState) -> list[object]:
         words += ["joints", len(state.joints.angles)]
         for angle, velocity in zip(state.joints.angles, state.joints.velocities):
             words += [_double(angle), _double(velocity)]
+    if state.field is not None:
+        words += ["field", state.field.generation, _double(state.field.depth), *_vector(state.field.proxy)]
     return words
 
 
@@ -137,6 +149,8 @@ def _frame(frame: Frame) -> list[object]:
             words += ["grip-force", _double(frame.grip_force)]
         if frame.way:
             words += ["way", frame.way]
+        if frame.field:
+            words += ["field", frame.field]
         return words
     if isinstance(frame, Control):
         if frame.request is None:
@@ -166,6 +180,13 @@ def _frame(frame: Frame) -> list[object]:
             return ["control", frame.id, "share", of.device, of.channel, _double(of.share)]
         if isinstance(frame.request, (Engage, Disengage)):
             return ["control", frame.id, type(frame.request).__name__.lower(), frame.request.device]
+        if isinstance(frame.request, OfferField):
+            offer = frame.request
+            return ["control", frame.id, "offer-field", _bytes(offer.field), offer.size, offer.offset, _bytes(offer.part)]
+        if isinstance(frame.request, UseField):
+            return ["control", frame.id, *_use_field(frame.request)]
+        if isinstance(frame.request, DropField):
+            return ["control", frame.id, "drop-field", _bytes(frame.request.field)]
         if isinstance(frame.request, SetOutput):
             wanted = frame.request
             words = ["control", frame.id, "output", wanted.device, wanted.output]
@@ -221,8 +242,29 @@ def _frame(frame: Frame) -> list[object]:
             *([] if frame.share is None else ["share", _double(frame.share)]),
             *(_double(frame.position_scale), _double(frame.force_scale), int(frame.of_peer)),
         ]
+    if isinstance(frame, FieldBrick):
+        return ["brick", _bytes(frame.hash), _bytes(frame.weights)]
+    if isinstance(frame, FieldStatus):
+        return ["field-status", _bytes(frame.field), _bytes(frame.missing.ljust(128, b"\0"))]
+    if isinstance(frame, FieldPose):
+        return [
+            *("pose", frame.device, frame.channel, frame.sequence, frame.time_ns, *_vector(frame.position)),
+            *map(_double, frame.orientation),
+            *(*_vector(frame.velocity), *_vector(frame.angular_velocity)),
+        ]
     assert isinstance(frame, Bye)
     return ["bye", int(frame.code), _text(frame.reason)]
+
+
+def _use_field(use: UseField) -> list[object]:
+    words: list[object] = ["use-field", use.device, use.channel, use.generation, _bytes(use.field)]
+    for one in use.materials:
+        words += ["material", *map(_double, (one.stiffness, one.branch_stiffness, one.relaxation, one.friction))]
+    for fixture in use.fixtures:
+        words += ["fixture", int(fixture.kind), *_vector(fixture.at), *_vector(fixture.normal)]
+        words += [_double(fixture.stiffness)]
+        words += [] if fixture.most_force is None else [_double(fixture.most_force)]
+    return words
 
 
 def _surface(surface: PortSurface | None) -> list[object]:
@@ -342,13 +384,16 @@ class Dice(random.Random):
         if isinstance(message, pb.DeviceReport) and self.random() < 0.7:  # a random report is hardly ever consistent
             message.steps = min(max(sum(message.lateness_us_log2), message.overruns, message.unseen), 2**64 - 1)
 
-    def value(self, field: object) -> float | int | str | bool:
+    def value(self, field: object) -> float | int | str | bool | bytes:
         kind = field.type  # type: ignore[attr-defined]
         if kind == field.TYPE_DOUBLE:  # type: ignore[attr-defined]
             good = [self.uniform(-10, 10)] * 120
             return self.choice([*_DOUBLES, *good])
         if kind == field.TYPE_STRING:  # type: ignore[attr-defined]
             return self.choice(_TEXTS)
+        if kind == field.TYPE_BYTES:  # type: ignore[attr-defined]
+            usual = {"hash": 16, "weights": 1024, "missing": 128, "field": 32, "part": 1000}[field.name]  # type: ignore[attr-defined]
+            return self.randbytes(self.choice([usual, usual, usual, usual - 1, usual + 1, 0, 1]))
         if kind == field.TYPE_BOOL:  # type: ignore[attr-defined]
             return self.choice([False, True])
         if kind == field.TYPE_ENUM:  # type: ignore[attr-defined]

@@ -37,26 +37,27 @@ struct Server {
   }
   Refusal part(const FieldName& field, const Bytes& manifest, std::size_t size, std::size_t offset,
                std::size_t length) {
-    return receiver.take(now, FieldPart{.field = field,
-                                        .size = static_cast<std::uint32_t>(size),
-                                        .offset = static_cast<std::uint32_t>(offset),
-                                        .bytes = std::span(manifest).subspan(0, length)});
+    return receiver.take(
+        now, OfferField{.field = field,
+                        .size = static_cast<std::uint32_t>(size),
+                        .offset = static_cast<std::uint32_t>(offset),
+                        .part = {manifest.begin(), manifest.begin() + static_cast<std::ptrdiff_t>(length)}});
   }
   /// Sends all parts and returns the first error.
   Refusal offer(const Bytes& manifest) { return offer(crypto::blake2b_256(manifest), manifest); }
   Refusal offer(const FieldName& field, const Bytes& manifest) {
     for (std::size_t at = 0; at < manifest.size(); at += limits::kMaxFieldPart) {
-      const auto bytes = std::span(manifest).subspan(at);
-      const FieldPart part{.field = field,
-                           .size = static_cast<std::uint32_t>(manifest.size()),
-                           .offset = static_cast<std::uint32_t>(at),
-                           .bytes = bytes.first(std::min(bytes.size(), limits::kMaxFieldPart))};
+      const auto bytes = std::span(manifest).subspan(at, std::min(manifest.size() - at, limits::kMaxFieldPart));
+      const OfferField part{.field = field,
+                            .size = static_cast<std::uint32_t>(manifest.size()),
+                            .offset = static_cast<std::uint32_t>(at),
+                            .part = {bytes.begin(), bytes.end()}};
       if (auto refused = receiver.take(now, part)) return refused;
     }
     return {};
   }
   Refusal brick(const BrickHash& hash, std::span<const std::byte> bytes) {
-    return receiver.take(now, FieldBrick{.hash = hash, .bytes = bytes});
+    return receiver.take(now, FieldBrick{.hash = hash, .weights = bytes});
   }
 };
 
@@ -97,9 +98,9 @@ const std::vector<Case>& cases() {
   const auto number = [offered](std::size_t at, auto value) { return offered(with(at, value)); };
   static const std::vector<Case> kCases = {
       // Parts:
-      {"bytes = 0: expected 1 … 117", [](Server& s) { return s.part(good(), 0, 0); }},
-      {"bytes = 117: expected 1 … 116", [](Server& s) { return s.part({}, good(), 117, 1, 117); }},
-      {"bytes = 1001: expected 1 … 1000", [](Server& s) { return s.part({}, Bytes(2000), 2000, 0, 1001); }},
+      {"part = 0: expected 1 … 117", [](Server& s) { return s.part(good(), 0, 0); }},
+      {"part = 117: expected 1 … 116", [](Server& s) { return s.part({}, good(), 117, 1, 117); }},
+      {"part = 1001: expected 1 … 1000", [](Server& s) { return s.part({}, Bytes(2000), 2000, 0, 1001); }},
       {"size = 0: expected 71 … 23577 bytes", [](Server& s) { return s.part({}, good(), 0, 0, 1); }},
       {"size = 4294967295: expected 71 …", [](Server& s) { return s.part({}, good(), 0xFFFFFFFF, 0, 1); }},
       {"offset = 200: expected below 117", [](Server& s) { return s.part({}, good(), 117, 200, 1); }},
@@ -166,10 +167,10 @@ const std::vector<Case>& cases() {
          return refused;
        }},
       // Bricks:
-      {"bytes = 0: expected 1024", [](Server& s) { return s.brick(hash_of(0), {}); }},
-      {"bytes = 1023: expected 1024",
+      {"weights = 0: expected 1024", [](Server& s) { return s.brick(hash_of(0), {}); }},
+      {"weights = 1023: expected 1024",
        [](Server& s) { return s.brick(hash_of(0), std::span(bricks()[0].bytes).first(1023)); }},
-      {"bytes = 1025: expected 1024", [](Server& s) { return s.brick(hash_of(0), Bytes(1025)); }},
+      {"weights = 1025: expected 1024", [](Server& s) { return s.brick(hash_of(0), Bytes(1025)); }},
       {"expected a brick of an offered field", [](Server& s) { return s.brick(hash_of(0), bricks()[0].bytes); }},
       {"the bytes have the hash",
        [](Server& s) {
@@ -232,11 +233,11 @@ TEST(FieldHostile, AStatusDoesNotTellWhatAnotherKeyHasUploaded) {
   FieldReceiver guesser({.owner = 1}, server.store);
   const Bytes manifest = good();
   const FieldName name = crypto::blake2b_256(manifest);
-  ASSERT_FALSE(guesser.take(kStart, FieldPart{.field = name, .size = 117, .offset = 0, .bytes = manifest}));
+  ASSERT_FALSE(guesser.take(kStart, OfferField{.field = name, .size = 117, .offset = 0, .part = manifest}));
   const auto status = guesser.next_status(kStart);
   ASSERT_TRUE(status);
   for (std::size_t i = 0; i < bricks().size(); ++i) {
-    EXPECT_TRUE(status->misses(i));
+    EXPECT_TRUE(misses(*status, i));
     EXPECT_EQ(guesser.brick(hash_of(i)), nullptr);
   }
   EXPECT_FALSE(guesser.ready(name));

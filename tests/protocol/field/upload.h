@@ -91,20 +91,16 @@ class Upload {
     if (refusal) refusals.push_back(refusal->detail);
   }
   void take(const Control& control) { answering_.take(control); }
-  void take(const SentBrick& brick) { note(receiver.take(now, FieldBrick{.hash = brick.hash, .bytes = brick.bytes})); }
+  void take(const SentBrick& brick) {
+    note(receiver.take(now, FieldBrick{.hash = brick.hash, .weights = brick.bytes}));
+  }
   void take(const ControlAck& ack) { asked_.acknowledge(ack); }
   void take(const FieldStatus& status) { sender.take(now, status, round_trip_.smoothed()); }
 
   void turn() {
     receive(to_server_);
-    while (const Control* const request = answering_.next()) {  // `hz` is the offset of the part
-      const std::size_t at = std::get<SetStateRate>(*request->request).hz;
-      const auto manifest = sender.manifest();
-      note(receiver.take(
-          now, FieldPart{.field = sender.field(),
-                         .size = static_cast<std::uint32_t>(manifest.size()),
-                         .offset = static_cast<std::uint32_t>(at),
-                         .bytes = manifest.subspan(at, std::min(manifest.size() - at, limits::kMaxFieldPart))}));
+    while (const Control* const request = answering_.next()) {
+      note(receiver.take(now, std::get<OfferField>(*request->request)));
       answering_.answer({.id = request->id, .code = Code::kOk, .detail = {}});
     }
     while (const auto status = receiver.next_status(now)) send(to_client_, ToClient(*status));
@@ -116,15 +112,15 @@ class Upload {
     receive(to_client_);
     while (asked_.next_answer()) {
     }
-    for (auto part = sender.next_part(now); part && asked_.add(SetStateRate{.hz = part->offset});
-         part = sender.next_part(now)) {
+    for (auto part = sender.next_part(now); part && asked_.add(*part); part = sender.next_part(now)) {
       sender.part_sent();
     }
     while (const Control* const request = asked_.next_due(now)) {
       send(to_server_, ToServer(*request));
       asked_.sent(request->id, now, round_trip_.timeout(std::chrono::milliseconds(20)));
     }
-    while (const auto brick = sender.next_brick(now)) send(to_server_, ToServer(SentBrick{brick->hash, brick->bytes}));
+    while (const auto brick = sender.next_brick(now))
+      send(to_server_, ToServer(SentBrick{brick->hash, brick->weights}));
   }
 
   Weather weather_;

@@ -289,8 +289,12 @@ class Maker {
       }
     }
     if (bound.bytes) {
-      for (const std::int64_t size : {whole(bound.bytes->most), whole(bound.bytes->most) + 1}) {
-        changed(std::to_string(size) + " bytes", size <= whole(bound.bytes->most), [&] {
+      const std::int64_t least = whole(bound.bytes->least);
+      const std::int64_t most = whole(bound.bytes->most);
+      std::set<std::int64_t> sizes = {most, most + 1};
+      if (least > 0) sizes.insert({least - 1, least});
+      for (const std::int64_t size : sizes) {
+        changed(std::to_string(size) + " bytes", size >= least && size <= most, [&] {
           const std::string text(static_cast<std::size_t>(size), 'x');
           if (field.is_repeated()) return reflection.SetRepeatedString(&message, &field, 0, text);
           reflection.SetString(&message, &field, text);
@@ -351,6 +355,7 @@ bool needs_a_bound(const FieldDescriptor& field) {
     case FieldDescriptor::TYPE_SINT64:
     case FieldDescriptor::TYPE_FLOAT:
     case FieldDescriptor::TYPE_STRING:
+    case FieldDescriptor::TYPE_BYTES:
       return true;
     case FieldDescriptor::TYPE_ENUM:  // its named values
       return false;

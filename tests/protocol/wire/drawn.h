@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <type_traits>
@@ -138,6 +139,22 @@ class Draw {
     value.resize(entries(bound));
     for (std::string& entry : value) entry = a_text(most);
   }
+  /// A span refers to static memory.
+  template <class Bytes>
+  void bytes(auto /*field*/, Name /*name*/, Bytes& value, Entries bound) {
+    static const std::vector<std::byte> kBytes = [] {
+      std::vector<std::byte> drawn(4096);
+      for (Dice dice(1); std::byte & byte : drawn) byte = static_cast<std::byte>(1 + dice.bits() % 255);
+      return drawn;
+    }();
+    const std::size_t size = spoils() ? dice_.bits() % (bound.most + 2) : entries(bound);
+    const auto drawn = std::span(kBytes).subspan(dice_.bits() % 1000, size);
+    if constexpr (requires { value.fill({}); }) {
+      std::copy_n(drawn.begin(), std::min(size, value.size()), value.begin());
+    } else {
+      value = Bytes(drawn.begin(), drawn.end());
+    }
+  }
   void messages(auto /*field*/, Name /*name*/, auto& value, Entries bound, auto list) {
     value.resize(entries(bound));
     for (auto& entry : value) list(*this, entry);
@@ -164,6 +181,9 @@ class Draw {
   void part(auto f, auto& value, auto fields) {
     if (!value && there()) value.emplace();
     rest(f, value, fields);
+    if constexpr (requires { value->generation; }) {
+      if (value && value->generation == 0) value.reset();
+    }
   }
   void rest(auto /*field*/, auto& value, auto fields) {
     if (value) fields(*value);
@@ -220,6 +240,9 @@ constexpr auto fields_of(const LinkReport& /*unused*/) { return wire::kLinkRepor
 constexpr auto fields_of(const DeviceReport& /*unused*/) { return wire::kDeviceReportFields; }
 constexpr auto fields_of(const PeerReport& /*unused*/) { return wire::kPeerReportFields; }
 constexpr auto fields_of(const PortFrame& /*unused*/) { return wire::kPortStateFields; }
+constexpr auto fields_of(const FieldBrick& /*unused*/) { return wire::kFieldBrickFields; }
+constexpr auto fields_of(const FieldStatus& /*unused*/) { return wire::kFieldStatusFields; }
+constexpr auto fields_of(const FieldPose& /*unused*/) { return wire::kFieldPoseFields; }
 
 template <class Value>
 Value a(Dice& dice, const Draw::Config& config = {}) {

@@ -118,6 +118,14 @@ class Writer {
     if (about->type() == FieldDescriptor::TYPE_MESSAGE) {
       line(hex(head()), depth, name + ": " + about->message_type()->name() + bytes);
       message(*about->message_type(), size, depth + 1);
+    } else if (about->type() == FieldDescriptor::TYPE_BYTES) {
+      line(hex(head()), depth, name + bytes);
+      const Bytes content = take(size);
+      const bool same = std::ranges::all_of(content, [&](std::byte b) { return b == content.front(); });
+      if (same && size > kAcross) return line(hex(content.first(1)) + " x" + std::to_string(size), depth + 1, "");
+      for (std::size_t at = 0; at < size; at += kAcross) {
+        text_ += hex(content.subspan(at, std::min(kAcross, size - at))) + '\n';
+      }
     } else if (about->type() == FieldDescriptor::TYPE_STRING) {
       const Bytes before = head();
       const Bytes text = take(size);

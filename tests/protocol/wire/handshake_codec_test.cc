@@ -152,21 +152,39 @@ TEST(Codec, TheLongestDescriptionOfAHandleFitsIntoADatagramOfItsOwn) {
   EXPECT_EQ(handle->outputs, most.outputs);
 }
 
-TEST(Codec, AStateAndAForceAlwaysFitTogetherIntoASealedDatagram) {
+template <class... Frames>
+void expect_to_fit_into_a_sealed_datagram() {
   OutgoingEcho echo = examples::echo();
   echo.packet_number = ~std::uint64_t{0};
 
   std::array<std::byte, kMaxDatagram> buffer;
   DataWriter writer;
   writer.begin(std::span(buffer).first(kMaxDatagram - crypto::kTagSize), {}, LocalTime{limits::kMaxTime}, echo);
-  ASSERT_TRUE(writer.add(drawn::the_fullest<DeviceState>()));
-  ASSERT_TRUE(writer.add(drawn::the_fullest<ForceCommand>()));
+  ASSERT_TRUE((writer.add(drawn::the_fullest<Frames>()) && ...));
 
   DataReader reader;
   const DataContent* content = reader.read(std::span(buffer).subspan(kHeaderSize, writer.size() - kHeaderSize));
   ASSERT_NE(content, nullptr);
-  EXPECT_EQ(content->frames.size(), 2U);
+  EXPECT_EQ(content->frames.size(), sizeof...(Frames));
   EXPECT_EQ(content->invalid, 0U);
+}
+
+TEST(Codec, AStateOrAForceWithAPoseFitsIntoASealedDatagram) {
+  expect_to_fit_into_a_sealed_datagram<DeviceState>();
+  expect_to_fit_into_a_sealed_datagram<ForceCommand, FieldPose>();
+}
+
+TEST(Codec, ABrickAndTheLargestUseOfAFieldFitIntoASealedDatagram) {
+  expect_to_fit_into_a_sealed_datagram<FieldBrick>();
+  UseField use{.device = 15, .channel = 7, .generation = ~0U, .field = examples::field_name()};
+  use.materials.resize(16, {.stiffness = 1, .branch_stiffness = 1, .relaxation = 1, .friction = 1});
+  const Vec3 direction(0.6, 0.64, 0.48);
+  use.fixtures.resize(4, {.at = direction, .normal = direction, .stiffness = 1, .most_force = 1});
+  std::array<std::byte, kMaxDatagram> buffer;
+  DataWriter writer;
+  writer.begin(std::span(buffer).first(kMaxDatagram - crypto::kTagSize), {}, LocalTime{limits::kMaxTime},
+               examples::echo());
+  EXPECT_TRUE(writer.add(Control{.id = ~0U, .request = use}));
 }
 
 constexpr std::uint64_t kOne = 0x3ff0'0000'0000'0000;  // 1.0

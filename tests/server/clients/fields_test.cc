@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <array>
 #include <map>
 #include <string>
 #include <vector>
 
 #include "protocol/wire/codec.h"
-#include "tests/protocol/wire/raw_protobuf.h"
+#include "tests/protocol/examples.h"
 #include "tests/server/clients/sealed_server.h"
 
 namespace tendon::fields_test {
@@ -15,8 +16,6 @@ using std::chrono::milliseconds;
 class ServerWithoutFields : public SealedServer {
  protected:
   ServerWithoutFields() { restart_without_keys(); }
-
-  static RawProtobuf body_of(const RawProtobuf& frame) { return RawProtobuf().fixed64(1, 1).message(3, frame); }
 };
 
 // The engine sends the frames 11 to 13 and the requests 16 to 18, which are used for fields.
@@ -31,23 +30,21 @@ TEST_F(ServerWithoutFields, DeniesTheFeatureAndRefusesItsRequests) {
   ASSERT_TRUE(engine.session());
   EXPECT_EQ(engine.welcome.value().features, std::vector<std::string>{"local-model"});
 
-  const std::string hash(32, 'h');
-  const std::string brick(limits::kMaxDetail * 8, '\x7F');
-  std::vector<RawProtobuf> bodies;
-  for (const unsigned frame : {11U, 12U, 13U}) {
-    bodies.push_back(body_of(RawProtobuf().message(frame, RawProtobuf().text(1, hash).text(2, brick))));
-  }
-  for (const unsigned request : {16U, 17U, 18U}) {
-    const RawProtobuf field = RawProtobuf().text(1, hash);
-    bodies.push_back(body_of(RawProtobuf().message(3, RawProtobuf().varint(1, request - 15).message(request, field))));
-  }
   std::uint64_t number = engine.session()->stats().datagrams_sent + 10;
-  for (const RawProtobuf& body : bodies) {
-    const auto header = encode_header({.connection_id = engine.session()->connection_id(), .packet_number = number++});
-    Bytes datagram(header.begin(), header.end());
-    datagram.insert(datagram.end(), body.bytes().begin(), body.bytes().end());
-    deliver(engine.end.self, datagram);
-  }
+  const auto send = [&](const auto& frame) {
+    std::array<std::byte, kMaxDatagram> buffer{};
+    DataWriter writer;
+    writer.begin(buffer, {.connection_id = engine.session()->connection_id(), .packet_number = number++},
+                 LocalTime{Duration{1}}, {});
+    ASSERT_TRUE(writer.add(frame));
+    deliver(engine.end.self, Bytes(buffer.begin(), buffer.begin() + static_cast<std::ptrdiff_t>(writer.size())));
+  };
+  send(examples::field_brick());
+  send(examples::field_status());
+  send(examples::field_pose());
+  send(Control{.id = 1, .request = examples::offer_field()});
+  send(Control{.id = 2, .request = examples::use_field()});
+  send(Control{.id = 3, .request = examples::drop_field()});
   states = 0;
   const std::size_t before = wire_.size();
   run_with(engine, milliseconds(50), count);

@@ -25,8 +25,16 @@ from ..generated import (
     DeviceState,
     Disarm,
     Disengage,
+    DropField,
     Echo,
     Engage,
+    FieldBrick,
+    FieldFixture,
+    FieldFixtureKind,
+    FieldMaterial,
+    FieldPose,
+    FieldState,
+    FieldStatus,
     ForceCommand,
     ForceTable,
     GiveLease,
@@ -41,6 +49,7 @@ from ..generated import (
     LinkReport,
     LocalModel,
     Mode,
+    OfferField,
     OutputDescription,
     OutputKind,
     PeerReport,
@@ -66,6 +75,7 @@ from ..generated import (
     TakeLease,
     Torque,
     Turning,
+    UseField,
     Vibration,
     Welcome,
     ZERO,
@@ -91,6 +101,7 @@ from .fields import (
 )
 
 _MODE = {int(value): value for value in Mode}
+_FIELD_FIXTURE_KIND = {int(value): value for value in FieldFixtureKind}
 _PORT_ROLE = {int(value): value for value in PortRole}
 _COUPLING_METHOD = {int(value): value for value in CouplingMethod}
 _OUTPUT_KIND = {int(value): value for value in OutputKind}
@@ -174,6 +185,10 @@ def read_device_state(m: pb.DeviceState) -> DeviceState:
         read_matrix("stiffness_wanted_npm", m.stiffness_wanted_npm)
         if m.stiffness_wanted_npm else None
     )
+    field_depth_m = m.field_depth_m
+    if not 0 <= field_depth_m <= 1e12:
+        raise OutOfBounds("field_depth_m")
+    field_proxy_m = read_vector("field_proxy_m", m.field_proxy_m) if m.HasField("field_proxy_m") else ZERO
     return DeviceState(
         m.tick,
         sampled_ns,
@@ -197,6 +212,7 @@ def read_device_state(m: pb.DeviceState) -> DeviceState:
         gripper_force_applied_n,
         hand_force_n,
         Joints(joint_rad, read_padded(joint_velocity_radps, len(joint_rad))) if joint_rad else None,
+        FieldState(m.field, field_depth_m, field_proxy_m) if m.field else None,
     )
 
 
@@ -237,6 +253,10 @@ def write_device_state(m: pb.DeviceState, value: DeviceState) -> None:
     if value.joints is not None:
         m.joint_rad.extend(value.joints.angles)
         m.joint_velocity_radps.extend(value.joints.velocities)
+    if value.field is not None:
+        m.field = value.field.generation
+        m.field_depth_m = value.field.depth
+        write_vector(m.field_proxy_m, value.field.proxy)
 
 
 def read_force_table(m: pb.ForceTable) -> ForceTable:
@@ -343,6 +363,7 @@ def read_force_command(m: pb.ForceCommand) -> ForceCommand:
         None if torque_nm is None and rotation_model is None else Torque(torque_nm or ZERO, rotation_model),
         gripper_force_n,
         way,
+        m.field,
     )
 
 
@@ -371,6 +392,179 @@ def write_force_command(m: pb.ForceCommand, value: ForceCommand) -> None:
         m.gripper_force_n = value.grip_force
     if value.way:
         m.way = value.way
+    if value.field:
+        m.field = value.field
+
+
+def read_offer_field(m: pb.OfferField) -> OfferField:
+    field = m.field
+    if not len(field) == 32:
+        raise OutOfBounds("field")
+    size = m.size
+    if not 1 <= size <= 65_535:
+        raise OutOfBounds("size")
+    offset = m.offset
+    if offset > 65_535:
+        raise OutOfBounds("offset")
+    part = m.part
+    if not 1 <= len(part) <= 1000:
+        raise OutOfBounds("part")
+    return OfferField(field, size, offset, part)
+
+
+def write_offer_field(m: pb.OfferField, value: OfferField) -> None:
+    m.field = value.field[:32]
+    m.size = value.size
+    m.offset = value.offset
+    m.part = value.part[:1000]
+
+
+def read_field_material(m: pb.FieldMaterial) -> FieldMaterial:
+    stiffness_npm = m.stiffness_npm
+    if not 0 < stiffness_npm <= 1e12:
+        raise OutOfBounds("stiffness_npm")
+    branch_stiffness_npm = m.branch_stiffness_npm
+    if not 0 <= branch_stiffness_npm <= 1e12:
+        raise OutOfBounds("branch_stiffness_npm")
+    relaxation_s = m.relaxation_s
+    if not (0.01 <= relaxation_s <= 10 or relaxation_s == 0):
+        raise OutOfBounds("relaxation_s")
+    friction = m.friction
+    if not 0 <= friction <= 2:
+        raise OutOfBounds("friction")
+    return FieldMaterial(stiffness_npm, branch_stiffness_npm, relaxation_s, friction)
+
+
+def write_field_material(m: pb.FieldMaterial, value: FieldMaterial) -> None:
+    m.stiffness_npm = value.stiffness
+    m.branch_stiffness_npm = value.branch_stiffness
+    m.relaxation_s = value.relaxation
+    m.friction = value.friction
+
+
+def read_field_fixture(m: pb.FieldFixture) -> FieldFixture:
+    kind = _FIELD_FIXTURE_KIND.get(m.kind)
+    if kind is None:
+        raise OutOfBounds("kind")
+    at_m = read_vector("at_m", m.at_m)
+    normal = read_normal("normal", m.normal)
+    stiffness_npm = m.stiffness_npm
+    if not 0 < stiffness_npm <= 1e12:
+        raise OutOfBounds("stiffness_npm")
+    most_force_n = m.most_force_n if m.HasField("most_force_n") else None
+    if most_force_n is not None and not 0 < most_force_n <= 1e12:
+        raise OutOfBounds("most_force_n")
+    return FieldFixture(kind, at_m, normal, stiffness_npm, most_force_n)
+
+
+def write_field_fixture(m: pb.FieldFixture, value: FieldFixture) -> None:
+    m.kind = value.kind  # type: ignore[assignment]
+    write_vector(m.at_m, value.at)
+    write_vector(m.normal, value.normal)
+    m.stiffness_npm = value.stiffness
+    if value.most_force is not None:
+        m.most_force_n = value.most_force
+
+
+def read_use_field(m: pb.UseField) -> UseField:
+    device = m.device
+    if device > 15:
+        raise OutOfBounds("device")
+    channel = m.channel
+    if channel > 7:
+        raise OutOfBounds("channel")
+    generation = m.generation
+    if generation < 1:
+        raise OutOfBounds("generation")
+    field = m.field
+    if not len(field) == 32:
+        raise OutOfBounds("field")
+    materials = read_each("materials", m.materials, 1, 16, read_field_material)
+    fixtures = read_each("fixtures", m.fixtures, 0, 4, read_field_fixture)
+    return UseField(device, channel, generation, field, materials, fixtures)
+
+
+def write_use_field(m: pb.UseField, value: UseField) -> None:
+    m.device = value.device
+    m.channel = value.channel
+    m.generation = value.generation
+    m.field = value.field[:32]
+    for entry in value.materials[:16]:
+        write_field_material(m.materials.add(), entry)
+    for entry in value.fixtures[:4]:
+        write_field_fixture(m.fixtures.add(), entry)
+
+
+def read_drop_field(m: pb.DropField) -> DropField:
+    field = m.field
+    if not len(field) == 32:
+        raise OutOfBounds("field")
+    return DropField(field)
+
+
+def write_drop_field(m: pb.DropField, value: DropField) -> None:
+    m.field = value.field[:32]
+
+
+def read_field_brick(m: pb.FieldBrick) -> FieldBrick:
+    hash = m.hash
+    if not len(hash) == 16:
+        raise OutOfBounds("hash")
+    weights = m.weights
+    if not len(weights) == 1024:
+        raise OutOfBounds("weights")
+    return FieldBrick(hash, weights)
+
+
+def write_field_brick(m: pb.FieldBrick, value: FieldBrick) -> None:
+    m.hash = value.hash[:16]
+    m.weights = value.weights[:1024]
+
+
+def read_field_status(m: pb.FieldStatus) -> FieldStatus:
+    field = m.field
+    if not len(field) == 32:
+        raise OutOfBounds("field")
+    missing = m.missing
+    if len(missing) > 128:
+        raise OutOfBounds("missing")
+    return FieldStatus(field, missing)
+
+
+def write_field_status(m: pb.FieldStatus, value: FieldStatus) -> None:
+    m.field = value.field[:32]
+    m.missing = value.missing[:128]
+
+
+def read_field_pose(m: pb.FieldPose) -> FieldPose:
+    device = m.device
+    if device > 15:
+        raise OutOfBounds("device")
+    channel = m.channel
+    if channel > 7:
+        raise OutOfBounds("channel")
+    sequence = m.sequence
+    if sequence < 1:
+        raise OutOfBounds("sequence")
+    time_ns = m.time_ns
+    if not -(2**60) <= time_ns <= 2**60:
+        raise OutOfBounds("time_ns")
+    position_m = read_vector("position_m", m.position_m)
+    orientation = read_rotation("orientation", m.orientation)
+    velocity_mps = read_vector("velocity_mps", m.velocity_mps)
+    angular_velocity_radps = read_vector("angular_velocity_radps", m.angular_velocity_radps)
+    return FieldPose(device, channel, sequence, time_ns, position_m, orientation, velocity_mps, angular_velocity_radps)
+
+
+def write_field_pose(m: pb.FieldPose, value: FieldPose) -> None:
+    m.device = value.device
+    m.channel = value.channel
+    m.sequence = value.sequence
+    m.time_ns = value.time_ns
+    write_vector(m.position_m, value.position)
+    write_rotation(m.orientation, value.orientation)
+    write_vector(m.velocity_mps, value.velocity)
+    write_vector(m.angular_velocity_radps, value.angular_velocity)
 
 
 def read_set_state_rate(m: pb.SetStateRate) -> SetStateRate:
@@ -1491,6 +1685,12 @@ def read_frame(m: pb.Frame) -> PlainFrame | None:
         return read_peer_report(m.peer_report)
     if case == "port_state":
         return read_port_state(m.port_state)
+    if case == "field_brick":
+        return read_field_brick(m.field_brick)
+    if case == "field_status":
+        return read_field_status(m.field_status)
+    if case == "field_pose":
+        return read_field_pose(m.field_pose)
     return None
 
 
@@ -1519,6 +1719,15 @@ def write_frame(m: pb.Frame, value: PlainFrame) -> None:
     elif isinstance(value, PortState):
         m.port_state.SetInParent()
         write_port_state(m.port_state, value)
+    elif isinstance(value, FieldBrick):
+        m.field_brick.SetInParent()
+        write_field_brick(m.field_brick, value)
+    elif isinstance(value, FieldStatus):
+        m.field_status.SetInParent()
+        write_field_status(m.field_status, value)
+    elif isinstance(value, FieldPose):
+        m.field_pose.SetInParent()
+        write_field_pose(m.field_pose, value)
 
 
 def read_request(m: pb.Control) -> Request | None:
@@ -1552,6 +1761,12 @@ def read_request(m: pb.Control) -> Request | None:
         return read_set_scale(m.set_scale)
     if case == "set_share":
         return read_set_share(m.set_share)
+    if case == "offer_field":
+        return read_offer_field(m.offer_field)
+    if case == "use_field":
+        return read_use_field(m.use_field)
+    if case == "drop_field":
+        return read_drop_field(m.drop_field)
     return None
 
 
@@ -1598,6 +1813,15 @@ def write_request(m: pb.Control, value: Request) -> None:
     elif isinstance(value, SetShare):
         m.set_share.SetInParent()
         write_set_share(m.set_share, value)
+    elif isinstance(value, OfferField):
+        m.offer_field.SetInParent()
+        write_offer_field(m.offer_field, value)
+    elif isinstance(value, UseField):
+        m.use_field.SetInParent()
+        write_use_field(m.use_field, value)
+    elif isinstance(value, DropField):
+        m.drop_field.SetInParent()
+        write_drop_field(m.drop_field, value)
 
 
 def read_answer(m: pb.Answer) -> Answer | None:

@@ -34,8 +34,14 @@ import type {
   DeviceState,
   Disarm,
   Disengage,
+  DropField,
   Echo,
   Engage,
+  FieldBrick,
+  FieldFixture,
+  FieldMaterial,
+  FieldPose,
+  FieldStatus,
   ForceCommand,
   ForceTable,
   GiveLease,
@@ -45,6 +51,7 @@ import type {
   LeaseLost,
   LinkReport,
   LocalModel,
+  OfferField,
   OutputDescription,
   PeerReport,
   PlainFrame,
@@ -63,6 +70,7 @@ import type {
   SetStateRate,
   StateDeadband,
   TakeLease,
+  UseField,
   Vibration,
   Welcome,
 } from "./messages.js";
@@ -117,6 +125,8 @@ export function refusedDeviceState(m: pb.DeviceState): string | undefined {
   if (!areNumbers(m.jointRad, 0, 8, -1e12, 1e12)) return "joint_rad";
   if (!areNumbers(m.jointVelocityRadps, 0, 8, -1e12, 1e12)) return "joint_velocity_radps";
   if (m.stiffnessWantedNpm.length > 0 && !isStiffness(m.stiffnessWantedNpm)) return "stiffness_wanted_npm";
+  if (!isWithin(m.fieldDepthM, 0, 1e12)) return "field_depth_m";
+  if (m.fieldProxyM && !isVec3(m.fieldProxyM)) return "field_proxy_m";
   return undefined;
 }
 
@@ -147,6 +157,7 @@ export const readDeviceState = (m: pb.DeviceState): DeviceState => ({
   ...(m.jointRad.length > 0 && {
     joints: { angles: m.jointRad, velocities: padded(m.jointVelocityRadps, m.jointRad.length) },
   }),
+  ...(m.field !== 0 && { field: { generation: m.field, depth: m.fieldDepthM, proxy: readVec3(m.fieldProxyM) } }),
 });
 
 export const writeDeviceState = (value: DeviceState): pb.DeviceState =>
@@ -176,6 +187,11 @@ export const writeDeviceState = (value: DeviceState): pb.DeviceState =>
     ...(value.gripApplied !== undefined && { gripperForceAppliedN: value.gripApplied }),
     ...(value.handForce && { handForceN: writeVec3(value.handForce) }),
     ...(value.joints && { jointRad: [...value.joints.angles], jointVelocityRadps: [...value.joints.velocities] }),
+    ...(value.field && {
+      field: value.field.generation,
+      fieldDepthM: value.field.depth,
+      fieldProxyM: writeVec3(value.field.proxy),
+    }),
   });
 
 /** Returns the name of the first field that is out of bounds. */
@@ -211,6 +227,7 @@ export const readForceCommand = (m: pb.ForceCommand): ForceCommand => ({
   }),
   ...(m.gripperForceN !== undefined && { gripForce: m.gripperForceN }),
   ...(m.way !== 0 && { way: m.way }),
+  ...(m.field !== 0 && { field: m.field }),
 });
 
 export const writeForceCommand = (value: ForceCommand): pb.ForceCommand =>
@@ -230,6 +247,7 @@ export const writeForceCommand = (value: ForceCommand): pb.ForceCommand =>
     }),
     ...(value.gripForce !== undefined && { gripperForceN: value.gripForce }),
     way: value.way ?? 0,
+    field: value.field ?? 0,
   });
 
 /** Returns the name of the first field that is out of bounds. */
@@ -312,6 +330,182 @@ export const readForceTable = (m: pb.ForceTable): ForceTable => ({
 
 export const writeForceTable = (value: ForceTable): pb.ForceTable =>
   create(pb.ForceTableSchema, { firstDepthM: value.first, stepM: value.step, forceN: [...value.force] });
+
+/** Returns the name of the first field that is out of bounds. */
+export function refusedOfferField(m: pb.OfferField): string | undefined {
+  if (m.field.length !== 32) return "field";
+  if (!isWhole(m.size, 1, 65_535)) return "size";
+  if (!isWhole(m.offset, 0, 65_535)) return "offset";
+  if (m.part.length < 1 || m.part.length > 1000) return "part";
+  return undefined;
+}
+
+export const readOfferField = (m: pb.OfferField): OfferField => ({
+  field: m.field,
+  size: m.size,
+  offset: m.offset,
+  part: m.part,
+});
+
+export const writeOfferField = (value: OfferField): pb.OfferField =>
+  create(pb.OfferFieldSchema, {
+    field: value.field.subarray(0, 32),
+    size: value.size,
+    offset: value.offset,
+    part: value.part.subarray(0, 1000),
+  });
+
+/** Returns the name of the first field that is out of bounds. */
+export function refusedUseField(m: pb.UseField): string | undefined {
+  if (!isWhole(m.device, 0, 15)) return "device";
+  if (!isWhole(m.channel, 0, 7)) return "channel";
+  if (m.generation < 1) return "generation";
+  if (m.field.length !== 32) return "field";
+  if (!areMessages(m.materials, 1, 16, refusedFieldMaterial)) return "materials";
+  if (!areMessages(m.fixtures, 0, 4, refusedFieldFixture)) return "fixtures";
+  return undefined;
+}
+
+export const readUseField = (m: pb.UseField): UseField => ({
+  device: m.device,
+  channel: m.channel,
+  generation: m.generation,
+  field: m.field,
+  materials: m.materials.map(readFieldMaterial),
+  ...(m.fixtures.length > 0 && { fixtures: m.fixtures.map(readFieldFixture) }),
+});
+
+export const writeUseField = (value: UseField): pb.UseField =>
+  create(pb.UseFieldSchema, {
+    device: value.device,
+    channel: value.channel,
+    generation: value.generation,
+    field: value.field.subarray(0, 32),
+    materials: value.materials.slice(0, 16).map(writeFieldMaterial),
+    fixtures: (value.fixtures ?? []).slice(0, 4).map(writeFieldFixture),
+  });
+
+/** Returns the name of the first field that is out of bounds. */
+export function refusedDropField(m: pb.DropField): string | undefined {
+  if (m.field.length !== 32) return "field";
+  return undefined;
+}
+
+export const readDropField = (m: pb.DropField): DropField => ({ field: m.field });
+
+export const writeDropField = (value: DropField): pb.DropField =>
+  create(pb.DropFieldSchema, { field: value.field.subarray(0, 32) });
+
+/** Returns the name of the first field that is out of bounds. */
+export function refusedFieldMaterial(m: pb.FieldMaterial): string | undefined {
+  if (!(m.stiffnessNpm > 0 && m.stiffnessNpm <= 1e12)) return "stiffness_npm";
+  if (!isWithin(m.branchStiffnessNpm, 0, 1e12)) return "branch_stiffness_npm";
+  if (m.relaxationS !== 0 && !isWithin(m.relaxationS, 0.01, 10)) return "relaxation_s";
+  if (!isWithin(m.friction, 0, 2)) return "friction";
+  return undefined;
+}
+
+export const readFieldMaterial = (m: pb.FieldMaterial): FieldMaterial => ({
+  stiffness: m.stiffnessNpm,
+  ...(m.branchStiffnessNpm !== 0 && { branchStiffness: m.branchStiffnessNpm }),
+  ...(m.relaxationS !== 0 && { relaxation: m.relaxationS }),
+  ...(m.friction !== 0 && { friction: m.friction }),
+});
+
+export const writeFieldMaterial = (value: FieldMaterial): pb.FieldMaterial =>
+  create(pb.FieldMaterialSchema, {
+    stiffnessNpm: value.stiffness,
+    branchStiffnessNpm: value.branchStiffness ?? 0,
+    relaxationS: value.relaxation ?? 0,
+    friction: value.friction ?? 0,
+  });
+
+/** Returns the name of the first field that is out of bounds. */
+export function refusedFieldFixture(m: pb.FieldFixture): string | undefined {
+  if (!isEnum(m.kind, pb.FieldFixtureKindSchema)) return "kind";
+  if (m.atM && !isVec3(m.atM)) return "at_m";
+  if (!isNormal(m.normal)) return "normal";
+  if (!(m.stiffnessNpm > 0 && m.stiffnessNpm <= 1e12)) return "stiffness_npm";
+  if (m.mostForceN !== undefined && !(m.mostForceN > 0 && m.mostForceN <= 1e12)) return "most_force_n";
+  return undefined;
+}
+
+export const readFieldFixture = (m: pb.FieldFixture): FieldFixture => ({
+  kind: m.kind,
+  at: readVec3(m.atM),
+  normal: readVec3(m.normal),
+  stiffness: m.stiffnessNpm,
+  ...(m.mostForceN !== undefined && { mostForce: m.mostForceN }),
+});
+
+export const writeFieldFixture = (value: FieldFixture): pb.FieldFixture =>
+  create(pb.FieldFixtureSchema, {
+    kind: value.kind,
+    atM: writeVec3(value.at),
+    normal: writeVec3(value.normal),
+    stiffnessNpm: value.stiffness,
+    ...(value.mostForce !== undefined && { mostForceN: value.mostForce }),
+  });
+
+/** Returns the name of the first field that is out of bounds. */
+export function refusedFieldBrick(m: pb.FieldBrick): string | undefined {
+  if (m.hash.length !== 16) return "hash";
+  if (m.weights.length !== 1024) return "weights";
+  return undefined;
+}
+
+export const readFieldBrick = (m: pb.FieldBrick): FieldBrick => ({ hash: m.hash, weights: m.weights });
+
+export const writeFieldBrick = (value: FieldBrick): pb.FieldBrick =>
+  create(pb.FieldBrickSchema, { hash: value.hash.subarray(0, 16), weights: value.weights.subarray(0, 1024) });
+
+/** Returns the name of the first field that is out of bounds. */
+export function refusedFieldStatus(m: pb.FieldStatus): string | undefined {
+  if (m.field.length !== 32) return "field";
+  if (m.missing.length > 128) return "missing";
+  return undefined;
+}
+
+export const readFieldStatus = (m: pb.FieldStatus): FieldStatus => ({ field: m.field, missing: m.missing });
+
+export const writeFieldStatus = (value: FieldStatus): pb.FieldStatus =>
+  create(pb.FieldStatusSchema, { field: value.field.subarray(0, 32), missing: value.missing.subarray(0, 128) });
+
+/** Returns the name of the first field that is out of bounds. */
+export function refusedFieldPose(m: pb.FieldPose): string | undefined {
+  if (!isWhole(m.device, 0, 15)) return "device";
+  if (!isWhole(m.channel, 0, 7)) return "channel";
+  if (m.sequence < 1n) return "sequence";
+  if (m.timeNs < -kMaxTime || m.timeNs > kMaxTime) return "time_ns";
+  if (m.positionM && !isVec3(m.positionM)) return "position_m";
+  if (!m.orientation || !isRotation(m.orientation)) return "orientation";
+  if (m.velocityMps && !isVec3(m.velocityMps)) return "velocity_mps";
+  if (m.angularVelocityRadps && !isVec3(m.angularVelocityRadps)) return "angular_velocity_radps";
+  return undefined;
+}
+
+export const readFieldPose = (m: pb.FieldPose): FieldPose => ({
+  device: m.device,
+  channel: m.channel,
+  sequence: m.sequence,
+  timeNs: m.timeNs,
+  position: readVec3(m.positionM),
+  orientation: readQuat(m.orientation),
+  ...(m.velocityMps && { velocity: readVec3(m.velocityMps) }),
+  ...(m.angularVelocityRadps && { angularVelocity: readVec3(m.angularVelocityRadps) }),
+});
+
+export const writeFieldPose = (value: FieldPose): pb.FieldPose =>
+  create(pb.FieldPoseSchema, {
+    device: value.device,
+    channel: value.channel,
+    sequence: value.sequence,
+    timeNs: value.timeNs,
+    positionM: writeVec3(value.position),
+    orientation: writeQuat(value.orientation),
+    velocityMps: writeVec3(value.velocity),
+    angularVelocityRadps: writeVec3(value.angularVelocity),
+  });
 
 /** Returns the name of the first field that is out of bounds. */
 export function refusedSetStateRate(m: pb.SetStateRate): string | undefined {
@@ -1276,6 +1470,15 @@ export function readFrame(body: pb.Frame["body"]): PlainFrame | undefined {
     case "portState":
       if (refusedPortState(body.value) !== undefined) return undefined;
       return { kind: "port", value: readPortState(body.value) };
+    case "fieldBrick":
+      if (refusedFieldBrick(body.value) !== undefined) return undefined;
+      return { kind: "fieldBrick", value: readFieldBrick(body.value) };
+    case "fieldStatus":
+      if (refusedFieldStatus(body.value) !== undefined) return undefined;
+      return { kind: "fieldStatus", value: readFieldStatus(body.value) };
+    case "fieldPose":
+      if (refusedFieldPose(body.value) !== undefined) return undefined;
+      return { kind: "fieldPose", value: readFieldPose(body.value) };
     default:
       return undefined;
   }
@@ -1299,6 +1502,12 @@ export function writeFrame(frame: PlainFrame): pb.Frame["body"] {
       return { case: "peerReport", value: writePeerReport(frame.value) };
     case "port":
       return { case: "portState", value: writePortState(frame.value) };
+    case "fieldBrick":
+      return { case: "fieldBrick", value: writeFieldBrick(frame.value) };
+    case "fieldStatus":
+      return { case: "fieldStatus", value: writeFieldStatus(frame.value) };
+    case "fieldPose":
+      return { case: "fieldPose", value: writeFieldPose(frame.value) };
   }
 }
 
@@ -1333,6 +1542,12 @@ export function readRequest(op: pb.Control["op"]): Request | string | undefined 
       return refusedSetScale(op.value) ?? { kind: op.case, ...readSetScale(op.value) };
     case "setShare":
       return refusedSetShare(op.value) ?? { kind: op.case, ...readSetShare(op.value) };
+    case "offerField":
+      return refusedOfferField(op.value) ?? { kind: op.case, ...readOfferField(op.value) };
+    case "useField":
+      return refusedUseField(op.value) ?? { kind: op.case, ...readUseField(op.value) };
+    case "dropField":
+      return refusedDropField(op.value) ?? { kind: op.case, ...readDropField(op.value) };
     default:
       return undefined;
   }
@@ -1368,5 +1583,11 @@ export function writeRequest(request: Request): pb.Control["op"] {
       return { case: request.kind, value: writeSetScale(request) };
     case "setShare":
       return { case: request.kind, value: writeSetShare(request) };
+    case "offerField":
+      return { case: request.kind, value: writeOfferField(request) };
+    case "useField":
+      return { case: request.kind, value: writeUseField(request) };
+    case "dropField":
+      return { case: request.kind, value: writeDropField(request) };
   }
 }

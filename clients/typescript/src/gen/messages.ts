@@ -1,11 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
 // Generated from protocol/wire/tendon.proto by protocol/generate. Do not edit.
 // The messages of tendon.proto as plain values.
-import { ChannelRule, Code, CouplingMethod, Hand, Mode, PortPhase, PortRole, Role, Safety } from "./tendon_pb.js";
+import {
+  ChannelRule,
+  Code,
+  CouplingMethod,
+  FieldFixtureKind,
+  Hand,
+  Mode,
+  PortPhase,
+  PortRole,
+  Role,
+  Safety,
+} from "./tendon_pb.js";
 import type { Quat, Stiffness, Vec3 } from "../messages.js";
 import type { Nanoseconds } from "../time.js";
 
-export { ChannelRule, Code, CouplingMethod, Hand, Mode, PortPhase, PortRole, Role, Safety };
+export { ChannelRule, Code, CouplingMethod, FieldFixtureKind, Hand, Mode, PortPhase, PortRole, Role, Safety };
 
 /** The kind of an output. */
 export enum OutputKind {
@@ -57,6 +68,19 @@ export interface Joints {
   readonly angles: readonly number[];
   /** rad/s. The velocities of these joints. Missing entries are 0, and entries without an angle are ignored */
   readonly velocities: readonly number[];
+}
+
+/** The field that is rendered. */
+export interface FieldState {
+  /**
+   * The generation of the rendered field (UseField.generation). If several channels use fields, this is the first one
+   * with contact, or else the first one.
+   */
+  readonly generation: number;
+  /** m, the distance from the proxy to the hand, or 0 if there is no contact */
+  readonly depth: number;
+  /** m, the position of the proxy, which is ignored if there is no field */
+  readonly proxy: Vec3;
 }
 
 /** The state of a device at one haptic step. Server → client, unreliable; for each device the highest tick wins. */
@@ -119,6 +143,8 @@ export interface DeviceState {
   readonly handForce?: Vec3 | undefined;
   /** Absent if the device does not report joints */
   readonly joints?: Joints | undefined;
+  /** Absent if no field is rendered */
+  readonly field?: FieldState | undefined;
 }
 
 /** On the hand, base frame axes, about the handle's position. */
@@ -163,6 +189,12 @@ export interface ForceCommand {
    * unknown. Servers treat an index that is larger than the number of ways as 0
    */
   readonly way?: number | undefined;
+  // With the feature "fields" only:
+  /**
+   * If it is not 0, force is not rendered. It is the true force at the state `basedOnTick`, from which the server
+   * learns the error of the field with this generation (UseField.generation). The model is ignored
+   */
+  readonly field?: number | undefined;
 }
 
 /**
@@ -217,6 +249,108 @@ export interface ForceTable {
   readonly step: number;
   /** N, the forces along +normal */
   readonly force: readonly number[];
+}
+
+/** A part of the manifest of a field, which lists its bricks and primitives. Parts are sent in order. */
+export interface OfferField {
+  /** The BLAKE2b-256 of the manifest, which is the name of the field */
+  readonly field: Uint8Array;
+  /** The size of the whole manifest in bytes */
+  readonly size: number;
+  /** The place of the first byte of `part` in the manifest */
+  readonly offset: number;
+  readonly part: Uint8Array;
+}
+
+/**
+ * Renders a field in a channel from now on, instead of the field that the channel has used. The server must have the
+ * whole field (FieldStatus), and the client must hold the lease of the channel, as for a ForceCommand.
+ */
+export interface UseField {
+  readonly device: number;
+  readonly channel: number;
+  /** Increases with each UseField of a session, device and channel */
+  readonly generation: number;
+  /** The name of the field */
+  readonly field: Uint8Array;
+  /** The materials that the manifest refers to, from number 0 */
+  readonly materials: readonly FieldMaterial[];
+  readonly fixtures?: readonly FieldFixture[] | undefined;
+}
+
+/** Forgets a field. A channel that uses it stops. Its bricks stay in the cache of the server. */
+export interface DropField {
+  /** The name of the field */
+  readonly field: Uint8Array;
+}
+
+/** A spring, beside a spring in series with a damper, with Coulomb friction (core/field/material.h). */
+export interface FieldMaterial {
+  /** N/m */
+  readonly stiffness: number;
+  /** N/m, of the spring in series with the damper, or 0 if there is none */
+  readonly branchStiffness?: number | undefined;
+  /** S, the time constant of the damper; ignored without this spring */
+  readonly relaxation?: number | undefined;
+  /** The coefficient of friction */
+  readonly friction?: number | undefined;
+}
+
+/**
+ * A spring from the hand to the nearest position on a point, a line or a plane, in the frame of the object
+ * (core/field/fixture.h).
+ */
+export interface FieldFixture {
+  readonly kind: FieldFixtureKind;
+  /** m, the point, or a point of the line or plane */
+  readonly at: Vec3;
+  /** The direction of the line, or the normal of the plane; any for a point */
+  readonly normal: Vec3;
+  /** N/m */
+  readonly stiffness: number;
+  /** N, the largest force. Absent if the force is not limited */
+  readonly mostForce?: number | undefined;
+}
+
+/** The weights of a brick (core/field/brick_field.h). Client → server, unreliable. */
+export interface FieldBrick {
+  /** The BLAKE2b-128 of the weights */
+  readonly hash: Uint8Array;
+  /** 8³ int16, little-endian, x fastest */
+  readonly weights: Uint8Array;
+}
+
+/**
+ * What a server still needs of a field. Bit i % 8 of byte i / 8 is set if brick i of the manifest is missing. The last
+ * of the 1024 bits is set if the manifest is not complete; the bits of unknown bricks are then 0. Absent bytes are 0.
+ * Server → client, unreliable; for each field the newest one wins.
+ */
+export interface FieldStatus {
+  /** The name of the field */
+  readonly field: Uint8Array;
+  readonly missing: Uint8Array;
+}
+
+/**
+ * The pose of the object of a channel, in the base frame of the device. It should be the pose that the engine expects
+ * for the time of its arrival. The server extrapolates it with its velocities for at most 50 ms. Client → server,
+ * unreliable; for each device and channel the highest sequence wins.
+ */
+export interface FieldPose {
+  readonly device: number;
+  readonly channel: number;
+  /** 1, 2, 3 … per session, device and channel */
+  readonly sequence: bigint;
+  /** The time that the pose is for, on the clock of the SERVER, like DeviceState.sampledNs */
+  readonly timeNs: Nanoseconds;
+  /** m, of the origin of the object. A server only accepts positions within 10 m */
+  readonly position: Vec3;
+  /** The rotation from the frame of the object to the base frame */
+  readonly orientation: Quat;
+  /** m/s, of the origin of the object */
+  readonly velocity?: Vec3 | undefined;
+  /** rad/s, the angular velocity in the axes of the base frame */
+  readonly angularVelocity?: Vec3 | undefined;
 }
 
 /**
@@ -868,7 +1002,10 @@ export type Request =
   | ({ readonly kind: "engage" } & Engage)
   | ({ readonly kind: "disengage" } & Disengage)
   | ({ readonly kind: "setScale" } & SetScale)
-  | ({ readonly kind: "setShare" } & SetShare);
+  | ({ readonly kind: "setShare" } & SetShare)
+  | ({ readonly kind: "offerField" } & OfferField)
+  | ({ readonly kind: "useField" } & UseField)
+  | ({ readonly kind: "dropField" } & DropField);
 
 /** Every frame but Control. */
 export type PlainFrame =
@@ -879,4 +1016,7 @@ export type PlainFrame =
   | { readonly kind: "report"; readonly value: LinkReport }
   | { readonly kind: "deviceReport"; readonly value: DeviceReport }
   | { readonly kind: "peerReport"; readonly value: PeerReport }
-  | { readonly kind: "port"; readonly value: PortState };
+  | { readonly kind: "port"; readonly value: PortState }
+  | { readonly kind: "fieldBrick"; readonly value: FieldBrick }
+  | { readonly kind: "fieldStatus"; readonly value: FieldStatus }
+  | { readonly kind: "fieldPose"; readonly value: FieldPose };

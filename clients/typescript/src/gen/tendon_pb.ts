@@ -12,7 +12,7 @@ import type { Message } from "@bufbuild/protobuf";
  * Describes the file tendon.proto.
  */
 export const file_tendon: GenFile = /*@__PURE__*/
-  fileDesc("Cgx0ZW5kb24ucHJvdG8SCXRlbmRvbi52MSJfCghEYXRhZ3JhbRISCgp0eF90aW1lX25zGAEgASgQEh0KBGVjaG8YAiABKAsyDy50ZW5kb24udjEuRWNobxIgCgZmcmFtZXMYAyADKAsyEC50ZW5kb24udjEuRnJhbWUiZgoERWNobxIXCg9wZWVyX3R4X3RpbWVfbnMYASABKBASEgoKcnhfdGltZV9ucxgCIAEoEBIaChJwZWVyX3BhY2tldF9udW1iZXIYAyABKAQSFQoNcmVjZWl2ZWRfbWFzaxgEIAEoByK2AwoFRnJhbWUSJwoFc3RhdGUYASABKAsyFi50ZW5kb24udjEuRGV2aWNlU3RhdGVIABIoCgVmb3JjZRgCIAEoCzIXLnRlbmRvbi52MS5Gb3JjZUNvbW1hbmRIABIlCgdjb250cm9sGAMgASgLMhIudGVuZG9uLnYxLkNvbnRyb2xIABIsCgtjb250cm9sX2FjaxgEIAEoCzIVLnRlbmRvbi52MS5Db250cm9sQWNrSAASHQoDYnllGAUgASgLMg4udGVuZG9uLnYxLkJ5ZUgAEicKBnJlcG9ydBgGIAEoCzIVLnRlbmRvbi52MS5MaW5rUmVwb3J0SAASMAoNZGV2aWNlX3JlcG9ydBgHIAEoCzIXLnRlbmRvbi52MS5EZXZpY2VSZXBvcnRIABIsCgtwZWVyX3JlcG9ydBgIIAEoCzIVLnRlbmRvbi52MS5QZWVyUmVwb3J0SAASKgoKcG9ydF9zdGF0ZRgJIAEoCzIULnRlbmRvbi52MS5Qb3J0U3RhdGVIABIpCgZzdGF0ZXMYCiABKAsyFy50ZW5kb24udjEuRGV2aWNlU3RhdGVzSABCBgoEYm9keSInCgRWZWMzEgkKAXgYASABKAESCQoBeRgCIAEoARIJCgF6GAMgASgBIjIKBFF1YXQSCQoBdxgBIAEoARIJCgF4GAIgASgBEgkKAXkYAyABKAESCQoBehgEIAEoASK8BgoLRGV2aWNlU3RhdGUSDAoEdGljaxgBIAEoBBISCgpzYW1wbGVkX25zGAIgASgQEiMKCnBvc2l0aW9uX20YAyABKAsyDy50ZW5kb24udjEuVmVjMxIlCgx2ZWxvY2l0eV9tcHMYBCABKAsyDy50ZW5kb24udjEuVmVjMxIoCg9mb3JjZV9hcHBsaWVkX24YBSABKAsyDy50ZW5kb24udjEuVmVjMxIQCghlbmVyZ3lfahgGIAEoARIZChFwZXJtaXR0ZWRfZm9yY2VfbhgHIAEoARIPCgdyZWFzb25zGAggASgHEhYKDmZvcmNlX3NlcXVlbmNlGAkgASgEEhQKDGZvcmNlX2FnZV9ucxgKIAEoBBIdCgRtb2RlGAsgASgOMg8udGVuZG9uLnYxLk1vZGUSDgoGZGV2aWNlGAwgASgNEg8KB2NoYW5uZWwYDSABKA0SJwoOZm9yY2Vfd2FudGVkX24YDiABKAsyDy50ZW5kb24udjEuVmVjMxIkCgtvcmllbnRhdGlvbhgPIAEoCzIPLnRlbmRvbi52MS5RdWF0Ei8KFmFuZ3VsYXJfdmVsb2NpdHlfcmFkcHMYECABKAsyDy50ZW5kb24udjEuVmVjMxIPCgdidXR0b25zGBEgASgHEioKEXRvcnF1ZV9hcHBsaWVkX25tGBIgASgLMg8udGVuZG9uLnYxLlZlYzMSGAoLZ3JpcHBlcl9yYWQYEyABKAFIAIgBARIjChZncmlwcGVyX3ZlbG9jaXR5X3JhZHBzGBQgASgBSAGIAQESJAoXZ3JpcHBlcl9mb3JjZV9hcHBsaWVkX24YFSABKAFIAogBARIlCgxoYW5kX2ZvcmNlX24YFiABKAsyDy50ZW5kb24udjEuVmVjMxIVCglqb2ludF9yYWQYFyADKAFCAhABEiAKFGpvaW50X3ZlbG9jaXR5X3JhZHBzGBggAygBQgIQARIgChRzdGlmZm5lc3Nfd2FudGVkX25wbRgZIAMoAUICEAFCDgoMX2dyaXBwZXJfcmFkQhkKF19ncmlwcGVyX3ZlbG9jaXR5X3JhZHBzQhoKGF9ncmlwcGVyX2ZvcmNlX2FwcGxpZWRfbiLdAgoMRGV2aWNlU3RhdGVzEgwKBHRpY2sYASABKAQSEgoKc2FtcGxlZF9ucxgCIAEoEBIPCgdkZXZpY2VzGAMgASgNEhYKCnBvc2l0aW9uX20YBCADKAFCAhABEhgKDHZlbG9jaXR5X21wcxgFIAMoAkICEAESGwoPZm9yY2VfYXBwbGllZF9uGAYgAygCQgIQARIUCghlbmVyZ3lfahgHIAMoAkICEAESHQoRcGVybWl0dGVkX2ZvcmNlX24YCCADKAJCAhABEiEKBG1vZGUYCSADKA4yDy50ZW5kb24udjEuTW9kZUICEAESEwoHcmVhc29ucxgKIAMoDUICEAESGgoOZm9yY2Vfc2VxdWVuY2UYCyADKARCAhABEhgKDGZvcmNlX2FnZV9ucxgMIAMoBEICEAESEwoHY2hhbm5lbBgNIAMoDUICEAESEwoHYnV0dG9ucxgOIAMoDUICEAEihwMKDEZvcmNlQ29tbWFuZBIQCghzZXF1ZW5jZRgBIAEoBBIVCg1iYXNlZF9vbl90aWNrGAIgASgEEiAKB2ZvcmNlX24YAyABKAsyDy50ZW5kb24udjEuVmVjMxIkCgVtb2RlbBgEIAEoCzIVLnRlbmRvbi52MS5Mb2NhbE1vZGVsEhQKDHZhbGlkX2Zvcl91cxgFIAEoDRIOCgZkZXZpY2UYBiABKA0SDwoHY2hhbm5lbBgHIAEoDRIYChB0b3BvbG9neV9jaGFuZ2VkGAggASgIEhQKB2Vycm9yX24YCSABKAFIAIgBARIiCgl0b3JxdWVfbm0YCiABKAsyDy50ZW5kb24udjEuVmVjMxIcCg9ncmlwcGVyX2ZvcmNlX24YCyABKAFIAYgBARIwCg5yb3RhdGlvbl9tb2RlbBgOIAEoCzIYLnRlbmRvbi52MS5Sb3RhdGlvbk1vZGVsEgsKA3dheRgPIAEoDUIKCghfZXJyb3JfbkISChBfZ3JpcHBlcl9mb3JjZV9uIl4KDVJvdGF0aW9uTW9kZWwSJwoOYXRfb3JpZW50YXRpb24YASABKAsyDy50ZW5kb24udjEuUXVhdBIkChhhbmd1bGFyX3N0aWZmbmVzc19ubXByYWQYAiADKAFCAhABIpsBCgpMb2NhbE1vZGVsEh0KBGF0X20YASABKAsyDy50ZW5kb24udjEuVmVjMxIZCg1zdGlmZm5lc3NfbnBtGAIgAygBQgIQARIbCg52YWxpZF9yYWRpdXNfbRgDIAEoAUgAiAEBEiMKB2NvbnRhY3QYBCABKAsyEi50ZW5kb24udjEuQ29udGFjdEIRCg9fdmFsaWRfcmFkaXVzX20iXwoHQ29udGFjdBIfCgZub3JtYWwYASABKAsyDy50ZW5kb24udjEuVmVjMxINCgVnYXBfbRgCIAEoARIkCgV0YWJsZRgDIAEoCzIVLnRlbmRvbi52MS5Gb3JjZVRhYmxlIkgKCkZvcmNlVGFibGUSFQoNZmlyc3RfZGVwdGhfbRgBIAEoARIOCgZzdGVwX20YAiABKAESEwoHZm9yY2VfbhgDIAMoAUICEAEi8wQKB0NvbnRyb2wSCgoCaWQYASABKA0SMQoOc2V0X3N0YXRlX3JhdGUYAiABKAsyFy50ZW5kb24udjEuU2V0U3RhdGVSYXRlSAASIQoFcmVhcm0YAyABKAsyEC50ZW5kb24udjEuUmVhcm1IABInCghkZXNjcmliZRgEIAEoCzITLnRlbmRvbi52MS5EZXNjcmliZUgAEioKCnRha2VfbGVhc2UYBSABKAsyFC50ZW5kb24udjEuVGFrZUxlYXNlSAASKgoKZ2l2ZV9sZWFzZRgGIAEoCzIULnRlbmRvbi52MS5HaXZlTGVhc2VIABI5ChJzZXRfc3RhdGVfZGVhZGJhbmQYCCABKAsyGy50ZW5kb24udjEuU2V0U3RhdGVEZWFkYmFuZEgAEiMKBmRpc2FybRgJIAEoCzIRLnRlbmRvbi52MS5EaXNhcm1IABIqCgpzZXRfb3V0cHV0GAogASgLMhQudGVuZG9uLnYxLlNldE91dHB1dEgAEiMKBmNvdXBsZRgLIAEoCzIRLnRlbmRvbi52MS5Db3VwbGVIABIjCgZlbmdhZ2UYDCABKAsyES50ZW5kb24udjEuRW5nYWdlSAASKQoJZGlzZW5nYWdlGA0gASgLMhQudGVuZG9uLnYxLkRpc2VuZ2FnZUgAEigKCXNldF9zY2FsZRgOIAEoCzITLnRlbmRvbi52MS5TZXRTY2FsZUgAEigKCXNldF9zaGFyZRgPIAEoCzITLnRlbmRvbi52MS5TZXRTaGFyZUgAEioKCmxlYXNlX2xvc3QYByABKAsyFC50ZW5kb24udjEuTGVhc2VMb3N0SABCBAoCb3AiKgoMU2V0U3RhdGVSYXRlEgoKAmh6GAEgASgNEg4KBmRldmljZRgCIAEoDSJMChBTZXRTdGF0ZURlYWRiYW5kEg0KBXNoYXJlGAEgASgBEhEKCWZsb29yX21wcxgCIAEoARIWCg5tYXhfc2lsZW5jZV91cxgDIAEoDSIXCgVSZWFybRIOCgZkZXZpY2UYASABKA0iGAoGRGlzYXJtEg4KBmRldmljZRgBIAEoDSKfBAoGQ291cGxlEg4KBmRldmljZRgBIAEoDRIPCgdjaGFubmVsGAIgASgNEiEKBHJvbGUYAyABKA4yEy50ZW5kb24udjEuUG9ydFJvbGUSKQoGbWV0aG9kGAQgASgOMhkudGVuZG9uLnYxLkNvdXBsaW5nTWV0aG9kEhYKDnBvc2l0aW9uX3NjYWxlGAUgASgBEhMKC2ZvcmNlX3NjYWxlGAYgASgBEiEKCHJvdGF0aW9uGAcgASgLMg8udGVuZG9uLnYxLlF1YXQSDAoEYXhlcxgIIAEoDRIVCg1zdGlmZm5lc3NfbnBtGAkgASgBEhsKE211dHVhbF9kYW1waW5nX25zcG0YCiABKAESFAoMZGFtcGluZ19uc3BtGAsgASgBEhYKDmFkYXB0X3RvX2RlbGF5GAwgASgIEg0KBXB1cnNlGA0gASgIEhEKCXBlcmlvZF91cxgOIAEoDRIQCghhYnNvbHV0ZRgPIAEoCBIdChV0dXJuX3N0aWZmbmVzc19ubXByYWQYECABKAESHAoUdHVybl9kYW1waW5nX25tc3ByYWQYESABKAESGgoSZ3JpcF9zdGlmZm5lc3NfbnBtGBIgASgBEhkKEWdyaXBfZGFtcGluZ19uc3BtGBMgASgBEhgKEGRyaWZ0X3JhdGVfcGVyX3MYFCABKAESJAoEcmF0ZRgVIAEoCzIWLnRlbmRvbi52MS5SYXRlQ29udHJvbCJNCgtSYXRlQ29udHJvbBITCgtkZWFkX3pvbmVfbRgBIAEoARISCgpnYWluX3Blcl9zGAIgASgBEhUKDW1heF9zcGVlZF9tcHMYAyABKAEiGAoGRW5nYWdlEg4KBmRldmljZRgBIAEoDSIbCglEaXNlbmdhZ2USDgoGZGV2aWNlGAEgASgNIkcKCFNldFNjYWxlEg4KBmRldmljZRgBIAEoDRIWCg5wb3NpdGlvbl9zY2FsZRgCIAEoARITCgtmb3JjZV9zY2FsZRgDIAEoASI6CghTZXRTaGFyZRIOCgZkZXZpY2UYASABKA0SDwoHY2hhbm5lbBgCIAEoDRINCgVzaGFyZRgDIAEoASJwCglTZXRPdXRwdXQSDgoGZGV2aWNlGAEgASgNEg4KBm91dHB1dBgCIAEoDRINCgNyZ2IYAyABKAdIABIpCgl2aWJyYXRpb24YBCABKAsyFC50ZW5kb24udjEuVmlicmF0aW9uSABCCQoHc2V0dGluZyJJCglWaWJyYXRpb24SEQoJYW1wbGl0dWRlGAEgASgBEhQKDGZyZXF1ZW5jeV9oehgCIAEoARITCgtkdXJhdGlvbl9tcxgDIAEoDSIqCghEZXNjcmliZRIOCgZkZXZpY2UYASABKA0SDgoGaGFuZGxlGAIgASgIIiwKCVRha2VMZWFzZRIOCgZkZXZpY2UYASABKA0SDwoHY2hhbm5lbBgCIAEoDSIsCglHaXZlTGVhc2USDgoGZGV2aWNlGAEgASgNEg8KB2NoYW5uZWwYAiABKA0iOAoJTGVhc2VMb3N0Eg4KBmRldmljZRgBIAEoDRIPCgdjaGFubmVsGAIgASgNEgoKAnRvGAMgASgJIrQBCgpDb250cm9sQWNrEgoKAmlkGAEgASgNEh0KBGNvZGUYAiABKA4yDy50ZW5kb24udjEuQ29kZRIOCgZkZXRhaWwYAyABKAkSDwoHd2FpdF9tcxgEIAEoDRIsCgZkZXZpY2UYBSABKAsyHC50ZW5kb24udjEuRGV2aWNlRGVzY3JpcHRpb24SLAoGaGFuZGxlGAYgASgLMhwudGVuZG9uLnYxLkhhbmRsZURlc2NyaXB0aW9uIuoCChFEZXZpY2VEZXNjcmlwdGlvbhIOCgZkZXZpY2UYASABKA0SDAoEbmFtZRgCIAEoCRINCgVtb2RlbBgDIAEoCRIUCgxwb3NpdGlvbl9kb2YYBCABKA0SEQoJZm9yY2VfZG9mGAUgASgNEigKD3dvcmtzcGFjZV9taW5fbRgGIAEoCzIPLnRlbmRvbi52MS5WZWMzEigKD3dvcmtzcGFjZV9tYXhfbRgHIAEoCzIPLnRlbmRvbi52MS5WZWMzEhMKC21heF9mb3JjZV9uGAggASgBEhoKEmNvbnRpbnVvdXNfZm9yY2VfbhgJIAEoARIZChFtYXhfc3RpZmZuZXNzX25wbRgKIAEoARIdChVwb3NpdGlvbl9yZXNvbHV0aW9uX20YCyABKAESDwoHbG9vcF9oehgMIAEoDRIvCghjaGFubmVscxgNIAMoCzIdLnRlbmRvbi52MS5DaGFubmVsRGVzY3JpcHRpb24i1gIKEUhhbmRsZURlc2NyaXB0aW9uEg4KBmRldmljZRgBIAEoDRItChRvcGVyYXRvcl9mcm9tX2RldmljZRgCIAEoCzIPLnRlbmRvbi52MS5RdWF0Eg8KB2J1dHRvbnMYAyADKAkSHAoUb3JpZW50YXRpb25fbWVhc3VyZWQYBCABKAgSFQoNbWF4X3RvcnF1ZV9ubRgFIAEoARIdChBncmlwcGVyX29wZW5fcmFkGAYgASgBSACIAQESGwoTbWF4X2dyaXBwZXJfZm9yY2VfbhgHIAEoARINCgVncm91cBgIIAEoCRIdCgRoYW5kGAkgASgOMg8udGVuZG9uLnYxLkhhbmQSDgoGam9pbnRzGAogAygJEi0KB291dHB1dHMYCyADKAsyHC50ZW5kb24udjEuT3V0cHV0RGVzY3JpcHRpb25CEwoRX2dyaXBwZXJfb3Blbl9yYWQiRgoRT3V0cHV0RGVzY3JpcHRpb24SDAoEbmFtZRgBIAEoCRIjCgRraW5kGAIgASgOMhUudGVuZG9uLnYxLk91dHB1dEtpbmQiagoSQ2hhbm5lbERlc2NyaXB0aW9uEgwKBG5hbWUYASABKAkSJAoEcnVsZRgCIAEoDjIWLnRlbmRvbi52MS5DaGFubmVsUnVsZRIQCghsZWFzZV9tcxgDIAEoDRIOCgZob2xkZXIYBCABKAkiNAoDQnllEh0KBGNvZGUYASABKA4yDy50ZW5kb24udjEuQ29kZRIOCgZyZWFzb24YAiABKAki3gQKCkxpbmtSZXBvcnQSDgoGbnVtYmVyGAEgASgEEhAKCHVudGlsX25zGAIgASgQEg8KB3NwYW5fbnMYAyABKAQSDgoGZm9yY2VzGAQgASgEEhMKC2xhdGVfc2VydmVyGAUgASgEEhQKDGxhdGVfbmV0d29yaxgGIAEoBBITCgtsYXRlX2VuZ2luZRgHIAEoBBIVCg13b3JzdF9sYXRlX25zGAggASgEEhYKDmxvbmdlc3RfZ2FwX25zGAkgASgEEiUKCnJvdW5kX3RyaXAYCiABKAsyES50ZW5kb24udjEuRGVsYXlzEiQKCXRvX3NlcnZlchgLIAEoCzIRLnRlbmRvbi52MS5EZWxheXMSJAoJdG9fY2xpZW50GAwgASgLMhEudGVuZG9uLnYxLkRlbGF5cxIXCg9jbG9ja19vZmZzZXRfbnMYDSABKBISFwoPY2xvY2tfZHJpZnRfcHBtGA4gASgBEhYKDmNsb2NrX2Vycm9yX25zGA8gASgEEhAKCHJlY2VpdmVkGBAgASgEEgwKBGxvc3QYESABKAQSEQoJcmVvcmRlcmVkGBIgASgEEhIKCmR1cGxpY2F0ZWQYEyABKAQSDQoFd29yZHMYFCABKAkSFAoMbGF0ZV91bmtub3duGBUgASgEEhoKEnJlZnVzZWRfbm90X2Zpbml0ZRgWIAEoBBIdChVyZWZ1c2VkX291dF9vZl9ib3VuZHMYFyABKAQSHAoUcmVmdXNlZF91bmtub3duX3RpY2sYGCABKAQSHAoUcmVmdXNlZF9vbGRfc2VxdWVuY2UYGSABKAQiKwoGRGVsYXlzEhEKCW1lZGlhbl9ucxgBIAEoEhIOCgZwOTlfbnMYAiABKBIi4wUKCVBvcnRTdGF0ZRIOCgZkZXZpY2UYASABKA0SDwoHY2hhbm5lbBgCIAEoDRINCgVlcG9jaBgDIAEoBBIQCghzZXF1ZW5jZRgEIAEoBBIVCg1hbnN3ZXJzX2Vwb2NoGAUgASgEEg8KB2Fuc3dlcnMYBiABKAQSDwoHdGltZV9ucxgHIAEoEBIVCg1yb3VuZF90cmlwX25zGAggASgEEiMKBXBoYXNlGAkgASgOMhQudGVuZG9uLnYxLlBvcnRQaGFzZRISCgplbmdhZ2VtZW50GAogASgEEg8KB2J1dHRvbnMYCyABKAcSIwoKcG9zaXRpb25fbRgMIAEoCzIPLnRlbmRvbi52MS5WZWMzEiUKDHZlbG9jaXR5X21wcxgNIAEoCzIPLnRlbmRvbi52MS5WZWMzEiAKB2ZvcmNlX24YDiABKAsyDy50ZW5kb24udjEuVmVjMxIoCg9jb250YWN0X2ZvcmNlX24YDyABKAsyDy50ZW5kb24udjEuVmVjMxIRCglhY2NvdW50X2oYECABKAESDgoGbmVlZF9qGBEgASgBEg8KB2dpdmVuX2oYEiABKAESDwoHdGFrZW5fahgTIAEoARImCg13YXZlX2ludGVncmFsGBQgASgLMg8udGVuZG9uLnYxLlZlYzMSFQoNd2F2ZV9lbmVyZ3lfahgVIAEoARInCgdzdXJmYWNlGBYgASgLMhYudGVuZG9uLnYxLlBvcnRTdXJmYWNlEiEKBHR1cm4YFyABKAsyEy50ZW5kb24udjEuUG9ydFR1cm4SIQoEZ3JpcBgYIAEoCzITLnRlbmRvbi52MS5Qb3J0R3JpcBITCgtlbmVyZ3lfaW5fahgZIAEoARISCgVzaGFyZRgaIAEoAUgAiAEBEhYKDnBvc2l0aW9uX3NjYWxlGBsgASgBEhMKC2ZvcmNlX3NjYWxlGBwgASgBEg8KB29mX3BlZXIYHSABKAhCCAoGX3NoYXJlIn4KCFBvcnRUdXJuEh0KBHR1cm4YASABKAsyDy50ZW5kb24udjEuUXVhdBIvChZhbmd1bGFyX3ZlbG9jaXR5X3JhZHBzGAIgASgLMg8udGVuZG9uLnYxLlZlYzMSIgoJdG9ycXVlX25tGAMgASgLMg8udGVuZG9uLnYxLlZlYzMiiQEKCFBvcnRHcmlwEhEKCW9wZW5pbmdfbRgBIAEoARIUCgx2ZWxvY2l0eV9tcHMYAiABKAESDwoHZm9yY2VfbhgDIAEoARIRCglhY2NvdW50X2oYBCABKAESDgoGbmVlZF9qGAUgASgBEg8KB2dpdmVuX2oYBiABKAESDwoHdGFrZW5fahgHIAEoASJXCgtQb3J0U3VyZmFjZRIfCgZub3JtYWwYASABKAsyDy50ZW5kb24udjEuVmVjMxIQCghvZmZzZXRfbRgCIAEoARIVCg1zdGlmZm5lc3NfbnBtGAMgASgBIvQBCgxEZXZpY2VSZXBvcnQSDgoGbnVtYmVyGAEgASgEEhAKCHVudGlsX25zGAIgASgQEg8KB3NwYW5fbnMYAyABKAQSDgoGZGV2aWNlGAQgASgNEg0KBXN0ZXBzGAUgASgEEg4KBm1pc3NlZBgGIAEoBBIQCghvdmVycnVucxgHIAEoBBIOCgZ1bnNlZW4YCCABKAQSHAoQbGF0ZW5lc3NfdXNfbG9nMhgJIAMoBEICEAESIQoGc2FmZXR5GAogASgOMhEudGVuZG9uLnYxLlNhZmV0eRINCgVmYXVsdBgLIAEoCRIQCghkZWdyYWRlZBgMIAEoCSK9AQoKUGVlclJlcG9ydBIOCgZkZXZpY2UYASABKA0SDwoHY2hhbm5lbBgCIAEoDRIMCgRuYW1lGAMgASgJEhQKDHN0YXRlX29uZV9pbhgEIAEoDRIWCg5mb3JjZXNfcmVmdXNlZBgFIAEoCBIjCgRsaW5rGAYgASgLMhUudGVuZG9uLnYxLkxpbmtSZXBvcnQSFAoHZXJyb3JfbhgHIAEoAUgAiAEBEgsKA3dheRgIIAEoCUIKCghfZXJyb3JfbiKgAQoFSGVsbG8SEwoLdmVyc2lvbl9taW4YASABKA0SEwoLdmVyc2lvbl9tYXgYAiABKA0SHQoEcm9sZRgDIAEoDjIPLnRlbmRvbi52MS5Sb2xlEgwKBG5hbWUYBCABKAkSEAoIZmVhdHVyZXMYBSADKAkSIAoGY2xhaW1zGAYgAygLMhAudGVuZG9uLnYxLkNsYWltEgwKBHdheXMYByADKAkiRwoFQ2xhaW0SDgoGZGV2aWNlGAEgASgJEg8KB2NoYW5uZWwYAiABKAkSHQoEcm9sZRgDIAEoDjIPLnRlbmRvbi52MS5Sb2xlIl4KBkFuc3dlchIlCgd3ZWxjb21lGAEgASgLMhIudGVuZG9uLnYxLldlbGNvbWVIABIlCgdyZWZ1c2VkGAIgASgLMhIudGVuZG9uLnYxLlJlZnVzZWRIAEIGCgRib2R5IusBCgdXZWxjb21lEg8KB3ZlcnNpb24YASABKA0SEAoIZmVhdHVyZXMYAiADKAkSHQoEcm9sZRgDIAEoDjIPLnRlbmRvbi52MS5Sb2xlEhMKC2RldmljZV9uYW1lGAQgASgJEhMKC21heF9mb3JjZV9uGAUgASgBEh0KFXBvc2l0aW9uX3Jlc29sdXRpb25fbRgGIAEoARIPCgdsb29wX2h6GAcgASgNEhIKCnRpbWVvdXRfbXMYCCABKA0SDgoGc2VydmVyGAkgASgJEiAKBmdyYW50cxgKIAMoCzIQLnRlbmRvbi52MS5HcmFudCJHCgVHcmFudBIOCgZkZXZpY2UYASABKA0SDwoHY2hhbm5lbBgCIAEoDRIdCgRyb2xlGAMgASgOMg8udGVuZG9uLnYxLlJvbGUiYgoHUmVmdXNlZBIdCgRjb2RlGAEgASgOMg8udGVuZG9uLnYxLkNvZGUSDgoGZGV0YWlsGAIgASgJEhMKC3ZlcnNpb25fbWluGAMgASgNEhMKC3ZlcnNpb25fbWF4GAQgASgNKoUBCgRNb2RlEhQKEE1PREVfVU5TUEVDSUZJRUQQABINCglNT0RFX0lETEUQARIPCgtNT0RFX0FDVElWRRACEhAKDE1PREVfSE9MRElORxADEhEKDU1PREVfREVDQVlJTkcQBBISCg5NT0RFX1NBRkVfU1RPUBAFEg4KCk1PREVfRkFVTFQQBipTCghQb3J0Um9sZRIZChVQT1JUX1JPTEVfVU5TUEVDSUZJRUQQABIUChBQT1JUX1JPTEVfTEVBREVSEAESFgoSUE9SVF9ST0xFX0ZPTExPV0VSEAIqjwIKDkNvdXBsaW5nTWV0aG9kEh8KG0NPVVBMSU5HX01FVEhPRF9VTlNQRUNJRklFRBAAEiUKIUNPVVBMSU5HX01FVEhPRF9QT1NJVElPTl9QT1NJVElPThABEiIKHkNPVVBMSU5HX01FVEhPRF9QT1NJVElPTl9GT1JDRRACEhkKFUNPVVBMSU5HX01FVEhPRF9XQVZFUxADEhsKF0NPVVBMSU5HX01FVEhPRF9TVVJGQUNFEAQSHQoZQ09VUExJTkdfTUVUSE9EX1BBU1NJVklUWRAFEiAKHENPVVBMSU5HX01FVEhPRF9TRVRfUE9TSVRJT04QBhIYChRDT1VQTElOR19NRVRIT0RfUkFURRAHKksKCk91dHB1dEtpbmQSFgoST1VUUFVUX1VOU1BFQ0lGSUVEEAASDwoLT1VUUFVUX0xBTVAQARIUChBPVVRQVVRfVklCUkFUSU9OEAIqMwoESGFuZBIMCghIQU5EX0FOWRAAEg0KCUhBTkRfTEVGVBABEg4KCkhBTkRfUklHSFQQAipcCgtDaGFubmVsUnVsZRIcChhDSEFOTkVMX1JVTEVfVU5TUEVDSUZJRUQQABIUChBDSEFOTkVMX1JVTEVfU1VNEAESGQoVQ0hBTk5FTF9SVUxFX1BSSU9SSVRZEAIqygEKCVBvcnRQaGFzZRIaChZQT1JUX1BIQVNFX1VOU1BFQ0lGSUVEEAASFAoQUE9SVF9QSEFTRV9BTE9ORRABEhYKElBPUlRfUEhBU0VfQ09VUExFRBACEhcKE1BPUlRfUEhBU0VfQUxJR05JTkcQAxIWChJQT1JUX1BIQVNFX0VOR0FHRUQQBBIXChNQT1JUX1BIQVNFX0NMVVRDSEVEEAUSEwoPUE9SVF9QSEFTRV9MT1NUEAYSFAoQUE9SVF9QSEFTRV9GQVVMVBAHKrwBCgZTYWZldHkSFgoSU0FGRVRZX1VOU1BFQ0lGSUVEEAASEQoNU0FGRVRZX0FCU0VOVBABEhIKDlNBRkVUWV9PUEVOSU5HEAISEwoPU0FGRVRZX0ZJUk1XQVJFEAMSEgoOU0FGRVRZX1VOSE9NRUQQBBIQCgxTQUZFVFlfSE9NRUQQBRIQCgxTQUZFVFlfQVJNRUQQBhIQCgxTQUZFVFlfRkFVTFQQBxIUChBTQUZFVFlfVU5HVUFSREVEEAgqvQEKBENvZGUSFAoQQ09ERV9VTlNQRUNJRklFRBAAEgsKB0NPREVfT0sQARIQCgxDT0RFX0lOVkFMSUQQAhIUChBDT0RFX1VOU1VQUE9SVEVEEAMSDQoJQ09ERV9CVVNZEAQSDwoLQ09ERV9ERU5JRUQQBRIRCg1DT0RFX1NIVVRET1dOEAYSEgoOQ09ERV9USU1FRF9PVVQQBxIQCgxDT0RFX0VYUElSRUQQCBIRCg1DT0RFX1JFUExBQ0VEEAkqRAoEUm9sZRIUChBST0xFX1VOU1BFQ0lGSUVEEAASEQoNUk9MRV9PQlNFUlZFUhABEhMKD1JPTEVfQ09OVFJPTExFUhACYgZwcm90bzM");
+  fileDesc("Cgx0ZW5kb24ucHJvdG8SCXRlbmRvbi52MSJfCghEYXRhZ3JhbRISCgp0eF90aW1lX25zGAEgASgQEh0KBGVjaG8YAiABKAsyDy50ZW5kb24udjEuRWNobxIgCgZmcmFtZXMYAyADKAsyEC50ZW5kb24udjEuRnJhbWUiZgoERWNobxIXCg9wZWVyX3R4X3RpbWVfbnMYASABKBASEgoKcnhfdGltZV9ucxgCIAEoEBIaChJwZWVyX3BhY2tldF9udW1iZXIYAyABKAQSFQoNcmVjZWl2ZWRfbWFzaxgEIAEoByLABAoFRnJhbWUSJwoFc3RhdGUYASABKAsyFi50ZW5kb24udjEuRGV2aWNlU3RhdGVIABIoCgVmb3JjZRgCIAEoCzIXLnRlbmRvbi52MS5Gb3JjZUNvbW1hbmRIABIlCgdjb250cm9sGAMgASgLMhIudGVuZG9uLnYxLkNvbnRyb2xIABIsCgtjb250cm9sX2FjaxgEIAEoCzIVLnRlbmRvbi52MS5Db250cm9sQWNrSAASHQoDYnllGAUgASgLMg4udGVuZG9uLnYxLkJ5ZUgAEicKBnJlcG9ydBgGIAEoCzIVLnRlbmRvbi52MS5MaW5rUmVwb3J0SAASMAoNZGV2aWNlX3JlcG9ydBgHIAEoCzIXLnRlbmRvbi52MS5EZXZpY2VSZXBvcnRIABIsCgtwZWVyX3JlcG9ydBgIIAEoCzIVLnRlbmRvbi52MS5QZWVyUmVwb3J0SAASKgoKcG9ydF9zdGF0ZRgJIAEoCzIULnRlbmRvbi52MS5Qb3J0U3RhdGVIABIpCgZzdGF0ZXMYCiABKAsyFy50ZW5kb24udjEuRGV2aWNlU3RhdGVzSAASLAoLZmllbGRfYnJpY2sYCyABKAsyFS50ZW5kb24udjEuRmllbGRCcmlja0gAEi4KDGZpZWxkX3N0YXR1cxgMIAEoCzIWLnRlbmRvbi52MS5GaWVsZFN0YXR1c0gAEioKCmZpZWxkX3Bvc2UYDSABKAsyFC50ZW5kb24udjEuRmllbGRQb3NlSABCBgoEYm9keSInCgRWZWMzEgkKAXgYASABKAESCQoBeRgCIAEoARIJCgF6GAMgASgBIjIKBFF1YXQSCQoBdxgBIAEoARIJCgF4GAIgASgBEgkKAXkYAyABKAESCQoBehgEIAEoASKKBwoLRGV2aWNlU3RhdGUSDAoEdGljaxgBIAEoBBISCgpzYW1wbGVkX25zGAIgASgQEiMKCnBvc2l0aW9uX20YAyABKAsyDy50ZW5kb24udjEuVmVjMxIlCgx2ZWxvY2l0eV9tcHMYBCABKAsyDy50ZW5kb24udjEuVmVjMxIoCg9mb3JjZV9hcHBsaWVkX24YBSABKAsyDy50ZW5kb24udjEuVmVjMxIQCghlbmVyZ3lfahgGIAEoARIZChFwZXJtaXR0ZWRfZm9yY2VfbhgHIAEoARIPCgdyZWFzb25zGAggASgHEhYKDmZvcmNlX3NlcXVlbmNlGAkgASgEEhQKDGZvcmNlX2FnZV9ucxgKIAEoBBIdCgRtb2RlGAsgASgOMg8udGVuZG9uLnYxLk1vZGUSDgoGZGV2aWNlGAwgASgNEg8KB2NoYW5uZWwYDSABKA0SJwoOZm9yY2Vfd2FudGVkX24YDiABKAsyDy50ZW5kb24udjEuVmVjMxIkCgtvcmllbnRhdGlvbhgPIAEoCzIPLnRlbmRvbi52MS5RdWF0Ei8KFmFuZ3VsYXJfdmVsb2NpdHlfcmFkcHMYECABKAsyDy50ZW5kb24udjEuVmVjMxIPCgdidXR0b25zGBEgASgHEioKEXRvcnF1ZV9hcHBsaWVkX25tGBIgASgLMg8udGVuZG9uLnYxLlZlYzMSGAoLZ3JpcHBlcl9yYWQYEyABKAFIAIgBARIjChZncmlwcGVyX3ZlbG9jaXR5X3JhZHBzGBQgASgBSAGIAQESJAoXZ3JpcHBlcl9mb3JjZV9hcHBsaWVkX24YFSABKAFIAogBARIlCgxoYW5kX2ZvcmNlX24YFiABKAsyDy50ZW5kb24udjEuVmVjMxIVCglqb2ludF9yYWQYFyADKAFCAhABEiAKFGpvaW50X3ZlbG9jaXR5X3JhZHBzGBggAygBQgIQARIgChRzdGlmZm5lc3Nfd2FudGVkX25wbRgZIAMoAUICEAESDQoFZmllbGQYGiABKA0SFQoNZmllbGRfZGVwdGhfbRgbIAEoARImCg1maWVsZF9wcm94eV9tGBwgASgLMg8udGVuZG9uLnYxLlZlYzNCDgoMX2dyaXBwZXJfcmFkQhkKF19ncmlwcGVyX3ZlbG9jaXR5X3JhZHBzQhoKGF9ncmlwcGVyX2ZvcmNlX2FwcGxpZWRfbiLdAgoMRGV2aWNlU3RhdGVzEgwKBHRpY2sYASABKAQSEgoKc2FtcGxlZF9ucxgCIAEoEBIPCgdkZXZpY2VzGAMgASgNEhYKCnBvc2l0aW9uX20YBCADKAFCAhABEhgKDHZlbG9jaXR5X21wcxgFIAMoAkICEAESGwoPZm9yY2VfYXBwbGllZF9uGAYgAygCQgIQARIUCghlbmVyZ3lfahgHIAMoAkICEAESHQoRcGVybWl0dGVkX2ZvcmNlX24YCCADKAJCAhABEiEKBG1vZGUYCSADKA4yDy50ZW5kb24udjEuTW9kZUICEAESEwoHcmVhc29ucxgKIAMoDUICEAESGgoOZm9yY2Vfc2VxdWVuY2UYCyADKARCAhABEhgKDGZvcmNlX2FnZV9ucxgMIAMoBEICEAESEwoHY2hhbm5lbBgNIAMoDUICEAESEwoHYnV0dG9ucxgOIAMoDUICEAEilgMKDEZvcmNlQ29tbWFuZBIQCghzZXF1ZW5jZRgBIAEoBBIVCg1iYXNlZF9vbl90aWNrGAIgASgEEiAKB2ZvcmNlX24YAyABKAsyDy50ZW5kb24udjEuVmVjMxIkCgVtb2RlbBgEIAEoCzIVLnRlbmRvbi52MS5Mb2NhbE1vZGVsEhQKDHZhbGlkX2Zvcl91cxgFIAEoDRIOCgZkZXZpY2UYBiABKA0SDwoHY2hhbm5lbBgHIAEoDRIYChB0b3BvbG9neV9jaGFuZ2VkGAggASgIEhQKB2Vycm9yX24YCSABKAFIAIgBARIiCgl0b3JxdWVfbm0YCiABKAsyDy50ZW5kb24udjEuVmVjMxIcCg9ncmlwcGVyX2ZvcmNlX24YCyABKAFIAYgBARIwCg5yb3RhdGlvbl9tb2RlbBgOIAEoCzIYLnRlbmRvbi52MS5Sb3RhdGlvbk1vZGVsEgsKA3dheRgPIAEoDRINCgVmaWVsZBgQIAEoDUIKCghfZXJyb3JfbkISChBfZ3JpcHBlcl9mb3JjZV9uIl4KDVJvdGF0aW9uTW9kZWwSJwoOYXRfb3JpZW50YXRpb24YASABKAsyDy50ZW5kb24udjEuUXVhdBIkChhhbmd1bGFyX3N0aWZmbmVzc19ubXByYWQYAiADKAFCAhABIpsBCgpMb2NhbE1vZGVsEh0KBGF0X20YASABKAsyDy50ZW5kb24udjEuVmVjMxIZCg1zdGlmZm5lc3NfbnBtGAIgAygBQgIQARIbCg52YWxpZF9yYWRpdXNfbRgDIAEoAUgAiAEBEiMKB2NvbnRhY3QYBCABKAsyEi50ZW5kb24udjEuQ29udGFjdEIRCg9fdmFsaWRfcmFkaXVzX20iXwoHQ29udGFjdBIfCgZub3JtYWwYASABKAsyDy50ZW5kb24udjEuVmVjMxINCgVnYXBfbRgCIAEoARIkCgV0YWJsZRgDIAEoCzIVLnRlbmRvbi52MS5Gb3JjZVRhYmxlIkgKCkZvcmNlVGFibGUSFQoNZmlyc3RfZGVwdGhfbRgBIAEoARIOCgZzdGVwX20YAiABKAESEwoHZm9yY2VfbhgDIAMoAUICEAEiRwoKT2ZmZXJGaWVsZBINCgVmaWVsZBgBIAEoDBIMCgRzaXplGAIgASgNEg4KBm9mZnNldBgDIAEoDRIMCgRwYXJ0GAQgASgMIqYBCghVc2VGaWVsZBIOCgZkZXZpY2UYASABKA0SDwoHY2hhbm5lbBgCIAEoDRISCgpnZW5lcmF0aW9uGAMgASgNEg0KBWZpZWxkGAQgASgMEisKCW1hdGVyaWFscxgFIAMoCzIYLnRlbmRvbi52MS5GaWVsZE1hdGVyaWFsEikKCGZpeHR1cmVzGAYgAygLMhcudGVuZG9uLnYxLkZpZWxkRml4dHVyZSIaCglEcm9wRmllbGQSDQoFZmllbGQYASABKAwibAoNRmllbGRNYXRlcmlhbBIVCg1zdGlmZm5lc3NfbnBtGAEgASgBEhwKFGJyYW5jaF9zdGlmZm5lc3NfbnBtGAIgASgBEhQKDHJlbGF4YXRpb25fcxgDIAEoARIQCghmcmljdGlvbhgEIAEoASK8AQoMRmllbGRGaXh0dXJlEikKBGtpbmQYASABKA4yGy50ZW5kb24udjEuRmllbGRGaXh0dXJlS2luZBIdCgRhdF9tGAIgASgLMg8udGVuZG9uLnYxLlZlYzMSHwoGbm9ybWFsGAMgASgLMg8udGVuZG9uLnYxLlZlYzMSFQoNc3RpZmZuZXNzX25wbRgEIAEoARIZCgxtb3N0X2ZvcmNlX24YBSABKAFIAIgBAUIPCg1fbW9zdF9mb3JjZV9uIisKCkZpZWxkQnJpY2sSDAoEaGFzaBgBIAEoDBIPCgd3ZWlnaHRzGAIgASgMIi0KC0ZpZWxkU3RhdHVzEg0KBWZpZWxkGAEgASgMEg8KB21pc3NpbmcYAiABKAwi8gEKCUZpZWxkUG9zZRIOCgZkZXZpY2UYASABKA0SDwoHY2hhbm5lbBgCIAEoDRIQCghzZXF1ZW5jZRgDIAEoBBIPCgd0aW1lX25zGAQgASgQEiMKCnBvc2l0aW9uX20YBSABKAsyDy50ZW5kb24udjEuVmVjMxIkCgtvcmllbnRhdGlvbhgGIAEoCzIPLnRlbmRvbi52MS5RdWF0EiUKDHZlbG9jaXR5X21wcxgHIAEoCzIPLnRlbmRvbi52MS5WZWMzEi8KFmFuZ3VsYXJfdmVsb2NpdHlfcmFkcHMYCCABKAsyDy50ZW5kb24udjEuVmVjMyL3BQoHQ29udHJvbBIKCgJpZBgBIAEoDRIxCg5zZXRfc3RhdGVfcmF0ZRgCIAEoCzIXLnRlbmRvbi52MS5TZXRTdGF0ZVJhdGVIABIhCgVyZWFybRgDIAEoCzIQLnRlbmRvbi52MS5SZWFybUgAEicKCGRlc2NyaWJlGAQgASgLMhMudGVuZG9uLnYxLkRlc2NyaWJlSAASKgoKdGFrZV9sZWFzZRgFIAEoCzIULnRlbmRvbi52MS5UYWtlTGVhc2VIABIqCgpnaXZlX2xlYXNlGAYgASgLMhQudGVuZG9uLnYxLkdpdmVMZWFzZUgAEjkKEnNldF9zdGF0ZV9kZWFkYmFuZBgIIAEoCzIbLnRlbmRvbi52MS5TZXRTdGF0ZURlYWRiYW5kSAASIwoGZGlzYXJtGAkgASgLMhEudGVuZG9uLnYxLkRpc2FybUgAEioKCnNldF9vdXRwdXQYCiABKAsyFC50ZW5kb24udjEuU2V0T3V0cHV0SAASIwoGY291cGxlGAsgASgLMhEudGVuZG9uLnYxLkNvdXBsZUgAEiMKBmVuZ2FnZRgMIAEoCzIRLnRlbmRvbi52MS5FbmdhZ2VIABIpCglkaXNlbmdhZ2UYDSABKAsyFC50ZW5kb24udjEuRGlzZW5nYWdlSAASKAoJc2V0X3NjYWxlGA4gASgLMhMudGVuZG9uLnYxLlNldFNjYWxlSAASKAoJc2V0X3NoYXJlGA8gASgLMhMudGVuZG9uLnYxLlNldFNoYXJlSAASKgoKbGVhc2VfbG9zdBgHIAEoCzIULnRlbmRvbi52MS5MZWFzZUxvc3RIABIsCgtvZmZlcl9maWVsZBgQIAEoCzIVLnRlbmRvbi52MS5PZmZlckZpZWxkSAASKAoJdXNlX2ZpZWxkGBEgASgLMhMudGVuZG9uLnYxLlVzZUZpZWxkSAASKgoKZHJvcF9maWVsZBgSIAEoCzIULnRlbmRvbi52MS5Ecm9wRmllbGRIAEIECgJvcCIqCgxTZXRTdGF0ZVJhdGUSCgoCaHoYASABKA0SDgoGZGV2aWNlGAIgASgNIkwKEFNldFN0YXRlRGVhZGJhbmQSDQoFc2hhcmUYASABKAESEQoJZmxvb3JfbXBzGAIgASgBEhYKDm1heF9zaWxlbmNlX3VzGAMgASgNIhcKBVJlYXJtEg4KBmRldmljZRgBIAEoDSIYCgZEaXNhcm0SDgoGZGV2aWNlGAEgASgNIp8ECgZDb3VwbGUSDgoGZGV2aWNlGAEgASgNEg8KB2NoYW5uZWwYAiABKA0SIQoEcm9sZRgDIAEoDjITLnRlbmRvbi52MS5Qb3J0Um9sZRIpCgZtZXRob2QYBCABKA4yGS50ZW5kb24udjEuQ291cGxpbmdNZXRob2QSFgoOcG9zaXRpb25fc2NhbGUYBSABKAESEwoLZm9yY2Vfc2NhbGUYBiABKAESIQoIcm90YXRpb24YByABKAsyDy50ZW5kb24udjEuUXVhdBIMCgRheGVzGAggASgNEhUKDXN0aWZmbmVzc19ucG0YCSABKAESGwoTbXV0dWFsX2RhbXBpbmdfbnNwbRgKIAEoARIUCgxkYW1waW5nX25zcG0YCyABKAESFgoOYWRhcHRfdG9fZGVsYXkYDCABKAgSDQoFcHVyc2UYDSABKAgSEQoJcGVyaW9kX3VzGA4gASgNEhAKCGFic29sdXRlGA8gASgIEh0KFXR1cm5fc3RpZmZuZXNzX25tcHJhZBgQIAEoARIcChR0dXJuX2RhbXBpbmdfbm1zcHJhZBgRIAEoARIaChJncmlwX3N0aWZmbmVzc19ucG0YEiABKAESGQoRZ3JpcF9kYW1waW5nX25zcG0YEyABKAESGAoQZHJpZnRfcmF0ZV9wZXJfcxgUIAEoARIkCgRyYXRlGBUgASgLMhYudGVuZG9uLnYxLlJhdGVDb250cm9sIk0KC1JhdGVDb250cm9sEhMKC2RlYWRfem9uZV9tGAEgASgBEhIKCmdhaW5fcGVyX3MYAiABKAESFQoNbWF4X3NwZWVkX21wcxgDIAEoASIYCgZFbmdhZ2USDgoGZGV2aWNlGAEgASgNIhsKCURpc2VuZ2FnZRIOCgZkZXZpY2UYASABKA0iRwoIU2V0U2NhbGUSDgoGZGV2aWNlGAEgASgNEhYKDnBvc2l0aW9uX3NjYWxlGAIgASgBEhMKC2ZvcmNlX3NjYWxlGAMgASgBIjoKCFNldFNoYXJlEg4KBmRldmljZRgBIAEoDRIPCgdjaGFubmVsGAIgASgNEg0KBXNoYXJlGAMgASgBInAKCVNldE91dHB1dBIOCgZkZXZpY2UYASABKA0SDgoGb3V0cHV0GAIgASgNEg0KA3JnYhgDIAEoB0gAEikKCXZpYnJhdGlvbhgEIAEoCzIULnRlbmRvbi52MS5WaWJyYXRpb25IAEIJCgdzZXR0aW5nIkkKCVZpYnJhdGlvbhIRCglhbXBsaXR1ZGUYASABKAESFAoMZnJlcXVlbmN5X2h6GAIgASgBEhMKC2R1cmF0aW9uX21zGAMgASgNIioKCERlc2NyaWJlEg4KBmRldmljZRgBIAEoDRIOCgZoYW5kbGUYAiABKAgiLAoJVGFrZUxlYXNlEg4KBmRldmljZRgBIAEoDRIPCgdjaGFubmVsGAIgASgNIiwKCUdpdmVMZWFzZRIOCgZkZXZpY2UYASABKA0SDwoHY2hhbm5lbBgCIAEoDSI4CglMZWFzZUxvc3QSDgoGZGV2aWNlGAEgASgNEg8KB2NoYW5uZWwYAiABKA0SCgoCdG8YAyABKAkitAEKCkNvbnRyb2xBY2sSCgoCaWQYASABKA0SHQoEY29kZRgCIAEoDjIPLnRlbmRvbi52MS5Db2RlEg4KBmRldGFpbBgDIAEoCRIPCgd3YWl0X21zGAQgASgNEiwKBmRldmljZRgFIAEoCzIcLnRlbmRvbi52MS5EZXZpY2VEZXNjcmlwdGlvbhIsCgZoYW5kbGUYBiABKAsyHC50ZW5kb24udjEuSGFuZGxlRGVzY3JpcHRpb24i6gIKEURldmljZURlc2NyaXB0aW9uEg4KBmRldmljZRgBIAEoDRIMCgRuYW1lGAIgASgJEg0KBW1vZGVsGAMgASgJEhQKDHBvc2l0aW9uX2RvZhgEIAEoDRIRCglmb3JjZV9kb2YYBSABKA0SKAoPd29ya3NwYWNlX21pbl9tGAYgASgLMg8udGVuZG9uLnYxLlZlYzMSKAoPd29ya3NwYWNlX21heF9tGAcgASgLMg8udGVuZG9uLnYxLlZlYzMSEwoLbWF4X2ZvcmNlX24YCCABKAESGgoSY29udGludW91c19mb3JjZV9uGAkgASgBEhkKEW1heF9zdGlmZm5lc3NfbnBtGAogASgBEh0KFXBvc2l0aW9uX3Jlc29sdXRpb25fbRgLIAEoARIPCgdsb29wX2h6GAwgASgNEi8KCGNoYW5uZWxzGA0gAygLMh0udGVuZG9uLnYxLkNoYW5uZWxEZXNjcmlwdGlvbiLWAgoRSGFuZGxlRGVzY3JpcHRpb24SDgoGZGV2aWNlGAEgASgNEi0KFG9wZXJhdG9yX2Zyb21fZGV2aWNlGAIgASgLMg8udGVuZG9uLnYxLlF1YXQSDwoHYnV0dG9ucxgDIAMoCRIcChRvcmllbnRhdGlvbl9tZWFzdXJlZBgEIAEoCBIVCg1tYXhfdG9ycXVlX25tGAUgASgBEh0KEGdyaXBwZXJfb3Blbl9yYWQYBiABKAFIAIgBARIbChNtYXhfZ3JpcHBlcl9mb3JjZV9uGAcgASgBEg0KBWdyb3VwGAggASgJEh0KBGhhbmQYCSABKA4yDy50ZW5kb24udjEuSGFuZBIOCgZqb2ludHMYCiADKAkSLQoHb3V0cHV0cxgLIAMoCzIcLnRlbmRvbi52MS5PdXRwdXREZXNjcmlwdGlvbkITChFfZ3JpcHBlcl9vcGVuX3JhZCJGChFPdXRwdXREZXNjcmlwdGlvbhIMCgRuYW1lGAEgASgJEiMKBGtpbmQYAiABKA4yFS50ZW5kb24udjEuT3V0cHV0S2luZCJqChJDaGFubmVsRGVzY3JpcHRpb24SDAoEbmFtZRgBIAEoCRIkCgRydWxlGAIgASgOMhYudGVuZG9uLnYxLkNoYW5uZWxSdWxlEhAKCGxlYXNlX21zGAMgASgNEg4KBmhvbGRlchgEIAEoCSI0CgNCeWUSHQoEY29kZRgBIAEoDjIPLnRlbmRvbi52MS5Db2RlEg4KBnJlYXNvbhgCIAEoCSLeBAoKTGlua1JlcG9ydBIOCgZudW1iZXIYASABKAQSEAoIdW50aWxfbnMYAiABKBASDwoHc3Bhbl9ucxgDIAEoBBIOCgZmb3JjZXMYBCABKAQSEwoLbGF0ZV9zZXJ2ZXIYBSABKAQSFAoMbGF0ZV9uZXR3b3JrGAYgASgEEhMKC2xhdGVfZW5naW5lGAcgASgEEhUKDXdvcnN0X2xhdGVfbnMYCCABKAQSFgoObG9uZ2VzdF9nYXBfbnMYCSABKAQSJQoKcm91bmRfdHJpcBgKIAEoCzIRLnRlbmRvbi52MS5EZWxheXMSJAoJdG9fc2VydmVyGAsgASgLMhEudGVuZG9uLnYxLkRlbGF5cxIkCgl0b19jbGllbnQYDCABKAsyES50ZW5kb24udjEuRGVsYXlzEhcKD2Nsb2NrX29mZnNldF9ucxgNIAEoEhIXCg9jbG9ja19kcmlmdF9wcG0YDiABKAESFgoOY2xvY2tfZXJyb3JfbnMYDyABKAQSEAoIcmVjZWl2ZWQYECABKAQSDAoEbG9zdBgRIAEoBBIRCglyZW9yZGVyZWQYEiABKAQSEgoKZHVwbGljYXRlZBgTIAEoBBINCgV3b3JkcxgUIAEoCRIUCgxsYXRlX3Vua25vd24YFSABKAQSGgoScmVmdXNlZF9ub3RfZmluaXRlGBYgASgEEh0KFXJlZnVzZWRfb3V0X29mX2JvdW5kcxgXIAEoBBIcChRyZWZ1c2VkX3Vua25vd25fdGljaxgYIAEoBBIcChRyZWZ1c2VkX29sZF9zZXF1ZW5jZRgZIAEoBCIrCgZEZWxheXMSEQoJbWVkaWFuX25zGAEgASgSEg4KBnA5OV9ucxgCIAEoEiLjBQoJUG9ydFN0YXRlEg4KBmRldmljZRgBIAEoDRIPCgdjaGFubmVsGAIgASgNEg0KBWVwb2NoGAMgASgEEhAKCHNlcXVlbmNlGAQgASgEEhUKDWFuc3dlcnNfZXBvY2gYBSABKAQSDwoHYW5zd2VycxgGIAEoBBIPCgd0aW1lX25zGAcgASgQEhUKDXJvdW5kX3RyaXBfbnMYCCABKAQSIwoFcGhhc2UYCSABKA4yFC50ZW5kb24udjEuUG9ydFBoYXNlEhIKCmVuZ2FnZW1lbnQYCiABKAQSDwoHYnV0dG9ucxgLIAEoBxIjCgpwb3NpdGlvbl9tGAwgASgLMg8udGVuZG9uLnYxLlZlYzMSJQoMdmVsb2NpdHlfbXBzGA0gASgLMg8udGVuZG9uLnYxLlZlYzMSIAoHZm9yY2VfbhgOIAEoCzIPLnRlbmRvbi52MS5WZWMzEigKD2NvbnRhY3RfZm9yY2VfbhgPIAEoCzIPLnRlbmRvbi52MS5WZWMzEhEKCWFjY291bnRfahgQIAEoARIOCgZuZWVkX2oYESABKAESDwoHZ2l2ZW5fahgSIAEoARIPCgd0YWtlbl9qGBMgASgBEiYKDXdhdmVfaW50ZWdyYWwYFCABKAsyDy50ZW5kb24udjEuVmVjMxIVCg13YXZlX2VuZXJneV9qGBUgASgBEicKB3N1cmZhY2UYFiABKAsyFi50ZW5kb24udjEuUG9ydFN1cmZhY2USIQoEdHVybhgXIAEoCzITLnRlbmRvbi52MS5Qb3J0VHVybhIhCgRncmlwGBggASgLMhMudGVuZG9uLnYxLlBvcnRHcmlwEhMKC2VuZXJneV9pbl9qGBkgASgBEhIKBXNoYXJlGBogASgBSACIAQESFgoOcG9zaXRpb25fc2NhbGUYGyABKAESEwoLZm9yY2Vfc2NhbGUYHCABKAESDwoHb2ZfcGVlchgdIAEoCEIICgZfc2hhcmUifgoIUG9ydFR1cm4SHQoEdHVybhgBIAEoCzIPLnRlbmRvbi52MS5RdWF0Ei8KFmFuZ3VsYXJfdmVsb2NpdHlfcmFkcHMYAiABKAsyDy50ZW5kb24udjEuVmVjMxIiCgl0b3JxdWVfbm0YAyABKAsyDy50ZW5kb24udjEuVmVjMyKJAQoIUG9ydEdyaXASEQoJb3BlbmluZ19tGAEgASgBEhQKDHZlbG9jaXR5X21wcxgCIAEoARIPCgdmb3JjZV9uGAMgASgBEhEKCWFjY291bnRfahgEIAEoARIOCgZuZWVkX2oYBSABKAESDwoHZ2l2ZW5fahgGIAEoARIPCgd0YWtlbl9qGAcgASgBIlcKC1BvcnRTdXJmYWNlEh8KBm5vcm1hbBgBIAEoCzIPLnRlbmRvbi52MS5WZWMzEhAKCG9mZnNldF9tGAIgASgBEhUKDXN0aWZmbmVzc19ucG0YAyABKAEi9AEKDERldmljZVJlcG9ydBIOCgZudW1iZXIYASABKAQSEAoIdW50aWxfbnMYAiABKBASDwoHc3Bhbl9ucxgDIAEoBBIOCgZkZXZpY2UYBCABKA0SDQoFc3RlcHMYBSABKAQSDgoGbWlzc2VkGAYgASgEEhAKCG92ZXJydW5zGAcgASgEEg4KBnVuc2VlbhgIIAEoBBIcChBsYXRlbmVzc191c19sb2cyGAkgAygEQgIQARIhCgZzYWZldHkYCiABKA4yES50ZW5kb24udjEuU2FmZXR5Eg0KBWZhdWx0GAsgASgJEhAKCGRlZ3JhZGVkGAwgASgJIr0BCgpQZWVyUmVwb3J0Eg4KBmRldmljZRgBIAEoDRIPCgdjaGFubmVsGAIgASgNEgwKBG5hbWUYAyABKAkSFAoMc3RhdGVfb25lX2luGAQgASgNEhYKDmZvcmNlc19yZWZ1c2VkGAUgASgIEiMKBGxpbmsYBiABKAsyFS50ZW5kb24udjEuTGlua1JlcG9ydBIUCgdlcnJvcl9uGAcgASgBSACIAQESCwoDd2F5GAggASgJQgoKCF9lcnJvcl9uIqABCgVIZWxsbxITCgt2ZXJzaW9uX21pbhgBIAEoDRITCgt2ZXJzaW9uX21heBgCIAEoDRIdCgRyb2xlGAMgASgOMg8udGVuZG9uLnYxLlJvbGUSDAoEbmFtZRgEIAEoCRIQCghmZWF0dXJlcxgFIAMoCRIgCgZjbGFpbXMYBiADKAsyEC50ZW5kb24udjEuQ2xhaW0SDAoEd2F5cxgHIAMoCSJHCgVDbGFpbRIOCgZkZXZpY2UYASABKAkSDwoHY2hhbm5lbBgCIAEoCRIdCgRyb2xlGAMgASgOMg8udGVuZG9uLnYxLlJvbGUiXgoGQW5zd2VyEiUKB3dlbGNvbWUYASABKAsyEi50ZW5kb24udjEuV2VsY29tZUgAEiUKB3JlZnVzZWQYAiABKAsyEi50ZW5kb24udjEuUmVmdXNlZEgAQgYKBGJvZHki6wEKB1dlbGNvbWUSDwoHdmVyc2lvbhgBIAEoDRIQCghmZWF0dXJlcxgCIAMoCRIdCgRyb2xlGAMgASgOMg8udGVuZG9uLnYxLlJvbGUSEwoLZGV2aWNlX25hbWUYBCABKAkSEwoLbWF4X2ZvcmNlX24YBSABKAESHQoVcG9zaXRpb25fcmVzb2x1dGlvbl9tGAYgASgBEg8KB2xvb3BfaHoYByABKA0SEgoKdGltZW91dF9tcxgIIAEoDRIOCgZzZXJ2ZXIYCSABKAkSIAoGZ3JhbnRzGAogAygLMhAudGVuZG9uLnYxLkdyYW50IkcKBUdyYW50Eg4KBmRldmljZRgBIAEoDRIPCgdjaGFubmVsGAIgASgNEh0KBHJvbGUYAyABKA4yDy50ZW5kb24udjEuUm9sZSJiCgdSZWZ1c2VkEh0KBGNvZGUYASABKA4yDy50ZW5kb24udjEuQ29kZRIOCgZkZXRhaWwYAiABKAkSEwoLdmVyc2lvbl9taW4YAyABKA0SEwoLdmVyc2lvbl9tYXgYBCABKA0qhQEKBE1vZGUSFAoQTU9ERV9VTlNQRUNJRklFRBAAEg0KCU1PREVfSURMRRABEg8KC01PREVfQUNUSVZFEAISEAoMTU9ERV9IT0xESU5HEAMSEQoNTU9ERV9ERUNBWUlORxAEEhIKDk1PREVfU0FGRV9TVE9QEAUSDgoKTU9ERV9GQVVMVBAGKo8BChBGaWVsZEZpeHR1cmVLaW5kEiIKHkZJRUxEX0ZJWFRVUkVfS0lORF9VTlNQRUNJRklFRBAAEhwKGEZJRUxEX0ZJWFRVUkVfS0lORF9QT0lOVBABEhsKF0ZJRUxEX0ZJWFRVUkVfS0lORF9MSU5FEAISHAoYRklFTERfRklYVFVSRV9LSU5EX1BMQU5FEAMqUwoIUG9ydFJvbGUSGQoVUE9SVF9ST0xFX1VOU1BFQ0lGSUVEEAASFAoQUE9SVF9ST0xFX0xFQURFUhABEhYKElBPUlRfUk9MRV9GT0xMT1dFUhACKo8CCg5Db3VwbGluZ01ldGhvZBIfChtDT1VQTElOR19NRVRIT0RfVU5TUEVDSUZJRUQQABIlCiFDT1VQTElOR19NRVRIT0RfUE9TSVRJT05fUE9TSVRJT04QARIiCh5DT1VQTElOR19NRVRIT0RfUE9TSVRJT05fRk9SQ0UQAhIZChVDT1VQTElOR19NRVRIT0RfV0FWRVMQAxIbChdDT1VQTElOR19NRVRIT0RfU1VSRkFDRRAEEh0KGUNPVVBMSU5HX01FVEhPRF9QQVNTSVZJVFkQBRIgChxDT1VQTElOR19NRVRIT0RfU0VUX1BPU0lUSU9OEAYSGAoUQ09VUExJTkdfTUVUSE9EX1JBVEUQBypLCgpPdXRwdXRLaW5kEhYKEk9VVFBVVF9VTlNQRUNJRklFRBAAEg8KC09VVFBVVF9MQU1QEAESFAoQT1VUUFVUX1ZJQlJBVElPThACKjMKBEhhbmQSDAoISEFORF9BTlkQABINCglIQU5EX0xFRlQQARIOCgpIQU5EX1JJR0hUEAIqXAoLQ2hhbm5lbFJ1bGUSHAoYQ0hBTk5FTF9SVUxFX1VOU1BFQ0lGSUVEEAASFAoQQ0hBTk5FTF9SVUxFX1NVTRABEhkKFUNIQU5ORUxfUlVMRV9QUklPUklUWRACKsoBCglQb3J0UGhhc2USGgoWUE9SVF9QSEFTRV9VTlNQRUNJRklFRBAAEhQKEFBPUlRfUEhBU0VfQUxPTkUQARIWChJQT1JUX1BIQVNFX0NPVVBMRUQQAhIXChNQT1JUX1BIQVNFX0FMSUdOSU5HEAMSFgoSUE9SVF9QSEFTRV9FTkdBR0VEEAQSFwoTUE9SVF9QSEFTRV9DTFVUQ0hFRBAFEhMKD1BPUlRfUEhBU0VfTE9TVBAGEhQKEFBPUlRfUEhBU0VfRkFVTFQQByq8AQoGU2FmZXR5EhYKElNBRkVUWV9VTlNQRUNJRklFRBAAEhEKDVNBRkVUWV9BQlNFTlQQARISCg5TQUZFVFlfT1BFTklORxACEhMKD1NBRkVUWV9GSVJNV0FSRRADEhIKDlNBRkVUWV9VTkhPTUVEEAQSEAoMU0FGRVRZX0hPTUVEEAUSEAoMU0FGRVRZX0FSTUVEEAYSEAoMU0FGRVRZX0ZBVUxUEAcSFAoQU0FGRVRZX1VOR1VBUkRFRBAIKr0BCgRDb2RlEhQKEENPREVfVU5TUEVDSUZJRUQQABILCgdDT0RFX09LEAESEAoMQ09ERV9JTlZBTElEEAISFAoQQ09ERV9VTlNVUFBPUlRFRBADEg0KCUNPREVfQlVTWRAEEg8KC0NPREVfREVOSUVEEAUSEQoNQ09ERV9TSFVURE9XThAGEhIKDkNPREVfVElNRURfT1VUEAcSEAoMQ09ERV9FWFBJUkVEEAgSEQoNQ09ERV9SRVBMQUNFRBAJKkQKBFJvbGUSFAoQUk9MRV9VTlNQRUNJRklFRBAAEhEKDVJPTEVfT0JTRVJWRVIQARITCg9ST0xFX0NPTlRST0xMRVIQAmIGcHJvdG8z");
 
 /**
  * The body of a Data datagram.
@@ -191,6 +191,32 @@ export type Frame = Message<"tendon.v1.Frame"> & {
      */
     value: DeviceStates;
     case: "states";
+  } | {
+    /**
+     * With the feature "fields" only:
+     *
+     * client → server, unreliable
+     *
+     * @generated from field: tendon.v1.FieldBrick field_brick = 11;
+     */
+    value: FieldBrick;
+    case: "fieldBrick";
+  } | {
+    /**
+     * server → client, unreliable; for each field the newest one wins
+     *
+     * @generated from field: tendon.v1.FieldStatus field_status = 12;
+     */
+    value: FieldStatus;
+    case: "fieldStatus";
+  } | {
+    /**
+     * client → server, unreliable; for each device and channel the highest sequence wins
+     *
+     * @generated from field: tendon.v1.FieldPose field_pose = 13;
+     */
+    value: FieldPose;
+    case: "fieldPose";
   } | { case: undefined; value?: undefined };
 };
 
@@ -479,6 +505,29 @@ export type DeviceState = Message<"tendon.v1.DeviceState"> & {
    * @generated from field: repeated double stiffness_wanted_npm = 25 [packed = true];
    */
   stiffnessWantedNpm: number[];
+
+  /**
+   * With the feature "fields" only:
+   * The generation of the rendered field (UseField.generation). If several channels use fields, this is the first one
+   * with contact, or else the first one. Absent if no field is rendered
+   *
+   * @generated from field: uint32 field = 26;
+   */
+  field: number;
+
+  /**
+   * [0, 1e12]: the distance from the proxy to the hand, or 0 if there is no contact
+   *
+   * @generated from field: double field_depth_m = 27;
+   */
+  fieldDepthM: number;
+
+  /**
+   * the position of the proxy, which is ignored if there is no field
+   *
+   * @generated from field: tendon.v1.Vec3 field_proxy_m = 28;
+   */
+  fieldProxyM?: Vec3 | undefined;
 };
 
 /**
@@ -493,7 +542,8 @@ export const DeviceStateSchema: GenMessage<DeviceState> = /*@__PURE__*/
  * DeviceState messages, because all values except for the positions are sent in single precision. Entry k of a column
  * belongs to the k-th device in `devices`, in the order of their numbers. Vectors have three entries (x, y, z). If one
  * of the last five columns is empty, all of its values are 0. The frame is dropped if any other column has the wrong
- * length, if there are no devices, or if a value is out of bounds.
+ * length, if there are no devices, or if a value is out of bounds. A state with a field has no columns, like all states
+ * with other members: it is sent as a DeviceState.
  *
  * @generated from message tendon.v1.DeviceStates
  */
@@ -710,6 +760,15 @@ export type ForceCommand = Message<"tendon.v1.ForceCommand"> & {
    * @generated from field: uint32 way = 15;
    */
   way: number;
+
+  /**
+   * With the feature "fields" only:
+   * If it is not 0, force_n is not rendered. It is the true force at the state `based_on_tick`, from which the server
+   * learns the error of the field with this generation (UseField.generation). The model is ignored
+   *
+   * @generated from field: uint32 field = 16;
+   */
+  field: number;
 };
 
 /**
@@ -876,6 +935,346 @@ export const ForceTableSchema: GenMessage<ForceTable> = /*@__PURE__*/
   messageDesc(file_tendon, 11);
 
 /**
+ * A part of the manifest of a field, which lists its bricks and primitives. Parts are sent in order.
+ *
+ * @generated from message tendon.v1.OfferField
+ */
+export type OfferField = Message<"tendon.v1.OfferField"> & {
+  /**
+   * [32, 32] bytes: the BLAKE2b-256 of the manifest, which is the name of the field
+   *
+   * @generated from field: bytes field = 1;
+   */
+  field: Uint8Array;
+
+  /**
+   * [1, 65535]: the size of the whole manifest in bytes
+   *
+   * @generated from field: uint32 size = 2;
+   */
+  size: number;
+
+  /**
+   * [0, 65535]: the place of the first byte of `part` in the manifest
+   *
+   * @generated from field: uint32 offset = 3;
+   */
+  offset: number;
+
+  /**
+   * [1, 1000] bytes
+   *
+   * @generated from field: bytes part = 4;
+   */
+  part: Uint8Array;
+};
+
+/**
+ * Describes the message tendon.v1.OfferField.
+ * Use `create(OfferFieldSchema)` to create a new message.
+ */
+export const OfferFieldSchema: GenMessage<OfferField> = /*@__PURE__*/
+  messageDesc(file_tendon, 12);
+
+/**
+ * Renders a field in a channel from now on, instead of the field that the channel has used. The server must have the
+ * whole field (FieldStatus), and the client must hold the lease of the channel, as for a ForceCommand.
+ *
+ * @generated from message tendon.v1.UseField
+ */
+export type UseField = Message<"tendon.v1.UseField"> & {
+  /**
+   * [0, 15]
+   *
+   * @generated from field: uint32 device = 1;
+   */
+  device: number;
+
+  /**
+   * [0, 7]
+   *
+   * @generated from field: uint32 channel = 2;
+   */
+  channel: number;
+
+  /**
+   * [1, …]: increases with each UseField of a session, device and channel
+   *
+   * @generated from field: uint32 generation = 3;
+   */
+  generation: number;
+
+  /**
+   * [32, 32] bytes: the name of the field
+   *
+   * @generated from field: bytes field = 4;
+   */
+  field: Uint8Array;
+
+  /**
+   * [1, 16] entries: the materials that the manifest refers to, from number 0
+   *
+   * @generated from field: repeated tendon.v1.FieldMaterial materials = 5;
+   */
+  materials: FieldMaterial[];
+
+  /**
+   * [0, 4] entries
+   *
+   * @generated from field: repeated tendon.v1.FieldFixture fixtures = 6;
+   */
+  fixtures: FieldFixture[];
+};
+
+/**
+ * Describes the message tendon.v1.UseField.
+ * Use `create(UseFieldSchema)` to create a new message.
+ */
+export const UseFieldSchema: GenMessage<UseField> = /*@__PURE__*/
+  messageDesc(file_tendon, 13);
+
+/**
+ * Forgets a field. A channel that uses it stops. Its bricks stay in the cache of the server.
+ *
+ * @generated from message tendon.v1.DropField
+ */
+export type DropField = Message<"tendon.v1.DropField"> & {
+  /**
+   * [32, 32] bytes: the name of the field
+   *
+   * @generated from field: bytes field = 1;
+   */
+  field: Uint8Array;
+};
+
+/**
+ * Describes the message tendon.v1.DropField.
+ * Use `create(DropFieldSchema)` to create a new message.
+ */
+export const DropFieldSchema: GenMessage<DropField> = /*@__PURE__*/
+  messageDesc(file_tendon, 14);
+
+/**
+ * A spring, beside a spring in series with a damper, with Coulomb friction (core/field/material.h).
+ *
+ * @generated from message tendon.v1.FieldMaterial
+ */
+export type FieldMaterial = Message<"tendon.v1.FieldMaterial"> & {
+  /**
+   * (0, 1e12]
+   *
+   * @generated from field: double stiffness_npm = 1;
+   */
+  stiffnessNpm: number;
+
+  /**
+   * [0, 1e12]: of the spring in series with the damper, or 0 if there is none
+   *
+   * @generated from field: double branch_stiffness_npm = 2;
+   */
+  branchStiffnessNpm: number;
+
+  /**
+   * [0.01, 10] or 0: the time constant of the damper; ignored without this spring
+   *
+   * @generated from field: double relaxation_s = 3;
+   */
+  relaxationS: number;
+
+  /**
+   * [0, 2]: the coefficient of friction
+   *
+   * @generated from field: double friction = 4;
+   */
+  friction: number;
+};
+
+/**
+ * Describes the message tendon.v1.FieldMaterial.
+ * Use `create(FieldMaterialSchema)` to create a new message.
+ */
+export const FieldMaterialSchema: GenMessage<FieldMaterial> = /*@__PURE__*/
+  messageDesc(file_tendon, 15);
+
+/**
+ * A spring from the hand to the nearest position on a point, a line or a plane, in the frame of the object
+ * (core/field/fixture.h).
+ *
+ * @generated from message tendon.v1.FieldFixture
+ */
+export type FieldFixture = Message<"tendon.v1.FieldFixture"> & {
+  /**
+   * @generated from field: tendon.v1.FieldFixtureKind kind = 1;
+   */
+  kind: FieldFixtureKind;
+
+  /**
+   * the point, or a point of the line or plane
+   *
+   * @generated from field: tendon.v1.Vec3 at_m = 2;
+   */
+  atM?: Vec3 | undefined;
+
+  /**
+   * the direction of the line, or the normal of the plane; any for a point
+   *
+   * @generated from field: tendon.v1.Vec3 normal = 3;
+   */
+  normal?: Vec3 | undefined;
+
+  /**
+   * (0, 1e12]
+   *
+   * @generated from field: double stiffness_npm = 4;
+   */
+  stiffnessNpm: number;
+
+  /**
+   * (0, 1e12]: the largest force. Absent if the force is not limited
+   *
+   * @generated from field: optional double most_force_n = 5;
+   */
+  mostForceN?: number | undefined;
+};
+
+/**
+ * Describes the message tendon.v1.FieldFixture.
+ * Use `create(FieldFixtureSchema)` to create a new message.
+ */
+export const FieldFixtureSchema: GenMessage<FieldFixture> = /*@__PURE__*/
+  messageDesc(file_tendon, 16);
+
+/**
+ * The weights of a brick (core/field/brick_field.h).
+ *
+ * @generated from message tendon.v1.FieldBrick
+ */
+export type FieldBrick = Message<"tendon.v1.FieldBrick"> & {
+  /**
+   * [16, 16] bytes: the BLAKE2b-128 of the weights
+   *
+   * @generated from field: bytes hash = 1;
+   */
+  hash: Uint8Array;
+
+  /**
+   * [1024, 1024] bytes: 8³ int16, little-endian, x fastest
+   *
+   * @generated from field: bytes weights = 2;
+   */
+  weights: Uint8Array;
+};
+
+/**
+ * Describes the message tendon.v1.FieldBrick.
+ * Use `create(FieldBrickSchema)` to create a new message.
+ */
+export const FieldBrickSchema: GenMessage<FieldBrick> = /*@__PURE__*/
+  messageDesc(file_tendon, 17);
+
+/**
+ * What a server still needs of a field. Bit i % 8 of byte i / 8 is set if brick i of the manifest is missing. The last
+ * of the 1024 bits is set if the manifest is not complete; the bits of unknown bricks are then 0. Absent bytes are 0.
+ *
+ * @generated from message tendon.v1.FieldStatus
+ */
+export type FieldStatus = Message<"tendon.v1.FieldStatus"> & {
+  /**
+   * [32, 32] bytes: the name of the field
+   *
+   * @generated from field: bytes field = 1;
+   */
+  field: Uint8Array;
+
+  /**
+   * [0, 128] bytes
+   *
+   * @generated from field: bytes missing = 2;
+   */
+  missing: Uint8Array;
+};
+
+/**
+ * Describes the message tendon.v1.FieldStatus.
+ * Use `create(FieldStatusSchema)` to create a new message.
+ */
+export const FieldStatusSchema: GenMessage<FieldStatus> = /*@__PURE__*/
+  messageDesc(file_tendon, 18);
+
+/**
+ * The pose of the object of a channel, in the base frame of the device. It should be the pose that the engine expects
+ * for the time of its arrival. The server extrapolates it with its velocities for at most 50 ms.
+ *
+ * @generated from message tendon.v1.FieldPose
+ */
+export type FieldPose = Message<"tendon.v1.FieldPose"> & {
+  /**
+   * [0, 15]
+   *
+   * @generated from field: uint32 device = 1;
+   */
+  device: number;
+
+  /**
+   * [0, 7]
+   *
+   * @generated from field: uint32 channel = 2;
+   */
+  channel: number;
+
+  /**
+   * [1, …]: 1, 2, 3 … per session, device and channel
+   *
+   * @generated from field: uint64 sequence = 3;
+   */
+  sequence: bigint;
+
+  /**
+   * The time that the pose is for, on the clock of the SERVER, like DeviceState.sampled_ns
+   *
+   * [-2^60, 2^60]
+   *
+   * @generated from field: sfixed64 time_ns = 4;
+   */
+  timeNs: bigint;
+
+  /**
+   * of the origin of the object. A server only accepts positions within 10 m
+   *
+   * @generated from field: tendon.v1.Vec3 position_m = 5;
+   */
+  positionM?: Vec3 | undefined;
+
+  /**
+   * the rotation from the frame of the object to the base frame
+   *
+   * @generated from field: tendon.v1.Quat orientation = 6;
+   */
+  orientation?: Quat | undefined;
+
+  /**
+   * of the origin of the object
+   *
+   * @generated from field: tendon.v1.Vec3 velocity_mps = 7;
+   */
+  velocityMps?: Vec3 | undefined;
+
+  /**
+   * the angular velocity in the axes of the base frame
+   *
+   * @generated from field: tendon.v1.Vec3 angular_velocity_radps = 8;
+   */
+  angularVelocityRadps?: Vec3 | undefined;
+};
+
+/**
+ * Describes the message tendon.v1.FieldPose.
+ * Use `create(FieldPoseSchema)` to create a new message.
+ */
+export const FieldPoseSchema: GenMessage<FieldPose> = /*@__PURE__*/
+  messageDesc(file_tendon, 19);
+
+/**
  * A request, and its number. `lease_lost` is from the server to the client, all others are from the client to the
  * server.
  *
@@ -980,6 +1379,26 @@ export type Control = Message<"tendon.v1.Control"> & {
      */
     value: LeaseLost;
     case: "leaseLost";
+  } | {
+    /**
+     * With the feature "fields" only:
+     *
+     * @generated from field: tendon.v1.OfferField offer_field = 16;
+     */
+    value: OfferField;
+    case: "offerField";
+  } | {
+    /**
+     * @generated from field: tendon.v1.UseField use_field = 17;
+     */
+    value: UseField;
+    case: "useField";
+  } | {
+    /**
+     * @generated from field: tendon.v1.DropField drop_field = 18;
+     */
+    value: DropField;
+    case: "dropField";
   } | { case: undefined; value?: undefined };
 };
 
@@ -988,7 +1407,7 @@ export type Control = Message<"tendon.v1.Control"> & {
  * Use `create(ControlSchema)` to create a new message.
  */
 export const ControlSchema: GenMessage<Control> = /*@__PURE__*/
-  messageDesc(file_tendon, 12);
+  messageDesc(file_tendon, 20);
 
 /**
  * Sets the number of states of a device that are sent to the client per second. Before the first request of this type,
@@ -1018,7 +1437,7 @@ export type SetStateRate = Message<"tendon.v1.SetStateRate"> & {
  * Use `create(SetStateRateSchema)` to create a new message.
  */
 export const SetStateRateSchema: GenMessage<SetStateRate> = /*@__PURE__*/
-  messageDesc(file_tendon, 13);
+  messageDesc(file_tendon, 21);
 
 /**
  * Suppresses states that can be predicted by the client. After a state with velocity v, the server sends the first
@@ -1060,7 +1479,7 @@ export type SetStateDeadband = Message<"tendon.v1.SetStateDeadband"> & {
  * Use `create(SetStateDeadbandSchema)` to create a new message.
  */
 export const SetStateDeadbandSchema: GenMessage<SetStateDeadband> = /*@__PURE__*/
-  messageDesc(file_tendon, 14);
+  messageDesc(file_tendon, 22);
 
 /**
  * Clears a latched fault and revokes a Disarm. Can only be used by controllers of the device. If the device has a
@@ -1082,7 +1501,7 @@ export type Rearm = Message<"tendon.v1.Rearm"> & {
  * Use `create(RearmSchema)` to create a new message.
  */
 export const RearmSchema: GenMessage<Rearm> = /*@__PURE__*/
-  messageDesc(file_tendon, 15);
+  messageDesc(file_tendon, 23);
 
 /**
  * Sets the force to zero without a ramp, from the next haptic step until a Rearm. Can be used by any controller of the
@@ -1107,7 +1526,7 @@ export type Disarm = Message<"tendon.v1.Disarm"> & {
  * Use `create(DisarmSchema)` to create a new message.
  */
 export const DisarmSchema: GenMessage<Disarm> = /*@__PURE__*/
-  messageDesc(file_tendon, 16);
+  messageDesc(file_tendon, 24);
 
 /**
  * Offers the sender's device as the other end of a coupling with this device, and describes that end. Can only be used
@@ -1276,7 +1695,7 @@ export type Couple = Message<"tendon.v1.Couple"> & {
  * Use `create(CoupleSchema)` to create a new message.
  */
 export const CoupleSchema: GenMessage<Couple> = /*@__PURE__*/
-  messageDesc(file_tendon, 17);
+  messageDesc(file_tendon, 25);
 
 /**
  * Describes how the displacement of the leader's handle sets the speed of the follower. A spring pulls the handle to
@@ -1314,7 +1733,7 @@ export type RateControl = Message<"tendon.v1.RateControl"> & {
  * Use `create(RateControlSchema)` to create a new message.
  */
 export const RateControlSchema: GenMessage<RateControl> = /*@__PURE__*/
-  messageDesc(file_tendon, 18);
+  messageDesc(file_tendon, 26);
 
 /**
  * Engages the coupling on the command of the operator. Can only be used by controllers of the leader's device, at its
@@ -1337,7 +1756,7 @@ export type Engage = Message<"tendon.v1.Engage"> & {
  * Use `create(EngageSchema)` to create a new message.
  */
 export const EngageSchema: GenMessage<Engage> = /*@__PURE__*/
-  messageDesc(file_tendon, 19);
+  messageDesc(file_tendon, 27);
 
 /**
  * Ends the engagement. Can be used at the server of either end, but only by controllers of its device.
@@ -1358,7 +1777,7 @@ export type Disengage = Message<"tendon.v1.Disengage"> & {
  * Use `create(DisengageSchema)` to create a new message.
  */
 export const DisengageSchema: GenMessage<Disengage> = /*@__PURE__*/
-  messageDesc(file_tendon, 20);
+  messageDesc(file_tendon, 28);
 
 /**
  * Sets the scales of the coupling. Can only be used by controllers of the leader's device, at its server. If the answer
@@ -1395,7 +1814,7 @@ export type SetScale = Message<"tendon.v1.SetScale"> & {
  * Use `create(SetScaleSchema)` to create a new message.
  */
 export const SetScaleSchema: GenMessage<SetScale> = /*@__PURE__*/
-  messageDesc(file_tendon, 21);
+  messageDesc(file_tendon, 29);
 
 /**
  * Sets the weight of the leader of one channel if a follower has several leaders. Can only be used by controllers of
@@ -1433,7 +1852,7 @@ export type SetShare = Message<"tendon.v1.SetShare"> & {
  * Use `create(SetShareSchema)` to create a new message.
  */
 export const SetShareSchema: GenMessage<SetShare> = /*@__PURE__*/
-  messageDesc(file_tendon, 22);
+  messageDesc(file_tendon, 30);
 
 /**
  * Sets a lamp of the device or starts a vibration pulse. Can only be used by a controller that holds one of the
@@ -1489,7 +1908,7 @@ export type SetOutput = Message<"tendon.v1.SetOutput"> & {
  * Use `create(SetOutputSchema)` to create a new message.
  */
 export const SetOutputSchema: GenMessage<SetOutput> = /*@__PURE__*/
-  messageDesc(file_tendon, 23);
+  messageDesc(file_tendon, 31);
 
 /**
  * A vibration pulse. It stops after its duration, or if it is replaced by a new pulse.
@@ -1528,7 +1947,7 @@ export type Vibration = Message<"tendon.v1.Vibration"> & {
  * Use `create(VibrationSchema)` to create a new message.
  */
 export const VibrationSchema: GenMessage<Vibration> = /*@__PURE__*/
-  messageDesc(file_tendon, 24);
+  messageDesc(file_tendon, 32);
 
 /**
  * Requests the DeviceDescription of a device, which does not need to be claimed.
@@ -1556,7 +1975,7 @@ export type Describe = Message<"tendon.v1.Describe"> & {
  * Use `create(DescribeSchema)` to create a new message.
  */
 export const DescribeSchema: GenMessage<Describe> = /*@__PURE__*/
-  messageDesc(file_tendon, 25);
+  messageDesc(file_tendon, 33);
 
 /**
  * Requests the lease of a channel. Can only be used by a client that has claimed the channel as a controller. If the
@@ -1586,7 +2005,7 @@ export type TakeLease = Message<"tendon.v1.TakeLease"> & {
  * Use `create(TakeLeaseSchema)` to create a new message.
  */
 export const TakeLeaseSchema: GenMessage<TakeLease> = /*@__PURE__*/
-  messageDesc(file_tendon, 26);
+  messageDesc(file_tendon, 34);
 
 /**
  * Releases the lease of a channel.
@@ -1614,7 +2033,7 @@ export type GiveLease = Message<"tendon.v1.GiveLease"> & {
  * Use `create(GiveLeaseSchema)` to create a new message.
  */
 export const GiveLeaseSchema: GenMessage<GiveLease> = /*@__PURE__*/
-  messageDesc(file_tendon, 27);
+  messageDesc(file_tendon, 35);
 
 /**
  * Notifies a client with the feature "channels" that the lease of the channel was taken by another client.
@@ -1649,7 +2068,7 @@ export type LeaseLost = Message<"tendon.v1.LeaseLost"> & {
  * Use `create(LeaseLostSchema)` to create a new message.
  */
 export const LeaseLostSchema: GenMessage<LeaseLost> = /*@__PURE__*/
-  messageDesc(file_tendon, 28);
+  messageDesc(file_tendon, 36);
 
 /**
  * The answer to a Control.
@@ -1706,7 +2125,7 @@ export type ControlAck = Message<"tendon.v1.ControlAck"> & {
  * Use `create(ControlAckSchema)` to create a new message.
  */
 export const ControlAckSchema: GenMessage<ControlAck> = /*@__PURE__*/
-  messageDesc(file_tendon, 29);
+  messageDesc(file_tendon, 37);
 
 /**
  * The properties of a device.
@@ -1817,7 +2236,7 @@ export type DeviceDescription = Message<"tendon.v1.DeviceDescription"> & {
  * Use `create(DeviceDescriptionSchema)` to create a new message.
  */
 export const DeviceDescriptionSchema: GenMessage<DeviceDescription> = /*@__PURE__*/
-  messageDesc(file_tendon, 30);
+  messageDesc(file_tendon, 38);
 
 /**
  * The properties of the handle of a device. Requires the feature "handle".
@@ -1920,7 +2339,7 @@ export type HandleDescription = Message<"tendon.v1.HandleDescription"> & {
  * Use `create(HandleDescriptionSchema)` to create a new message.
  */
 export const HandleDescriptionSchema: GenMessage<HandleDescription> = /*@__PURE__*/
-  messageDesc(file_tendon, 31);
+  messageDesc(file_tendon, 39);
 
 /**
  * An output of a device, in addition to its forces.
@@ -1946,7 +2365,7 @@ export type OutputDescription = Message<"tendon.v1.OutputDescription"> & {
  * Use `create(OutputDescriptionSchema)` to create a new message.
  */
 export const OutputDescriptionSchema: GenMessage<OutputDescription> = /*@__PURE__*/
-  messageDesc(file_tendon, 32);
+  messageDesc(file_tendon, 40);
 
 /**
  * The properties of a channel.
@@ -1991,7 +2410,7 @@ export type ChannelDescription = Message<"tendon.v1.ChannelDescription"> & {
  * Use `create(ChannelDescriptionSchema)` to create a new message.
  */
 export const ChannelDescriptionSchema: GenMessage<ChannelDescription> = /*@__PURE__*/
-  messageDesc(file_tendon, 33);
+  messageDesc(file_tendon, 41);
 
 /**
  * The end of the session.
@@ -2019,7 +2438,7 @@ export type Bye = Message<"tendon.v1.Bye"> & {
  * Use `create(ByeSchema)` to create a new message.
  */
 export const ByeSchema: GenMessage<Bye> = /*@__PURE__*/
-  messageDesc(file_tendon, 34);
+  messageDesc(file_tendon, 42);
 
 /**
  * Statistics of the forces and datagrams of a client, which show why forces were late and how the network performed.
@@ -2213,7 +2632,7 @@ export type LinkReport = Message<"tendon.v1.LinkReport"> & {
  * Use `create(LinkReportSchema)` to create a new message.
  */
 export const LinkReportSchema: GenMessage<LinkReport> = /*@__PURE__*/
-  messageDesc(file_tendon, 35);
+  messageDesc(file_tendon, 43);
 
 /**
  * Two quantiles of a delay. The delay can be negative if two clocks are compared.
@@ -2241,7 +2660,7 @@ export type Delays = Message<"tendon.v1.Delays"> & {
  * Use `create(DelaysSchema)` to create a new message.
  */
 export const DelaysSchema: GenMessage<Delays> = /*@__PURE__*/
-  messageDesc(file_tendon, 36);
+  messageDesc(file_tendon, 44);
 
 /**
  * The state of one end of a coupling, which is sent to the other end. Vectors use the base frame and the scale of the
@@ -2474,7 +2893,7 @@ export type PortState = Message<"tendon.v1.PortState"> & {
  * Use `create(PortStateSchema)` to create a new message.
  */
 export const PortStateSchema: GenMessage<PortState> = /*@__PURE__*/
-  messageDesc(file_tendon, 37);
+  messageDesc(file_tendon, 45);
 
 /**
  * The rotation of a handle since its offset was set.
@@ -2509,7 +2928,7 @@ export type PortTurn = Message<"tendon.v1.PortTurn"> & {
  * Use `create(PortTurnSchema)` to create a new message.
  */
 export const PortTurnSchema: GenMessage<PortTurn> = /*@__PURE__*/
-  messageDesc(file_tendon, 38);
+  messageDesc(file_tendon, 46);
 
 /**
  * The state of a gripper, measured at its fingers. The gripper has a separate energy account.
@@ -2574,7 +2993,7 @@ export type PortGrip = Message<"tendon.v1.PortGrip"> & {
  * Use `create(PortGripSchema)` to create a new message.
  */
 export const PortGripSchema: GenMessage<PortGrip> = /*@__PURE__*/
-  messageDesc(file_tendon, 39);
+  messageDesc(file_tendon, 47);
 
 /**
  * A flat elastic surface that is or was touched by the tool of the sender. It can push but not pull.
@@ -2609,7 +3028,7 @@ export type PortSurface = Message<"tendon.v1.PortSurface"> & {
  * Use `create(PortSurfaceSchema)` to create a new message.
  */
 export const PortSurfaceSchema: GenMessage<PortSurface> = /*@__PURE__*/
-  messageDesc(file_tendon, 40);
+  messageDesc(file_tendon, 48);
 
 /**
  * Statistics of the loop of a device. All counts are for the reported interval.
@@ -2714,7 +3133,7 @@ export type DeviceReport = Message<"tendon.v1.DeviceReport"> & {
  * Use `create(DeviceReportSchema)` to create a new message.
  */
 export const DeviceReportSchema: GenMessage<DeviceReport> = /*@__PURE__*/
-  messageDesc(file_tendon, 41);
+  messageDesc(file_tendon, 49);
 
 /**
  * Statistics of the engine that holds the lease of a channel.
@@ -2791,7 +3210,7 @@ export type PeerReport = Message<"tendon.v1.PeerReport"> & {
  * Use `create(PeerReportSchema)` to create a new message.
  */
 export const PeerReportSchema: GenMessage<PeerReport> = /*@__PURE__*/
-  messageDesc(file_tendon, 42);
+  messageDesc(file_tendon, 50);
 
 /**
  * The first message of a client.
@@ -2865,7 +3284,7 @@ export type Hello = Message<"tendon.v1.Hello"> & {
  * Use `create(HelloSchema)` to create a new message.
  */
 export const HelloSchema: GenMessage<Hello> = /*@__PURE__*/
-  messageDesc(file_tendon, 43);
+  messageDesc(file_tendon, 51);
 
 /**
  * Claims a device or a channel.
@@ -2898,7 +3317,7 @@ export type Claim = Message<"tendon.v1.Claim"> & {
  * Use `create(ClaimSchema)` to create a new message.
  */
 export const ClaimSchema: GenMessage<Claim> = /*@__PURE__*/
-  messageDesc(file_tendon, 44);
+  messageDesc(file_tendon, 52);
 
 /**
  * The server's answer to a Hello.
@@ -2929,7 +3348,7 @@ export type Answer = Message<"tendon.v1.Answer"> & {
  * Use `create(AnswerSchema)` to create a new message.
  */
 export const AnswerSchema: GenMessage<Answer> = /*@__PURE__*/
-  messageDesc(file_tendon, 45);
+  messageDesc(file_tendon, 53);
 
 /**
  * The server accepts the client.
@@ -3018,7 +3437,7 @@ export type Welcome = Message<"tendon.v1.Welcome"> & {
  * Use `create(WelcomeSchema)` to create a new message.
  */
 export const WelcomeSchema: GenMessage<Welcome> = /*@__PURE__*/
-  messageDesc(file_tendon, 46);
+  messageDesc(file_tendon, 54);
 
 /**
  * The numbers of a device and a channel that were claimed using their names.
@@ -3054,7 +3473,7 @@ export type Grant = Message<"tendon.v1.Grant"> & {
  * Use `create(GrantSchema)` to create a new message.
  */
 export const GrantSchema: GenMessage<Grant> = /*@__PURE__*/
-  messageDesc(file_tendon, 47);
+  messageDesc(file_tendon, 55);
 
 /**
  * The server refuses the client.
@@ -3096,7 +3515,7 @@ export type Refused = Message<"tendon.v1.Refused"> & {
  * Use `create(RefusedSchema)` to create a new message.
  */
 export const RefusedSchema: GenMessage<Refused> = /*@__PURE__*/
-  messageDesc(file_tendon, 48);
+  messageDesc(file_tendon, 56);
 
 /**
  * How the device renders the remote force.
@@ -3161,6 +3580,41 @@ export const ModeSchema: GenEnum<Mode> = /*@__PURE__*/
   enumDesc(file_tendon, 0);
 
 /**
+ * The shape that a fixture pulls to.
+ *
+ * @generated from enum tendon.v1.FieldFixtureKind
+ */
+export enum FieldFixtureKind {
+  /**
+   * refused
+   *
+   * @generated from enum value: FIELD_FIXTURE_KIND_UNSPECIFIED = 0;
+   */
+  UNSPECIFIED = 0,
+
+  /**
+   * @generated from enum value: FIELD_FIXTURE_KIND_POINT = 1;
+   */
+  POINT = 1,
+
+  /**
+   * @generated from enum value: FIELD_FIXTURE_KIND_LINE = 2;
+   */
+  LINE = 2,
+
+  /**
+   * @generated from enum value: FIELD_FIXTURE_KIND_PLANE = 3;
+   */
+  PLANE = 3,
+}
+
+/**
+ * Describes the enum tendon.v1.FieldFixtureKind.
+ */
+export const FieldFixtureKindSchema: GenEnum<FieldFixtureKind> = /*@__PURE__*/
+  enumDesc(file_tendon, 1);
+
+/**
  * The role of an end in a coupling.
  *
  * @generated from enum tendon.v1.PortRole
@@ -3188,7 +3642,7 @@ export enum PortRole {
  * Describes the enum tendon.v1.PortRole.
  */
 export const PortRoleSchema: GenEnum<PortRole> = /*@__PURE__*/
-  enumDesc(file_tendon, 1);
+  enumDesc(file_tendon, 2);
 
 /**
  * How two handles are coupled.
@@ -3258,7 +3712,7 @@ export enum CouplingMethod {
  * Describes the enum tendon.v1.CouplingMethod.
  */
 export const CouplingMethodSchema: GenEnum<CouplingMethod> = /*@__PURE__*/
-  enumDesc(file_tendon, 2);
+  enumDesc(file_tendon, 3);
 
 /**
  * The kind of an output.
@@ -3290,7 +3744,7 @@ export enum OutputKind {
  * Describes the enum tendon.v1.OutputKind.
  */
 export const OutputKindSchema: GenEnum<OutputKind> = /*@__PURE__*/
-  enumDesc(file_tendon, 3);
+  enumDesc(file_tendon, 4);
 
 /**
  * The hand that is used for holding a device.
@@ -3318,7 +3772,7 @@ export enum Hand {
  * Describes the enum tendon.v1.Hand.
  */
 export const HandSchema: GenEnum<Hand> = /*@__PURE__*/
-  enumDesc(file_tendon, 4);
+  enumDesc(file_tendon, 5);
 
 /**
  * Describes how the forces of the channels of a device are combined. The result is the sum of the forces of all sum
@@ -3353,7 +3807,7 @@ export enum ChannelRule {
  * Describes the enum tendon.v1.ChannelRule.
  */
 export const ChannelRuleSchema: GenEnum<ChannelRule> = /*@__PURE__*/
-  enumDesc(file_tendon, 5);
+  enumDesc(file_tendon, 6);
 
 /**
  * The phase of an end of a coupling.
@@ -3422,7 +3876,7 @@ export enum PortPhase {
  * Describes the enum tendon.v1.PortPhase.
  */
 export const PortPhaseSchema: GenEnum<PortPhase> = /*@__PURE__*/
-  enumDesc(file_tendon, 6);
+  enumDesc(file_tendon, 7);
 
 /**
  * The state of a device and its safety layer.
@@ -3498,7 +3952,7 @@ export enum Safety {
  * Describes the enum tendon.v1.Safety.
  */
 export const SafetySchema: GenEnum<Safety> = /*@__PURE__*/
-  enumDesc(file_tendon, 7);
+  enumDesc(file_tendon, 8);
 
 /**
  * Explains why a request was refused or a session was closed.
@@ -3579,7 +4033,7 @@ export enum Code {
  * Describes the enum tendon.v1.Code.
  */
 export const CodeSchema: GenEnum<Code> = /*@__PURE__*/
-  enumDesc(file_tendon, 8);
+  enumDesc(file_tendon, 9);
 
 /**
  * The role of a client. Observers receive states, and controllers also send forces.
@@ -3613,5 +4067,5 @@ export enum Role {
  * Describes the enum tendon.v1.Role.
  */
 export const RoleSchema: GenEnum<Role> = /*@__PURE__*/
-  enumDesc(file_tendon, 9);
+  enumDesc(file_tendon, 10);
 
