@@ -459,8 +459,9 @@ class _Codec:
             texts = f"clip(text, {field.bound.bytes.most}) for text in {value}[:{most}]"
             self._lines.append(f"{indent}{target}.extend({texts})")
         elif field.kind == "message":
-            self._lines.append(f"{indent}for entry in {value}[:{most}]:")
-            self._lines.append(f"{indent}    write_{snake(field.type)}({target}.add(), entry)")
+            entry = field.name.removesuffix("s")
+            self._lines.append(f"{indent}for {entry} in {value}[:{most}]:")
+            self._lines.append(f"{indent}    write_{snake(field.type)}({target}.add(), {entry})")
         else:
             self._lines.append(f"{indent}{target}.extend({value})")
 

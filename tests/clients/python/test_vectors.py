@@ -3,6 +3,7 @@
 
 import hmac
 import json
+import re
 from dataclasses import replace
 
 import pytest
@@ -219,10 +220,12 @@ def test_a_request_out_of_bounds_names_its_field_and_an_answer_is_refused():
     assert {field.partition(".")[0] for field in controls} == {
         *("SetStateRate", "Rearm", "Describe", "TakeLease", "GiveLease", "SetStateDeadband", "Disarm", "SetOutput"),
         *("Couple", "Engage", "Disengage", "SetScale", "SetShare", "LeaseLost"),
+        *("OfferField", "UseField", "FieldMaterial", "FieldFixture", "DropField"),
     }
     for field, found in controls.items():
-        name = field.partition(".")[2]
-        expected = "rotation" if name.startswith("rotation") else name
+        message, _, name = field.partition(".")
+        inside = {"FieldMaterial": "materials.", "FieldFixture": "fixtures."}.get(message, "")
+        expected = "rotation" if name.startswith("rotation") else inside + re.sub(r"\.[xyz]$", "", name)
         assert {(control.request, control.invalid) for control in found} == {(None, expected)}, field
     answers = {field: found for field, found in frames.items() if field not in controls}
     assert {field.partition(".")[0] for field in answers} == {"ControlAck", "ChannelDescription", "OutputDescription"}

@@ -489,10 +489,10 @@ def write_use_field(m: pb.UseField, value: UseField) -> None:
     m.channel = value.channel
     m.generation = value.generation
     m.field = value.field[:32]
-    for entry in value.materials[:16]:
-        write_field_material(m.materials.add(), entry)
-    for entry in value.fixtures[:4]:
-        write_field_fixture(m.fixtures.add(), entry)
+    for material in value.materials[:16]:
+        write_field_material(m.materials.add(), material)
+    for fixture in value.fixtures[:4]:
+        write_field_fixture(m.fixtures.add(), fixture)
 
 
 def read_drop_field(m: pb.DropField) -> DropField:
@@ -1006,8 +1006,8 @@ def write_device_description(m: pb.DeviceDescription, value: DeviceDescription) 
     m.max_stiffness_npm = value.max_stiffness
     m.position_resolution_m = value.position_resolution
     m.loop_hz = value.loop_hz
-    for entry in value.channels[:8]:
-        write_channel_description(m.channels.add(), entry)
+    for channel in value.channels[:8]:
+        write_channel_description(m.channels.add(), channel)
 
 
 def read_output_description(m: pb.OutputDescription) -> OutputDescription:
@@ -1078,8 +1078,8 @@ def write_handle_description(m: pb.HandleDescription, value: HandleDescription) 
         m.group = clip(value.group, 24)
     m.hand = value.hand  # type: ignore[assignment]
     m.joints.extend(clip(text, 24) for text in value.joints[:8])
-    for entry in value.outputs[:8]:
-        write_output_description(m.outputs.add(), entry)
+    for output in value.outputs[:8]:
+        write_output_description(m.outputs.add(), output)
 
 
 def read_control_ack(m: pb.ControlAck) -> ControlAck:
@@ -1571,8 +1571,8 @@ def write_hello(m: pb.Hello, value: Hello) -> None:
         m.version_min = value.version_min
     if value.version_max:
         m.version_max = value.version_max
-    for entry in value.claims[:16]:
-        write_claim(m.claims.add(), entry)
+    for claim in value.claims[:16]:
+        write_claim(m.claims.add(), claim)
     m.ways.extend(clip(text, 24) for text in value.ways[:8])
 
 
@@ -1644,8 +1644,8 @@ def write_welcome(m: pb.Welcome, value: Welcome) -> None:
     m.loop_hz = value.loop_hz
     m.timeout_ms = value.timeout_ms
     m.server = clip(value.server, 64)
-    for entry in value.grants[:16]:
-        write_grant(m.grants.add(), entry)
+    for grant in value.grants[:16]:
+        write_grant(m.grants.add(), grant)
 
 
 def read_refused(m: pb.Refused) -> Refused:

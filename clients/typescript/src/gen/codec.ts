@@ -491,8 +491,8 @@ export const readFieldPose = (m: pb.FieldPose): FieldPose => ({
   timeNs: m.timeNs,
   position: readVec3(m.positionM),
   orientation: readQuat(m.orientation),
-  ...(m.velocityMps && { velocity: readVec3(m.velocityMps) }),
-  ...(m.angularVelocityRadps && { angularVelocity: readVec3(m.angularVelocityRadps) }),
+  velocity: readVec3(m.velocityMps),
+  angularVelocity: readVec3(m.angularVelocityRadps),
 });
 
 export const writeFieldPose = (value: FieldPose): pb.FieldPose =>

@@ -348,9 +348,9 @@ export interface FieldPose {
   /** The rotation from the frame of the object to the base frame */
   readonly orientation: Quat;
   /** m/s, of the origin of the object */
-  readonly velocity?: Vec3 | undefined;
+  readonly velocity: Vec3;
   /** rad/s, the angular velocity in the axes of the base frame */
-  readonly angularVelocity?: Vec3 | undefined;
+  readonly angularVelocity: Vec3;
 }
 
 /**
