@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/base/expect.h"
+#include "protocol/field/newest_brick.h"
 #include "protocol/limits.h"
 #include "protocol/reliable/replay_window.h"
 #include "protocol/reliable/requests.h"
@@ -126,20 +127,6 @@ class Newest {
   std::size_t waiting_ = 0;
 };
 
-/// The newest brick. Memory is only allocated for the first one.
-struct NewestBrick {
-  bool waiting = false;
-  decltype(FieldBrick::hash) hash{};
-  std::vector<std::byte> weights;
-
-  void put(const FieldBrick& brick) {
-    waiting = true;
-    hash = brick.hash;
-    weights.assign(brick.weights.begin(), brick.weights.end());
-  }
-  FieldBrick value() const noexcept { return {.hash = hash, .weights = weights}; }
-};
-
 template <class... Newests>
 struct Streams : Newests... {
   bool empty() const noexcept { return (Newests::empty() && ...); }
@@ -155,6 +142,16 @@ template <class Value, class Told>
 Newest<Value, Told>& of(Newest<Value, Told>& streams) noexcept {
   return streams;
 }
+
+/// The frames of the feature "fields". Other sessions do not pay for them.
+struct FieldFrames {
+  Streams<Newest<FieldPose>, Newest<FieldStatus>> to_send;
+  NewestBrick brick_to_send;
+  Streams<Newest<FieldPose, Session::FieldPoseArrived>, Newest<FieldStatus, Session::FieldStatusArrived>> arrived;
+  NewestBrick brick;  ///< that has arrived
+
+  bool anything_to_send() const noexcept { return !to_send.empty() || brick_to_send.waiting; }
+};
 
 }  // namespace
 
@@ -183,9 +180,8 @@ struct Session::State {
   std::uint64_t next_packet = 0;
   std::optional<LocalTime> last_sent;
   Streams<Newest<DeviceState>, Newest<ForceCommand>, Newest<PortFrame>, Newest<LinkReport>, Newest<DeviceReport>,
-          Newest<PeerReport>, Newest<FieldPose>, Newest<FieldStatus>>
+          Newest<PeerReport>>
       to_send;
-  NewestBrick brick_to_send;
   OutgoingRequests asked;
   Bye bye;
   int byes_left = 0;
@@ -204,10 +200,9 @@ struct Session::State {
   // Pending events, in the order of next_event().
   Streams<Newest<ForceCommand, ForceArrived>, Newest<PortFrame, PortArrived>, Newest<LinkReport, ReportArrived>,
           Newest<DeviceReport, DeviceReportArrived>, Newest<PeerReport, PeerReportArrived>,
-          Newest<DeviceState, StateArrived>, Newest<FieldPose, FieldPoseArrived>,
-          Newest<FieldStatus, FieldStatusArrived>>
+          Newest<DeviceState, StateArrived>>
       arrived;
-  NewestBrick brick;  ///< that has arrived
+  std::unique_ptr<FieldFrames> fields;  ///< null until the first frame for fields
   std::optional<Closed> closed;
   bool untold = false;  ///< some event may be pending
   Event rare;           ///< other events returned by next_event()
@@ -229,10 +224,17 @@ struct Session::State {
   void take(const Control& control, bool /*newest*/) { stats.invalid += news().answering.take(control) ? 0 : 1; }
   void take(const ControlAck& ack, bool /*newest*/) { stats.invalid += news().asked.acknowledge(ack) ? 0 : 1; }
   void take(const Bye& said, bool newest);
-  void take(const FieldBrick& arrived_brick, bool /*newest*/) { brick.put(arrived_brick); }
+  void take(const FieldBrick& brick, bool /*newest*/) { of_fields().brick.put(brick); }
   void take(const FieldStatus& status, bool newest) {
-    if (newest) return of<FieldStatus>(arrived).put(status);
+    if (newest) return of<FieldStatus>(of_fields().arrived).put(status);
     ++stats.stale;
+  }
+  void take(const FieldPose& pose, bool /*newest*/) {
+    stats.stale += of<FieldPose>(of_fields().arrived).put_if_newer(pose) ? 0 : 1;
+  }
+  FieldFrames& of_fields() {
+    if (!fields) fields = std::make_unique<FieldFrames>();
+    return *fields;
   }
 
   bool silent_too_long(LocalTime now) const noexcept { return !last_sent || now - *last_sent >= config.keep_alive; }
@@ -243,7 +245,7 @@ struct Session::State {
   }
   bool something_to_say(LocalTime now) noexcept {
     if (now < silent_until) return false;
-    if (!to_send.empty() || brick_to_send.waiting || answering.next_due() || asked.next_due(now) ||
+    if (!to_send.empty() || (fields && fields->anything_to_send()) || answering.next_due() || asked.next_due(now) ||
         silent_too_long(now))
       return true;
     silent_until = std::min(*last_sent + config.keep_alive, asked.next_due_time());
@@ -263,8 +265,11 @@ struct Session::State {
   Header begin(LocalTime now, std::span<std::byte, kMaxDatagram> buffer);
   std::size_t sent(LocalTime now, const Header& header, std::span<std::byte, kMaxDatagram> buffer) noexcept;
   void fill(LocalTime now);
+  template <class Value>
+  void fill_from(Newest<Value>& waiting);
   template <class... Value>
   void fill_with();
+  void fill_with_fields();
   void fill_columns();
 };
 
@@ -395,11 +400,12 @@ void Session::send(const LinkReport& report) { state_->send(report); }
 void Session::send(const DeviceReport& report) { state_->send(report); }
 void Session::send(const PeerReport& report) { state_->send(report); }
 void Session::send(const PortFrame& port) { state_->send(port); }
-void Session::send(const FieldStatus& status) { state_->send(status); }
-void Session::send(const FieldPose& pose) { state_->send(pose); }
+void Session::send(const FieldStatus& status) { of<FieldStatus>(state_->news().of_fields().to_send).put(status); }
+void Session::send(const FieldPose& pose) { of<FieldPose>(state_->news().of_fields().to_send).put(pose); }
 bool Session::send(const FieldBrick& brick) {
-  if (state_->brick_to_send.waiting) return false;
-  state_->news().brick_to_send.put(brick);
+  NewestBrick& mine = state_->news().of_fields().brick_to_send;
+  if (mine.waiting) return false;
+  mine.put(brick);
   return true;
 }
 
@@ -482,19 +488,21 @@ void Session::State::fill_columns() {
   }
 }
 
+template <class Value>
+void Session::State::fill_from(Newest<Value>& waiting) {
+  while (waiting.first() && writer.add(*waiting.first())) waiting.take();
+}
+
 template <class... Value>
 void Session::State::fill_with() {
-  const auto add = [this](auto& waiting) {
-    while (waiting.first() && writer.add(*waiting.first())) waiting.take();
-  };
-  (add(of<Value>(to_send)), ...);
+  (fill_from(of<Value>(to_send)), ...);
 }
 
 /// Adds as much as possible, most urgent first, and the rest to the next datagram. A state fits in any case,
 /// and so does a force with a pose.
 void Session::State::fill(LocalTime now) {
   if (config.states_in_columns) fill_columns();
-  fill_with<DeviceState, PortFrame, ForceCommand, FieldPose>();
+  fill_with<DeviceState, PortFrame, ForceCommand>();
   for (const ControlAck* ack = answering.next_due(); ack && writer.add(*ack); ack = answering.next_due()) {
     answering.sent(ack->id);
   }
@@ -502,8 +510,15 @@ void Session::State::fill(LocalTime now) {
   for (const Control* due = asked.next_due(now); due && writer.add(*due); due = asked.next_due(now)) {
     asked.sent(due->id, now, timeout);
   }
-  fill_with<LinkReport, DeviceReport, PeerReport, FieldStatus>();
-  if (brick_to_send.waiting && writer.add(brick_to_send.value())) brick_to_send.waiting = false;
+  fill_with<LinkReport, DeviceReport, PeerReport>();
+  if (fields) fill_with_fields();
+}
+
+void Session::State::fill_with_fields() {
+  fill_from(of<FieldPose>(fields->to_send));
+  fill_from(of<FieldStatus>(fields->to_send));
+  NewestBrick& brick = fields->brick_to_send;
+  if (brick.waiting && writer.add(brick.value())) brick.waiting = false;
 }
 
 std::size_t Session::next_datagram(LocalTime now, std::span<std::byte, kMaxDatagram> buffer) {
@@ -553,7 +568,10 @@ const Session::Event* Session::State::tell() {
                                 .handle = std::move(ack.handle)});
   }
   if (const Event* const event = arrived.take()) return event;
-  if (std::exchange(brick.waiting, false)) return keep(BrickArrived{brick.value()});
+  if (fields) {
+    if (const Event* const event = fields->arrived.take()) return event;
+    if (std::exchange(fields->brick.waiting, false)) return keep(BrickArrived{fields->brick.value()});
+  }
   if (closed) return keep(*std::exchange(closed, std::nullopt));
   return nullptr;
 }

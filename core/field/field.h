@@ -17,8 +17,8 @@ namespace tendon::field {
 /// Must be built outside the haptic thread.
 struct Field {
   static constexpr std::size_t kMostPrimitives = 32;
-  static constexpr std::size_t kMostMaterials = 32;
-  static constexpr std::size_t kMostFixtures = 16;
+  static constexpr std::size_t kMostMaterials = 16;
+  static constexpr std::size_t kMostFixtures = 4;
   static constexpr double kPrimitiveSpacing = 1e-3;  ///< m, the spacing of a field without bricks
 
   const BrickField* bricks = nullptr;  ///< may be null; not owned. An unknown material of a brick is material 0

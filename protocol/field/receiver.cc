@@ -79,9 +79,9 @@ std::optional<FieldRefusal> FieldReceiver::refuse_part(const OfferField& part) c
   const auto refuse = [&](const char* name, std::size_t value, const std::string& expected) {
     return refuse_field(part.field, Code::kInvalid, number_of(name, value, expected));
   };
-  constexpr std::size_t kLeast = FieldManifest::kHead + FieldManifest::kEntry;
-  if (part.size < kLeast || part.size > FieldManifest::kMost) {
-    return refuse("size", part.size, std::to_string(kLeast) + " … " + std::to_string(FieldManifest::kMost) + " bytes");
+  if (part.size < FieldManifest::kLeast || part.size > FieldManifest::kMost) {
+    return refuse("size", part.size,
+                  std::to_string(FieldManifest::kLeast) + " … " + std::to_string(FieldManifest::kMost) + " bytes");
   }
   if (part.offset >= part.size) return refuse("offset", part.offset, "below " + std::to_string(part.size));
   const std::size_t most = std::min<std::size_t>(limits::kMaxFieldPart, part.size - part.offset);
@@ -104,10 +104,9 @@ std::optional<FieldRefusal> FieldReceiver::refuse_head(const Offer& offer) const
   if (const std::string why = manifest.refused_head(); !why.empty()) {
     return refuse_field(offer.field, Code::kInvalid, why);
   }
-  const std::size_t expected = FieldManifest::kHead + manifest.bricks() * FieldManifest::kEntry;
-  if (offer.size != expected) {
+  if (offer.size != manifest.size()) {
     return refuse_field(offer.field, Code::kInvalid,
-                        number_of("size", offer.size, std::to_string(expected) + " bytes"));
+                        number_of("size", offer.size, std::to_string(manifest.size()) + " bytes"));
   }
   std::size_t bricks = 0;
   for (const Offer& one : offers_) bricks += one.open ? one.manifest().bricks() : 0;

@@ -14,7 +14,8 @@ constexpr Duration kJitterOfStatus = std::chrono::milliseconds(10);
 
 }  // namespace
 
-FieldSender::FieldSender(const Config& config, const FieldLattice& lattice, std::span<const Brick> bricks)
+FieldSender::FieldSender(const Config& config, const FieldLattice& lattice, std::span<const Brick> bricks,
+                         std::span<const field::Primitive> primitives)
     : config_(config), bricks_(bricks), sent_at_(bricks.size(), kNever), pace_(config.bytes_per_s, config.burst) {
   expect_above_zero(seconds(config.silence), "silence_s");
   std::vector<PlacedBrick> placed;
@@ -22,7 +23,7 @@ FieldSender::FieldSender(const Config& config, const FieldLattice& lattice, std:
   for (const Brick& one : bricks) {
     placed.push_back({.place = one.place, .material = one.material, .hash = crypto::blake2b_128(one.bytes)});
   }
-  manifest_ = encode_manifest(lattice, placed);
+  manifest_ = encode_manifest(lattice, placed, primitives);
   field_ = crypto::blake2b_256(manifest_);
 }
 

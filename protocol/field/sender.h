@@ -31,9 +31,10 @@ class FieldSender {
     Duration silence = std::chrono::seconds(2);
   };
 
-  /// `bricks` must remain valid. Throws std::invalid_argument as encode_manifest(), or if a number of `config` is not
+  /// `bricks` must remain valid; there can be none if there is a primitive. Throws std::invalid_argument as encode_manifest(), or if a number of `config` is not
   /// positive.
-  FieldSender(const Config& config, const FieldLattice& lattice, std::span<const Brick> bricks);
+  FieldSender(const Config& config, const FieldLattice& lattice, std::span<const Brick> bricks,
+              std::span<const field::Primitive> primitives = {});
 
   const FieldName& field() const noexcept { return field_; }
   std::span<const std::byte> manifest() const noexcept { return manifest_; }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <array>
+#include <cmath>
 #include <set>
 #include <vector>
 
@@ -41,7 +42,10 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
                                                 FieldReceiver({.owner = 1, .offers = 2}, store)};
   const std::array bricks = {bricks_of(0), bricks_of(2)};  // brick 2 is in both fields
   const FieldLattice lattice{.bricks = {3, 1, 1}};
-  std::array<FieldSender, kOwners> clients = {FieldSender({}, lattice, bricks[0]), FieldSender({}, lattice, bricks[1])};
+  const std::array<field::Primitive, 2> shapes = {field::Primitive{.shape = field::Sphere{.radius = 0.01}},
+                                                  field::Primitive{.shape = field::Plane{}, .hollow = true}};
+  std::array<FieldSender, kOwners> clients = {FieldSender({}, lattice, bricks[0]),
+                                              FieldSender({}, lattice, bricks[1], shapes)};
   std::array<std::set<BrickHash>, kOwners> uploaded;
   const LocalTime start = now;
 
@@ -134,6 +138,10 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         fuzz::require(manifest->refused().empty());
         for (std::size_t i = 0; i < manifest->bricks(); ++i) {
           fuzz::require(uploaded[owner].contains(manifest->brick(i).hash));
+        }
+        for (std::size_t i = 0; i < manifest->primitives(); ++i) {
+          const field::SurfacePoint point = distance(manifest->primitive(i), Vec3(0.01, 0.02, 0.03));
+          fuzz::require(std::isfinite(point.distance) && point.gradient.allFinite());
         }
       }
     }

@@ -416,11 +416,12 @@ inline const BrickBytes& brick_weights() {
   return weights;
 }
 inline FieldBrick field_brick() { return {.hash = crypto::blake2b_128(brick_weights()), .weights = brick_weights()}; }
-/// A field of one brick.
+/// A field of one brick and a sphere.
 inline Bytes manifest() {
   const PlacedBrick brick{.place = {1, 0, 2}, .material = 1, .hash = field_brick().hash};
+  const field::Primitive ball{.shape = field::Sphere{.centre = {0.01, 0, -0.02}, .radius = 0.0125}};
   return encode_manifest({.origin = {-0.016, 0, 0.125}, .spacing = 0.002, .scale = 1e-6, .bricks = {2, 1, 3}},
-                         std::span(&brick, 1));
+                         std::span(&brick, 1), std::span(&ball, 1));
 }
 inline FieldName field_name() { return crypto::blake2b_256(manifest()); }
 inline OfferField offer_field() {

@@ -67,11 +67,23 @@ const std::vector<FieldSender::Brick>& bricks() {
 }
 BrickHash hash_of(std::size_t i) { return crypto::blake2b_128(bricks()[i].bytes); }
 
-Bytes manifest_of(std::span<const FieldSender::Brick> of) {
-  const FieldSender sender({}, lattice_of_1024(), of);
+using Primitives = std::vector<field::Primitive>;
+const field::Primitive kFloor{.shape = field::Plane{.at = {0.01, 0.02, 0.03}}, .material = 1};
+const field::Primitive kBall{.shape = field::Sphere{.centre = {0.01, 0.02, 0.03}, .radius = 0.04}, .hollow = true};
+const field::Primitive kRod{
+    .shape = field::Capsule{.from = {0.01, 0.02, 0.03}, .to = {0.04, 0.05, 0.06}, .radius = 0.07}, .material = 15};
+const field::Primitive kBox{.shape = field::Box{.centre = {0.01, -0.02, 0.03},
+                                                .half = {0.05, 0.03, 0.01},
+                                                .rounding = 0.005,
+                                                .turn = {.w = 1, .x = 0, .y = 0, .z = 0}},
+                            .material = 2};
+
+Bytes manifest_of(std::span<const FieldSender::Brick> of, const Primitives& primitives = {}) {
+  const FieldSender sender({}, lattice_of_1024(), of, primitives);
   return {sender.manifest().begin(), sender.manifest().end()};
 }
-Bytes good() { return manifest_of(bricks()); }
+/// 210 bytes: the head, three bricks, and a primitive.
+Bytes good() { return manifest_of(bricks(), {kBox}); }
 
 template <class Number>
 Bytes with(std::size_t at, Number number) {
@@ -87,6 +99,7 @@ constexpr std::size_t kScale = 32;
 constexpr std::size_t kLattice = 40;
 constexpr std::size_t kCount = 46;
 constexpr std::size_t kFirst = FieldManifest::kHead;
+constexpr std::size_t kPrimitive = kFirst + 3 * FieldManifest::kEntry;
 
 struct Case {
   const char* said;  ///< part of the refusal
@@ -96,35 +109,41 @@ struct Case {
 const std::vector<Case>& cases() {
   const auto offered = [](const Bytes& manifest) { return [manifest](Server& s) { return s.offer(manifest); }; };
   const auto number = [offered](std::size_t at, auto value) { return offered(with(at, value)); };
+  const auto primitive = [offered](const field::Primitive& one, std::size_t number, double value) {
+    Bytes manifest = manifest_of(bricks(), {one});
+    put_little_endian(std::bit_cast<std::uint64_t>(value), manifest.data() + kPrimitive + 3 + 8 * number);
+    return offered(manifest);
+  };
   static const std::vector<Case> kCases = {
       // Parts:
-      {"part = 0: expected 1 … 117", [](Server& s) { return s.part(good(), 0, 0); }},
-      {"part = 117: expected 1 … 116", [](Server& s) { return s.part({}, good(), 117, 1, 117); }},
+      {"part = 0: expected 1 … 210", [](Server& s) { return s.part(good(), 0, 0); }},
+      {"part = 210: expected 1 … 209", [](Server& s) { return s.part({}, good(), 210, 1, 210); }},
       {"part = 1001: expected 1 … 1000", [](Server& s) { return s.part({}, Bytes(2000), 2000, 0, 1001); }},
-      {"size = 0: expected 71 … 23577 bytes", [](Server& s) { return s.part({}, good(), 0, 0, 1); }},
-      {"size = 4294967295: expected 71 …", [](Server& s) { return s.part({}, good(), 0xFFFFFFFF, 0, 1); }},
-      {"offset = 200: expected below 117", [](Server& s) { return s.part({}, good(), 117, 200, 1); }},
-      {"offset = 4294967295: expected below", [](Server& s) { return s.part({}, good(), 117, 0xFFFFFFFF, 1); }},
-      {"offset = 50: expected at most 0", [](Server& s) { return s.part({}, good(), 117, 50, 1); }},
+      {"size = 0: expected 73 … 26491 bytes", [](Server& s) { return s.part({}, good(), 0, 0, 1); }},
+      {"size = 4294967295: expected 73 …", [](Server& s) { return s.part({}, good(), 0xFFFFFFFF, 0, 1); }},
+      {"offset = 300: expected below 210", [](Server& s) { return s.part({}, good(), 210, 300, 1); }},
+      {"offset = 4294967295: expected below", [](Server& s) { return s.part({}, good(), 210, 0xFFFFFFFF, 1); }},
+      {"offset = 50: expected at most 0", [](Server& s) { return s.part({}, good(), 210, 50, 1); }},
       {"offset = 3: expected at most 2",
        [](Server& s) {
-         s.part({}, good(), 117, 0, 2);
-         const Refusal refused = s.part({}, good(), 117, 3, 1);
+         s.part({}, good(), 210, 0, 2);
+         const Refusal refused = s.part({}, good(), 210, 3, 1);
          s.receiver.drop({});
          return refused;
        }},
-      {"size = 118: expected 117",
+      {"size = 211: expected 210",
        [](Server& s) {
-         s.part({}, good(), 117, 0, 2);
-         const Refusal refused = s.part({}, good(), 118, 2, 1);
+         s.part({}, good(), 210, 0, 2);
+         const Refusal refused = s.part({}, good(), 211, 2, 1);
          s.receiver.drop({});
          return refused;
        }},
       {"field 00000000…: the manifest has the hash", [](Server& s) { return s.offer({}, good()); }},
       // Manifests:
-      {"bricks = 65535: expected 1 … 1023", number(kCount, std::uint16_t{65535})},
-      {"bricks = 0: expected 1 … 1023", number(kCount, std::uint16_t{0})},
-      {"size = 117: expected 94 bytes", number(kCount, std::uint16_t{2})},
+      {"bricks = 65535: expected at most 1023", number(kCount, std::uint16_t{65535})},
+      {"bricks = 0: expected 1 … 1023, or a primitive", number(kCount, std::uint32_t{0})},
+      {"size = 210: expected 141 bytes", number(kCount, std::uint16_t{0})},
+      {"size = 210: expected 187 bytes", number(kCount, std::uint16_t{2})},
       {"scale = 0: expected", number(kScale, 0.0)},
       {"scale = nan: expected", number(kScale, kNaN)},
       {"scale = 1e+12: expected", number(kScale, 1e12)},
@@ -143,16 +162,35 @@ const std::vector<Case>& cases() {
       {"bricks[2].place.x = 16: expected 0 … 15", number(kFirst + 2 * 23, std::uint16_t{16})},
       {"bricks[0].place.z = 65535: expected 0 … 7", number(kFirst + 4, std::uint16_t{65535})},
       {"bricks[1].place: expected a place without a brick", number(kFirst + 23, std::uint16_t{0})},
-      {"bricks[0].material = 32: expected 0 … 31", number(kFirst + 6, std::uint8_t{32})},
+      {"bricks[0].material = 16: expected 0 … 15", number(kFirst + 6, std::uint8_t{16})},
+      {"primitives = 33: expected at most 32", number(kCount + 2, std::uint16_t{33})},
+      {"primitives = 65535: expected at most 32", number(kCount + 2, std::uint16_t{65535})},
+      {"size = 210: expected 119 bytes", number(kCount + 2, std::uint16_t{0})},
+      {"primitives[0].kind = 0: expected 1 … 4", number(kPrimitive, std::uint8_t{0})},
+      {"primitives[0].kind = 5: expected 1 … 4", number(kPrimitive, std::uint8_t{5})},
+      {"primitives[0].numbers[4] = 0.03: expected 0", number(kPrimitive, std::uint8_t{2})},
+      {"primitives[0].hollow = 2: expected 0 or 1", number(kPrimitive + 1, std::uint8_t{2})},
+      {"primitives[0].material = 16: expected 0 … 15", number(kPrimitive + 2, std::uint8_t{16})},
+      {"primitives[0].numbers[0] = nan: expected ±1e12", primitive(kBox, 0, kNaN)},
+      {"primitives[0].numbers[2] = inf: expected", primitive(kBox, 2, kInfinity)},
+      {"primitives[0].numbers[5] = -1e+13: expected", primitive(kBox, 5, -1e13)},
+      {"primitives[0]: box.half = 0: expected", primitive(kBox, 3, 0.0)},
+      {"primitives[0]: box.rounding = 0.02: expected", primitive(kBox, 6, 0.02)},
+      {"primitives[0]: box.turn.w = 0: expected", primitive(kBox, 7, 0.0)},
+      {"primitives[0]: sphere.radius = 0: expected", primitive(kBall, 3, 0.0)},
+      {"primitives[0]: sphere.radius = -1: expected", primitive(kBall, 3, -1.0)},
+      {"primitives[0].numbers[4] = nan: expected 0", primitive(kBall, 4, kNaN)},
+      {"primitives[0]: capsule.radius = 0: expected", primitive(kRod, 6, 0.0)},
+      {"primitives[0]: plane.normal = 0: expected", primitive(kFloor, 5, 0.0)},
       // Too many:
       {"offers = 4: expected at most 3",
        [](Server& s) {
          Refusal last;
          for (std::uint16_t i = 1; i <= 10'000; ++i) {
-           last = s.part({}, with(0, static_cast<double>(i)), 117, 0, 1);
+           last = s.part({}, with(0, static_cast<double>(i)), 210, 0, 1);
            FieldName name{};
            put_little_endian(i, name.data());
-           last = s.part(name, good(), 117, 0, 100);
+           last = s.part(name, good(), 210, 0, 100);
          }
          s.now += seconds(30);  // they were never sent
          return last;
@@ -220,10 +258,19 @@ TEST(FieldHostile, APlaceOf2To31IsRefusedBeforeItIsSent) {
   }
 }
 
-TEST(FieldHostile, TooManyOrNoBricksAreRefusedBeforeTheyAreSent) {
+TEST(FieldHostile, TooManyOrNoPartsAreRefusedBeforeTheyAreSent) {
   const std::vector<PlacedBrick> many(65'535);
-  EXPECT_EQ(thrown_by([&] { encode_manifest(lattice_of_1024(), many); }), "bricks = 65535: expected 1 … 1023");
-  EXPECT_EQ(thrown_by([&] { encode_manifest(lattice_of_1024(), {}); }), "bricks = 0: expected 1 … 1023");
+  const Primitives balls(33, kBall);
+  EXPECT_EQ(thrown_by([&] { encode_manifest(lattice_of_1024(), many); }), "bricks = 65535: expected at most 1023");
+  EXPECT_EQ(thrown_by([&] { encode_manifest({}, {}, balls); }), "primitives = 33: expected at most 32");
+  EXPECT_EQ(thrown_by([&] { encode_manifest({}, {}); }), "bricks = 0: expected 1 … 1023, or a primitive");
+}
+
+TEST(FieldHostile, AnInvalidPrimitiveIsRefusedBeforeItIsSent) {
+  field::Primitive flat = kBox;
+  std::get<field::Box>(flat.shape).half.y() = 0;
+  const std::string said = thrown_by([&] { encode_manifest({}, {}, Primitives{kBall, flat}); });
+  EXPECT_TRUE(said.starts_with("primitives[1]: box.half = 0: expected")) << said;
 }
 
 TEST(FieldHostile, AStatusDoesNotTellWhatAnotherKeyHasUploaded) {
@@ -233,7 +280,7 @@ TEST(FieldHostile, AStatusDoesNotTellWhatAnotherKeyHasUploaded) {
   FieldReceiver guesser({.owner = 1}, server.store);
   const Bytes manifest = good();
   const FieldName name = crypto::blake2b_256(manifest);
-  ASSERT_FALSE(guesser.take(kStart, OfferField{.field = name, .size = 117, .offset = 0, .part = manifest}));
+  ASSERT_FALSE(guesser.take(kStart, OfferField{.field = name, .size = 210, .offset = 0, .part = manifest}));
   const auto status = guesser.next_status(kStart);
   ASSERT_TRUE(status);
   for (std::size_t i = 0; i < bricks().size(); ++i) {

@@ -128,6 +128,40 @@ TEST(FieldUpload, TwoEnginesShareBricksNotQuotas) {
   EXPECT_EQ(store.held(0), 300U) << "the other engine keeps all of its bricks";
 }
 
+TEST(FieldUpload, AFieldOfPrimitivesIsReadyAfterItsManifest) {
+  const std::vector<field::Primitive> sent = {
+      {.shape = field::Plane{.at = {1, 2, 3}, .normal = {0.6, 0, 0.8}}, .material = 3},
+      {.shape = field::Sphere{.centre = {4, 5, 6}, .radius = 7}, .hollow = true},
+      {.shape = field::Capsule{.from = {8, 9, 10}, .to = {11, 12, 13}, .radius = 14}, .material = 15},
+      {.shape = field::Box{
+           .centre = {15, 16, 17}, .half = {18, 19, 20}, .rounding = 1, .turn = {.w = 0.6, .x = 0, .y = 0.8, .z = 0}}}};
+  const std::vector<std::byte> manifest = encode_manifest({}, {}, sent);
+  EXPECT_EQ(manifest.size(), 50U + 4 * 91);
+  BrickStore store({});
+  FieldReceiver receiver({}, store);
+  FieldSender sender({}, {}, {}, sent);
+  const LocalTime now{seconds(100)};
+  ASSERT_FALSE(receiver.take(now, sender.next_part(now).value()));
+  sender.part_sent();
+  EXPECT_FALSE(sender.next_part(now));
+  ASSERT_TRUE(sender.take(now, receiver.next_status(now).value(), {}));
+  EXPECT_TRUE(sender.complete());
+  const auto ready = receiver.ready(sender.field());
+  ASSERT_TRUE(ready);
+  EXPECT_EQ(ready->bricks(), 0U);
+  ASSERT_EQ(ready->primitives(), sent.size());
+  std::vector<field::Primitive> received;
+  for (std::size_t i = 0; i < sent.size(); ++i) received.push_back(ready->primitive(i));
+  EXPECT_EQ(encode_manifest({}, {}, received), manifest);
+  for (std::size_t i = 0; i < sent.size(); ++i) {
+    EXPECT_EQ(received[i].hollow, sent[i].hollow);
+    EXPECT_EQ(received[i].material, sent[i].material);
+    const Vec3 x(0.3, -0.2, 0.1);
+    EXPECT_EQ(distance(received[i], x).distance, distance(sent[i], x).distance) << i;
+    EXPECT_EQ(distance(received[i], x).gradient, distance(sent[i], x).gradient) << i;
+  }
+}
+
 TEST(FieldUpload, AServerThatHasForgottenTheOfferIsOfferedItAgain) {
   const auto bricks = random_bricks(20, 8);
   BrickStore store({});
