@@ -32,6 +32,11 @@ HapticController::HapticController(const Config& config)
     }
     couplings_.emplace(*config.coupling, config.leaders);
   }
+  if (const auto& field = config.hold.field; field && (field->push.push_j > 0 || field->push.push_w > 0)) {
+    if (!config.limiter.shared_account) {
+      throw std::invalid_argument("field: push_j and push_w expect a limiter with a shared_account, to be credited");
+    }
+  }
   if (config.friction_map) {
     if (!config.limiter.parts.adaptive_friction) {
       throw std::invalid_argument("friction_map: expected a limiter with adaptive_friction, which uses it");
@@ -151,12 +156,13 @@ void HapticController::step_into(Step& fresh, const Motion& hand, const Vec3& ap
 
 Step HapticController::step(const Motion& hand, const Vec3& applied, const std::optional<Vec3>& hand_force,
                             const ForceChannels::Wanted& wanted, const HandleSample* handle,
-                            const EnergyTank::Settlement& settled,
-                            const EnergyTank::Settlement& grip_settled) noexcept {
+                            const EnergyTank::Settlement& settled, const EnergyTank::Settlement& grip_settled,
+                            const std::optional<FieldStep>& field) noexcept {
   if (!believable(hand, handle)) return disbelieve(hand, applied, handle);
   settled_ = settled;
   grip_settled_ = grip_settled;
   Step step;
+  step.field = field;
   ForceChannels::Wanted given = wanted;
   take(step, hand, applied, hand_force, given, handle);
   return step;
@@ -179,10 +185,23 @@ void HapticController::add_coupling(const Motion& hand, const HandleSample* hand
   if (silent && couplings_->live()) wanted.mode = Mode::kActive;
 }
 
-/// Credits the energy from the peers and withdraws the energy given to them, before the account bounds the force.
+/// Not inlined, because most scenes have no fields.
+[[gnu::noinline]] void HapticController::render_fields(const Motion& hand, Step& step,
+                                                       ForceChannels::Wanted& wanted) noexcept {
+  ++tick_;
+  if (const auto rendered = held_.render(hand, step.energy, tick_, wanted)) step.field = rendered;
+}
+
+/// Credits the energy from the tank of a field and from the peers, and withdraws the energy given to them, before the
+/// account bounds the force. The energy that is stored in a field is not given.
 template <class Port, class Force>
-void HapticController::settle(Port& port, const Force& wanted, Duration elapsed) noexcept {
-  if (couplings_) settled_ = couplings_->settle(port.payable(), port.worst_loss(wanted), elapsed);
+void HapticController::settle(Port& port, const Force& wanted, const Step& step) noexcept {
+  double stored = 0;
+  if (step.field) {
+    port.credit(step.field->credit);
+    stored = step.field->stored;
+  }
+  if (couplings_) settled_ = couplings_->settle(port.payable() - stored, port.worst_loss(wanted), step.held);
   port.credit(settled_.credit);
   port.withdraw(settled_.withdraw);
 }
@@ -209,6 +228,7 @@ void HapticController::take(Step& step, const Motion& hand, const Vec3& applied,
   step.hand_force = hand_force;
   if (handle != nullptr) note(*handle, wanted, step);
   book(hand, applied, handle, step);
+  if (held_.has_fields()) render_fields(hand, step, wanted);
   if (couplings_) add_coupling(hand, handle, step, wanted);
   last_ = hand;
   if (wrench_) last_orientation_ = handle->turning->orientation;
@@ -259,7 +279,7 @@ void HapticController::take(Step& step, const Motion& hand, const Vec3& applied,
   const Duration elapsed = std::min(step.held, config_.limiter.longest_hold);
   const Limited slewed = limit_slew(saturated.force, applied, config_.max_slew, elapsed);
   if (friction_map_) limiter_.adapt(friction_map_->at(step.hand.position));
-  if (config_.limiter.shared_account) settle(limiter_, slewed.force, step.held);
+  if (config_.limiter.shared_account) settle(limiter_, slewed.force, step);
   // A limit changes the felt environment, so the stiffness is only known for an unlimited force.
   const bool as_wanted =
       !admittance_ && !disarmed_ && saturated.reasons.empty() && slewed.reasons.empty() && step.mode == wanted.mode;
@@ -291,7 +311,7 @@ void HapticController::limit_wrench(Duration age, const Vec3& applied, Step& ste
   const LimitedWrench slewed =
       limit_slew(saturated.wrench, wrench_of(applied, turn.was_applied), config_.max_slew, rotation.max_slew, elapsed);
   if (friction_map_) wrench_->adapt({friction_map_->at(step.hand.position), rotation.friction});
-  if (config_.limiter.shared_account) settle(*wrench_, slewed.wrench, step.held);
+  if (config_.limiter.shared_account) settle(*wrench_, slewed.wrench, step);
   LimitedForce<6> limited = wrench_->limit({.force = slewed.wrench, .age = age});
   if (limited.reasons.has(Reason::kDamped)) {
     limited.force = saturate(limited.force, config_.max_force, rotation.max_torque).wrench;
@@ -340,6 +360,7 @@ Step HapticController::step_unseen(LocalTime now, const Vec3& applied, const Han
   last_.reset();
   last_at_ = now;
   started_ = true;
+  ++tick_;
   if (++missed_ >= config_.max_missed && fault_ == Fault::kNone) fault_ = Fault::kDeviceSilent;
   if (couplings_) couplings_->command_unseen(now, ready());
   settled_ = {};

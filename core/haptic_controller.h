@@ -13,6 +13,7 @@
 #include "core/handle/handle_port.h"
 #include "core/handle/handle_sample.h"
 #include "core/ledger/friction_map.h"
+#include "core/remote/field_use.h"
 #include "core/remote/force_channels.h"
 #include "core/remote/remote_force.h"
 #include "core/teleoperation/couplings.h"
@@ -69,6 +70,7 @@ struct PositionStep {
 /// Input and result of one haptic step. This is enough to repeat the step (tests/tools/replay).
 struct Step : PositionStep {
   std::optional<HandleStep> handle{};  ///< empty if the device only has a position
+  std::optional<FieldStep> field{};    ///< empty if no field is in use
 
   /// Null if the device does not measure its orientation, its joints, or has no gripper.
   TurnStep* turn() noexcept { return handle && handle->turn ? &*handle->turn : nullptr; }
@@ -81,10 +83,12 @@ struct Step : PositionStep {
 /// One haptic step: from the measured motion of the hand to the force to apply.
 ///     account ← the last interval, with the force that was applied          (Limiter::observe)
 ///     F ← newest remote force, held, faded or stopped by its age            (HeldForce; several: ForceChannels)
+///     F ← F + forces of the uploaded fields, as far as the account pays     (field::Renderer, when listed)
 ///     F ← F + force of the coupling to one or several peers                 (Couplings, when listed)
 ///     F ← the force that makes the handle follow a tool on which F acts     (AdmittanceLoop, when listed)
 ///     F ← ‖F‖ ≤ max_force                                                   (saturate)
 ///     F ← ‖F − F_before‖ ≤ max_slew · T                                     (limit_slew)
+///     account ← energy from the tank of the field                           (field::EnergyGate, with a tank)
 ///     account ← energy received from the peers, less energy given           (Couplings::settle, with an energy tank)
 ///     F ← the bound of the account, e.g. ‖F‖ ≤ f_c + 2 √(b E / T_max)        (Limiter::limit)
 ///     F ← ‖F‖ ≤ max_force again, if the damper of the limiter has added to it
@@ -148,6 +152,16 @@ class HapticController {
   /// Takes a newer remote force for `channel`, an index into `channels`. Returns false if it is not sound (HeldForce).
   bool observe(const RemoteForce& force, std::size_t channel = 0) noexcept { return held_.observe(channel, force); }
 
+  /// Takes a newer pose of the object of a channel. Its time is on the clock of `Motion::at` (HeldForce::observe).
+  bool observe(const field::TimedPose& pose, std::size_t channel = 0) noexcept { return held_.observe(channel, pose); }
+
+  /// Renders a field in a channel from now on, or stops it (HeldForce::use).
+  bool use(const FieldUse& use, LocalTime now, std::size_t channel = 0) noexcept {
+    return held_.use(channel, use, now);
+  }
+  /// Returns the generation of the field in use, or 0. The fields of the previous generations are not used any more.
+  std::uint32_t field(std::size_t channel = 0) const noexcept { return held_.field(channel); }
+
   /// Must be called when the remote environment `source` of a channel has disconnected.
   void release(LocalTime now, std::uint32_t source = 0, std::size_t channel = 0) noexcept {
     held_.release(channel, source, now);
@@ -166,11 +180,12 @@ class HapticController {
   void step_into(Step& fresh, const Motion& hand, const Vec3& applied, const std::optional<Vec3>& hand_force = {},
                  const HandleSample* handle = nullptr) noexcept;
 
-  /// Performs a step with a given `wanted` instead of the observed remote forces and the coupling, and with given
-  /// settlements of the tanks. This can replay a recorded scene without `coupling`.
+  /// Performs a step with a given `wanted` instead of the observed remote forces, the fields and the coupling, and with
+  /// given settlements of the tanks. This can replay a recorded scene without `coupling`.
   Step step(const Motion& hand, const Vec3& applied, const std::optional<Vec3>& hand_force,
             const ForceChannels::Wanted& wanted, const HandleSample* handle = nullptr,
-            const EnergyTank::Settlement& settled = {}, const EnergyTank::Settlement& grip_settled = {}) noexcept;
+            const EnergyTank::Settlement& settled = {}, const EnergyTank::Settlement& grip_settled = {},
+            const std::optional<FieldStep>& field = {}) noexcept;
 
   /// Performs a step if the position was not measured. The force to apply is zero. The last orientation and grip are
   /// recorded from `handle`, and the held torque and grip force are booked.
@@ -203,8 +218,9 @@ class HapticController {
   void limit_wrench(Duration age, const Vec3& applied, Step& step) noexcept;
   void limit_grip(Step& step) noexcept;
   void add_coupling(const Motion& hand, const HandleSample* handle, Step& step, ForceChannels::Wanted& wanted) noexcept;
+  void render_fields(const Motion& hand, Step& step, ForceChannels::Wanted& wanted) noexcept;
   template <class Port, class Force>
-  void settle(Port& port, const Force& wanted, Duration elapsed) noexcept;
+  void settle(Port& port, const Force& wanted, const Step& step) noexcept;
   void settle_grip(double wanted, Duration elapsed) noexcept;
   bool ready() const noexcept { return armed_ && !disarmed_ && fault_ == Fault::kNone; }
   static void note(const HandleSample& handle, const ForceChannels::Wanted& wanted, Step& step) noexcept;
@@ -229,6 +245,7 @@ class HapticController {
   std::optional<Quat> last_orientation_;
   std::optional<double> last_opening_;  ///< rad
   LocalTime last_at_{};                 ///< start of the current hold
+  std::uint64_t tick_ = 0;              ///< number of the step; only counted if fields are listed
   bool started_ = false;
 };
 

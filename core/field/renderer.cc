@@ -33,6 +33,9 @@ void Renderer::use(const Field* field, LocalTime now) noexcept {
   first_tick_.reset();
   if (field == nullptr) {
     started_ = false;
+    pose_ = {};
+    material_count_ = 0;
+    residual_.forget();
     return;
   }
   const std::size_t count = std::min(field->materials.size(), materials_.size());
@@ -45,6 +48,13 @@ void Renderer::use(const Field* field, LocalTime now) noexcept {
   material_count_ = count;
   from_ = law_;
   blend_ = started_ ? kBlend : 0;
+}
+
+double Renderer::stored(const Vec3& x) const noexcept {
+  if (!started_) return 0;
+  double sum = law_.energy((place_ - x).norm(), dent_);
+  for (std::size_t i = 0; i < pull_count_; ++i) sum += pulls_[i].law.energy((pulls_[i].place - x).norm());
+  return sum;
 }
 
 bool Renderer::observe(std::uint64_t tick, const Vec3& truth, LocalTime now) noexcept {
@@ -167,6 +177,8 @@ Renderer::Rendered Renderer::render(const Motion& hand, double account, std::uin
   last_ = hand.at;
   if (!started_) {
     start(pose_.at(hand.at, 0), x);
+    swapped_ = hand.at;
+    swapping_ = true;
     law_ = materials_[proxy_.material < material_count_ ? proxy_.material : 0];
     blends_to_ = proxy_.material;
     result.proxy = x;
@@ -175,9 +187,7 @@ Renderer::Rendered Renderer::render(const Motion& hand, double account, std::uin
     return result;
   }
   const double before = law_.energy((place_ - x).norm(), dent_);
-  double all_before = before;
-  for (std::size_t i = 0; i < pull_count_; ++i) all_before += pulls_[i].law.energy((pulls_[i].place - x).norm());
-  gate_.open(account, all_before, swapping_ ? kSwapPower : EnergyGate::kNoLimit, period);
+  gate_.open(account, stored(x), swapping_ ? kSwapPower : EnergyGate::kNoLimit, period);
   bound_ = false;
   const Pose pose = pose_.at(hand.at, period);
   render_surface(pose, x, before, period, result);

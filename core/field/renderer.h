@@ -61,9 +61,16 @@ class Renderer {
   /// Throws std::invalid_argument with the name of the field if it is out of range.
   explicit Renderer(const Config& config);
 
-  /// Replaces the field, or removes it if the pointer is null. `field` must be valid and outlive its use. Learned
-  /// tables are kept if the material does not change.
+  /// Replaces the field. `field` must be valid and outlive its use. Learned tables are kept if the material does not
+  /// change. If the pointer is null, the field is removed, and its pose, tables and true forces are forgotten.
   void use(const Field* field, LocalTime now) noexcept;
+
+  /// The field appears under the hand again, because its force was not applied.
+  void restart() noexcept { started_ = false; }
+
+  /// Returns ΣU(d, z) (J) at `x`, with the law and the places of p of the last step: H₀ of the next step. 0 without a
+  /// field.
+  double stored(const Vec3& x) const noexcept;
 
   /// See FieldPose::observe.
   bool observe(const TimedPose& pose) noexcept { return pose_.observe(pose); }

@@ -51,6 +51,9 @@ class Residual {
   bool learn(std::uint64_t tick, const Vec3& truth, LocalTime now, double max_stiffness,
              std::span<Material> materials) noexcept;
 
+  /// Forgets the rest of the last truth.
+  void forget() noexcept { rest_ = ease_ = given_ = Vec3::Zero(); }
+
   /// Returns the held force (N, on the hand) at `hand.position`. Must be called once per haptic step of `period` s.
   Vec3 held(const Motion& hand, double depth, double period) noexcept;
 

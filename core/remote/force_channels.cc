@@ -27,11 +27,12 @@ int staleness(Mode mode) noexcept {
 
 }  // namespace
 
-ForceChannels::ForceChannels(const Config& config) : ramp_(config.hold.ramp_in) {
+ForceChannels::ForceChannels(const Config& config)
+    : ramp_(config.hold.ramp_in), has_fields_(config.hold.field.has_value()) {
   if (config.rules.empty()) throw std::invalid_argument("a device needs at least one channel");
   for (const ChannelRule rule : config.rules) {
-    channels_.push_back(
-        {.held = HeldForce(config.hold), .rule = rule, .weight = rule == ChannelRule::kSum ? 1.0 : 0.0});
+    const bool whole = rule == ChannelRule::kSum || config.rules.size() == 1;
+    channels_.push_back({.held = HeldForce(config.hold), .rule = rule, .weight = whole ? 1.0 : 0.0});
   }
 }
 
@@ -88,6 +89,35 @@ ForceChannels::Wanted ForceChannels::wanted(const Motion& hand, const Quat* orie
     if (channel.wants.mode != Mode::kSafeStop) sum.reasons |= channel.wants.reasons;
   }
   return sum;
+}
+
+std::optional<FieldStep> ForceChannels::render(const Motion& hand, double account, std::uint64_t tick,
+                                               Wanted& wanted) noexcept {
+  std::optional<FieldStep> result;
+  double stored = 0;  // Σ w H₀ of the fields that are not rendered yet, Σ w H of the others
+  for (const Channel& channel : channels_) stored += channel.weight * channel.held.stored(hand.position);
+  for (std::size_t i = 0; i < channels_.size(); ++i) {
+    Channel& channel = channels_[i];
+    if (channel.held.field() == 0) continue;
+    stored -= channel.weight * channel.held.stored(hand.position);
+    const field::Renderer::Rendered rendered = channel.held.render(hand, account - stored, tick);
+    stored += channel.weight * rendered.stored;
+    account += rendered.credit;
+    wanted.force += channel.weight * rendered.force;
+    wanted.stiffness += channel.weight * rendered.stiffness;
+    if (!result) result.emplace();
+    if (result->generation == 0 || (result->depth == 0 && rendered.depth > 0)) {
+      result->generation = channel.held.field();
+      result->channel = static_cast<std::uint8_t>(i);
+      result->swapping = rendered.swapping;
+      result->depth = rendered.depth;
+      result->proxy = rendered.proxy;
+    }
+    result->refused += rendered.refused;
+    result->credit += rendered.credit;
+  }
+  if (result) result->stored = stored;
+  return result;
 }
 
 }  // namespace tendon

@@ -3,9 +3,11 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "core/remote/channel_rule.h"
+#include "core/remote/field_use.h"
 #include "core/remote/held_force.h"
 
 namespace tendon {
@@ -37,6 +39,12 @@ class ForceChannels {
   bool observe(std::size_t channel, const RemoteForce& force) noexcept {
     return channels_[channel].held.observe(force);
   }
+  bool observe(std::size_t channel, const field::TimedPose& pose) noexcept {
+    return channels_[channel].held.observe(pose);
+  }
+  bool use(std::size_t channel, const FieldUse& use, LocalTime now) noexcept {
+    return channels_[channel].held.use(use, now);
+  }
   /// Must be called when the remote environment of a channel has disconnected.
   void release(std::size_t channel, std::uint32_t source, LocalTime now) noexcept {
     channels_[channel].held.release(source, now);
@@ -45,6 +53,16 @@ class ForceChannels {
 
   /// Must be called once per haptic step.
   Wanted wanted(const Motion& hand, const Quat* orientation = nullptr) noexcept;
+
+  bool has_fields() const noexcept { return has_fields_; }  ///< the part `field` is listed
+
+  /// Adds the forces of the fields to `wanted`, with their weights, in the order of the channels. Must be called after
+  /// `wanted`. `account` is E in J. Each field can use E + Σ credit − Σ wⱼ Hⱼ, where Hⱼ is the stored energy of the other
+  /// fields and the credit is that of the fields before. Returns nothing if no field is in use.
+  std::optional<FieldStep> render(const Motion& hand, double account, std::uint64_t tick, Wanted& wanted) noexcept;
+
+  /// Generation of the field in use, or 0.
+  std::uint32_t field(std::size_t channel) const noexcept { return channels_[channel].held.field(); }
 
   /// Returns the force of a channel, or nothing if there is no force.
   const std::optional<RemoteForce>& newest(std::size_t channel) const noexcept {
@@ -55,13 +73,14 @@ class ForceChannels {
   struct Channel {
     HeldForce held;
     ChannelRule rule;
-    double weight;  ///< always 1 in a sum
+    double weight;  ///< always 1 in a sum and if there is no other channel
     HeldForce::Wanted wants{};
   };
 
   void shift_weights(LocalTime now) noexcept;
 
   Duration ramp_;
+  bool has_fields_;
   std::vector<Channel> channels_;
   LocalTime last_{};  ///< previous step
 };

@@ -1,13 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <optional>
 
 #include "core/base/mode.h"
 #include "core/base/motion.h"
 #include "core/base/reason.h"
+#include "core/field/renderer.h"
 #include "core/remote/adaptive_local_model.h"
+#include "core/remote/field_use.h"
 #include "core/remote/learned_model.h"
 #include "core/remote/output_estimator.h"
 #include "core/remote/remote_force.h"
@@ -32,6 +35,7 @@ struct HandleWanted {
 ///     adaptive_local_model   blends from one stiffness to the next              (AdaptiveLocalModel)
 ///     output_estimator       learns a model of the environment                  (OutputEstimator)
 ///     learned_model          learns how the force depends on the position, for answers without a model (LearnedModel)
+///     field                  as without a part, until an engine uses a field    (field::Renderer)
 /// A torque follows its own model of rotation, and a grip force is constant. Both are held, faded out and ramped in at
 /// the same time as the force. Only the trusted part of an answer is used, and an answer that is not sound is refused
 /// (answer.h). The result must be bounded by a limiter.
@@ -39,6 +43,11 @@ struct HandleWanted {
 /// The first force, the first force after a safe stop, and the first force from another source are ramped in linearly
 /// over `ramp_in`, starting from the current force. A fresh force that arrives during the decay is ramped in over (1 −
 /// gain) · ramp_in. The force does not jump if an engine returns, stutters or takes over.
+///
+/// While a field is in use, other forces of the channel are ignored, and the mode is Active without any message. The
+/// field starts without a force, while the force before it fades out over ramp_in. When the engine stops using the
+/// field or disconnects, the last force of the field is held and faded out, as if it had expired, and the next force is
+/// ramped in.
 /// Thread-safe: no. Realtime-safe: yes.
 class HeldForce {
  public:
@@ -53,9 +62,10 @@ class HeldForce {
     Duration max_valid_for = std::chrono::milliseconds(500);  ///< upper limit of valid_for
     double max_stiffness = 5000;                              ///< N/m, > 0; limits the stiffness between two forces
     double max_angular_stiffness = 5;                         ///< N·m/rad, > 0; used for rotation
-    std::optional<AdaptiveLocalModel::Config> adaptive_local_model{};  ///< at most one of these three
+    std::optional<AdaptiveLocalModel::Config> adaptive_local_model{};  ///< at most one of these four
     std::optional<OutputEstimator::Config> output_estimator{};
     std::optional<LearnedModel::Config> learned_model{};
+    std::optional<field::Renderer::Config> field{};
   };
 
   struct Wanted {
@@ -72,23 +82,35 @@ class HeldForce {
   /// positive, safe_stop is shorter than hold, a part is not valid, or there are several parts.
   explicit HeldForce(const Config& config);
 
-  /// Returns false and does nothing if the force is not sound.
+  /// Returns false and does nothing if the force is not sound. A true force (RemoteForce::field) is refused unless it
+  /// is for the field in use, from its source, and newer than the last one.
   bool observe(const RemoteForce& force) noexcept;
+
+  /// Returns false and does nothing if the part `field` is not listed, or if the generation of a field is 0.
+  bool use(const FieldUse& use, LocalTime now) noexcept;
+
+  /// Takes a pose of the object, also before its field is used. Returns false if the part `field` is not listed, and as
+  /// FieldPose::observe.
+  bool observe(const field::TimedPose& pose) noexcept { return renderer_ && renderer_->observe(pose); }
 
   /// Must be called when the remote environment `source` has disconnected. Its force expires at `now`.
   void release(std::uint32_t source, LocalTime now) noexcept;
 
-  /// The next fresh force is ramped in.
-  void disengage() noexcept {
-    newest_.reset();
-    mode_ = Mode::kIdle;
-    rendered_.setZero();
-    handle_rendered_.reset();
-  }
+  /// The next fresh force is ramped in, and a field starts without a force.
+  void disengage() noexcept;
 
-  /// Returns the demand for `hand.position`, `hand.at` and `orientation`. Must be called once per haptic step, because
-  /// an estimator learns from it. If there is no orientation, the model of rotation is not used.
+  /// Returns the demand for `hand.position`, `hand.at` and `orientation`, without the force of a field. Must be called
+  /// once per haptic step, because an estimator learns from it. If there is no orientation, the model of rotation is
+  /// not used.
   Wanted wanted(const Motion& hand, const Quat* orientation = nullptr) noexcept;
+
+  std::uint32_t field() const noexcept { return generation_; }  ///< generation of the field in use, or 0
+
+  /// H₀ of the field at `x` (J), or 0 if there is none.
+  double stored(const Vec3& x) const noexcept { return generation_ != 0 ? renderer_->stored(x) : 0; }
+
+  /// Must be called after `wanted` in each step with a field in use. See Renderer::render.
+  field::Renderer::Rendered render(const Motion& hand, double account, std::uint64_t tick) noexcept;
 
   /// Returns the part of the held force that is used, or nothing if there is no force.
   const std::optional<RemoteForce>& newest() const noexcept { return newest_; }
@@ -97,6 +119,8 @@ class HeldForce {
   Prediction follow(const Motion& hand) noexcept;
   Duration validity() const noexcept;
   std::optional<HandleWanted> handle_wanted(const Quat* orientation, double gain, double rest) const noexcept;
+  Wanted beside_field(const Motion& hand) noexcept;
+  void leave_field(LocalTime now) noexcept;
 
   Config config_;
   std::optional<RemoteForce> newest_;
@@ -111,6 +135,10 @@ class HeldForce {
   std::optional<AdaptiveLocalModel> local_model_;
   std::unique_ptr<OutputEstimator> estimator_;  ///< 100 kB, only when listed
   std::unique_ptr<LearnedModel> learned_;       ///< 32 kB, only when listed
+  std::unique_ptr<field::Renderer> renderer_;   ///< 100 kB, only when listed
+  std::uint32_t generation_ = 0;                ///< of the field in use; 0 if there is none. `newest_` is empty then
+  std::uint32_t source_ = 0;                    ///< of the field in use
+  bool left_field_ = false;                     ///< `newest_` is the last force of a field
 };
 
 }  // namespace tendon

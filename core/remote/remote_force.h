@@ -61,7 +61,7 @@ struct RemoteTorque {
 /// exerted by the device *on the hand*, so a wall that resists motion along +x sends −x. (Lee & Lee 2009 use f = −F.)
 struct RemoteForce {
   std::uint64_t sequence = 0;      ///< increases strictly within a session; 0 if there is no force yet
-  std::uint64_t answers_tick = 0;  ///< the haptic step with the answered motion
+  std::uint64_t answers_tick = 0;  ///< the haptic step with the answered motion; the first step has the number 1
   LocalTime answers{};             ///< time when this motion was sampled, used to compute `loop_age`
   LocalTime received{};            ///< arrival time
   Vec3 force = Vec3::Zero();       ///< N, on the hand
@@ -70,6 +70,9 @@ struct RemoteForce {
   std::uint32_t source = 0;  ///< identifies the sender, because the first force of another engine is ramped in
   /// If true, the body was cut or torn since the previous answer, and the models of both answers are not valid.
   bool topology_changed = false;
+  /// Generation of a field (FieldUse). If it is not 0, `force` is not rendered: it is the true force of the object in
+  /// the answered step, from which the field learns.
+  std::uint32_t field = 0;
   std::uint8_t way = 0;           ///< number of the solver path in the engine, or 0 if unknown (for diagnostics)
   std::optional<double> error{};  ///< N, ≥ 0; error of `force`, as estimated by the engine
   std::optional<RemoteTorque> torque{};

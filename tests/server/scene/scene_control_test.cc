@@ -65,8 +65,9 @@ TEST(Scene, AnEstimatorIsThereWhenItsTableIs) {
   const auto sent = minimal_and("[force.adaptive_local_model]\nshare = 0.8\n").loop.control.hold;
   ASSERT_TRUE(sent.adaptive_local_model && !sent.output_estimator);
   EXPECT_EQ(sent.adaptive_local_model->share, 0.8);
-  EXPECT_EQ(error_of_minimal_and("[force.output_estimator]\n[force.adaptive_local_model]\n"),
-            "s.toml:4: force: adaptive_local_model, output_estimator and learned_model: expected at most one of them");
+  EXPECT_EQ(
+      error_of_minimal_and("[force.output_estimator]\n[force.adaptive_local_model]\n"),
+      "s.toml:4: force: adaptive_local_model, output_estimator, learned_model and field: expected at most one of them");
 }
 
 TEST(Scene, AToolNeedsADeviceThatMeasuresTheHand) {

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+
+#include "core/base/motion.h"
+#include "core/field/field.h"
+
+namespace tendon {
+
+/// A channel renders `field` from now on (core/field/README.md). If `field` is null, it stops if `source` uses a field.
+struct FieldUse {
+  const field::Field* field = nullptr;  ///< valid (Field::expect_valid); not owned, and not changed while it is in use
+  std::uint32_t generation = 0;         ///< > 0, chosen by the source; a true force names it (RemoteForce::field)
+  std::uint32_t source = 0;             ///< as in RemoteForce
+};
+
+/// The fields in a haptic step. `generation` to `proxy` are of the first channel that touches its field, or of the
+/// first one with a field. The energies are sums over the channels.
+struct FieldStep {
+  std::uint32_t generation = 0;
+  std::uint8_t channel = 0;
+  bool swapping = false;      ///< a field appears or is replaced
+  double depth = 0;           ///< m, from the proxy to the hand; 0 without contact
+  Vec3 proxy = Vec3::Zero();  ///< m, base frame
+  double stored = 0;          ///< H, J
+  double refused = 0;         ///< J that the gates refused in this step
+  double credit = 0;          ///< J from the tanks, credited to the account before the force was bounded
+};
+
+}  // namespace tendon
