@@ -213,10 +213,12 @@ TEST(SafeDevice, MakesNoHeapCallWhateverHappens) {
   EXPECT_GT(safe.times_armed(), 20U);
 }
 
-// Tests all laws of the catalogue, all parts of AOL+, and all ways to extrapolate between two forces.
+// Tests all laws of the catalogue, all parts of AOL+, all ways to extrapolate between two forces, and fields.
 TEST(HapticController, NoLawAndNoPartMakesAHeapCallInTheLoop) {
+  field::Field ball{.primitives = {{.shape = field::Sphere{.radius = 0.014}}}, .materials = {{.stiffness = 900}}};
+  ball.fixtures = {{.kind = field::Fixture::Kind::kLine, .stiffness = 100}};
   for (const LawInfo& law : laws()) {
-    for (int between = 0; between < 4; ++between) {
+    for (int between = 0; between < 5; ++between) {
       HapticController::Config config;
       config.limiter = {.law = law.law, .friction = {0.05, 0.26}, .longest_hold = milliseconds(1)};
       config.limiter.max_force = 3;
@@ -235,6 +237,7 @@ TEST(HapticController, NoLawAndNoPartMakesAHeapCallInTheLoop) {
       if (between == 1) config.hold.adaptive_local_model.emplace();
       if (between == 2) config.hold.output_estimator.emplace();
       if (between == 3) config.hold.learned_model.emplace();
+      if (between == 4) config.hold.field.emplace();
       HapticController controller(config);
       Vec3 applied = Vec3::Zero();
       const HeapGuard guard;
@@ -256,6 +259,14 @@ TEST(HapticController, NoLawAndNoPartMakesAHeapCallInTheLoop) {
           }
           force.valid_for = milliseconds(30);
           controller.observe(force);
+        }
+        if (n % 500 == 0) controller.use({n % 1500 == 0 ? nullptr : &ball, static_cast<std::uint32_t>(n)}, now);
+        if (n % 16 == 0) controller.observe(field::TimedPose{.at = now, .velocity = {0.01, 0, 0}});
+        if (n % 16 == 8) {
+          controller.observe({.answers_tick = static_cast<std::uint64_t>(n) - 8,
+                              .received = now,
+                              .force = -x,
+                              .field = controller.field()});
         }
         const Step step = n % 777 == 0 ? controller.step_unseen(now, applied)
                                        : controller.step({.at = now, .position = x, .velocity = Vec3::Zero()}, applied);
