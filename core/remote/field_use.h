@@ -16,13 +16,14 @@ struct FieldUse {
 };
 
 /// The fields in a haptic step. `generation` to `proxy` are of the first channel that touches its field, or of the
-/// first one with a field. The energies are sums over the channels.
+/// first one with a field. The force and the energies are sums over the channels.
 struct FieldStep {
   std::uint32_t generation = 0;
   std::uint8_t channel = 0;
   bool swapping = false;      ///< a field appears or is replaced
   double depth = 0;           ///< m, from the proxy to the hand; 0 without contact
   Vec3 proxy = Vec3::Zero();  ///< m, base frame
+  Vec3 force = Vec3::Zero();  ///< N, on the hand; part of `wanted`
   double stored = 0;          ///< H, J
   double refused = 0;         ///< J that the gates refused in this step
   double credit = 0;          ///< J from the tanks, credited to the account before the force was bounded

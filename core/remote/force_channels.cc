@@ -103,7 +103,6 @@ std::optional<FieldStep> ForceChannels::render(const Motion& hand, double accoun
     const field::Renderer::Rendered rendered = channel.held.render(hand, account - stored, tick);
     stored += channel.weight * rendered.stored;
     account += rendered.credit;
-    wanted.force += channel.weight * rendered.force;
     wanted.stiffness += channel.weight * rendered.stiffness;
     if (!result) result.emplace();
     if (result->generation == 0 || (result->depth == 0 && rendered.depth > 0)) {
@@ -113,10 +112,13 @@ std::optional<FieldStep> ForceChannels::render(const Motion& hand, double accoun
       result->depth = rendered.depth;
       result->proxy = rendered.proxy;
     }
+    result->force += channel.weight * rendered.force;
     result->refused += rendered.refused;
     result->credit += rendered.credit;
   }
-  if (result) result->stored = stored;
+  if (!result) return result;
+  result->stored = stored;
+  wanted.force += result->force;
   return result;
 }
 

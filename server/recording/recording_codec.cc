@@ -74,6 +74,30 @@ GripStep grip_step(const pb::Grip& in) {
           .energy = in.energy_j()};
 }
 
+void put(pb::Field* out, const FieldStep& field) {
+  out->set_generation(field.generation);
+  out->set_channel(field.channel);
+  out->set_swapping(field.swapping);
+  out->set_depth_m(field.depth);
+  put(out->mutable_proxy_m(), field.proxy);
+  put(out->mutable_force_n(), field.force);
+  out->set_stored_j(field.stored);
+  out->set_refused_j(field.refused);
+  out->set_credited_j(field.credit);
+}
+
+FieldStep field_step(const pb::Field& in) {
+  return {.generation = in.generation(),
+          .channel = static_cast<std::uint8_t>(in.channel()),
+          .swapping = in.swapping(),
+          .depth = in.depth_m(),
+          .proxy = vec3(in.proxy_m()),
+          .force = vec3(in.force_n()),
+          .stored = in.stored_j(),
+          .refused = in.refused_j(),
+          .credit = in.credited_j()};
+}
+
 void put(pb::PortState* out, const PortState& state) {
   out->set_epoch(state.epoch);
   out->set_sequence(state.sequence);
@@ -260,6 +284,7 @@ std::string encode(const StepRecord& step, std::string_view force_way) {
   out.set_buttons(step.buttons);
   if (const TurnStep* const turn = step.turn()) put(out.mutable_turn(), *turn);
   if (const GripStep* const grip = step.grip()) put(out.mutable_grip(), *grip);
+  if (step.field) put(out.mutable_field(), *step.field);
   if (const Joints* const joints = step.joints()) {
     for (std::size_t i = 0; i < joints->count; ++i) {
       out.add_joint_rad(joints->angle[i]);
@@ -370,6 +395,7 @@ StepRecord decode_step(std::string_view message, LocalTime at, SolverPaths& ways
   if (in.has_turn()) out.handle->turn = turn_step(in.turn());
   if (in.has_grip()) out.handle->grip = grip_step(in.grip());
   if (in.joint_rad_size() > 0) out.handle->joints = joints_in(in);
+  if (in.has_field()) out.field = field_step(in.field());
   if (const int entries = in.stiffness_wanted_n_per_m_size(); entries > 0) {
     if (entries != 9)
       throw std::invalid_argument("step " + std::to_string(in.tick()) + " has a stiffness of " +

@@ -10,27 +10,32 @@
 namespace tendon {
 
 /// Stores the last steps of a device before a fault. Without `handles`, the handles of steps are not stored, which
-/// saves half of the memory of a StepRecord. Thread-safe, Realtime-safe: see FlightRecorder.
+/// saves half of the memory of a StepRecord, and without `fields`, their fields are not stored. Thread-safe,
+/// Realtime-safe: see FlightRecorder.
 class StepFlight {
  public:
   /// `capacity` must be a power of two.
-  explicit StepFlight(std::size_t capacity, bool handles = true) : steps_(capacity) {
+  explicit StepFlight(std::size_t capacity, bool handles = true, bool fields = true) : steps_(capacity) {
     if (handles) handles_.emplace(capacity);
+    if (fields) fields_.emplace(capacity);
   }
 
   void record(const StepRecord& step) {
     steps_.record(step);
     if (handles_) handles_->record(step.handle);
+    if (fields_) fields_->record(step.field);
   }
 
   /// In this order, because the other thread only checks the recorder of the steps.
   void freeze() noexcept {
     if (handles_) handles_->freeze();
+    if (fields_) fields_->freeze();
     steps_.freeze();
   }
   bool frozen() const noexcept { return steps_.frozen(); }
   void thaw() noexcept {
     if (handles_) handles_->thaw();
+    if (fields_) fields_->thaw();
     steps_.thaw();
   }
 
@@ -40,6 +45,7 @@ class StepFlight {
     static_cast<PositionStep&>(step) = steps_[i];
     static_cast<LoopStep&>(step) = steps_[i];
     if (handles_) step.handle = (*handles_)[i];
+    if (fields_) step.field = (*fields_)[i];
     return step;
   }
 
@@ -54,6 +60,7 @@ class StepFlight {
 
   FlightRecorder<Kept> steps_;
   std::optional<FlightRecorder<std::optional<HandleStep>>> handles_;
+  std::optional<FlightRecorder<std::optional<FieldStep>>> fields_;
 };
 
 }  // namespace tendon

@@ -83,6 +83,17 @@ inline StepRecord sample_step(std::uint64_t tick) {
     step.handle->joints = Joints::three({0.1, t, -0.3}, {t, -2, 3});
   }
   if (step.handle && !step.handle->turn && !step.handle->grip && !step.handle->joints) step.handle.reset();
+  if (tick % 3 == 2) {
+    step.field = FieldStep{.generation = 7,
+                           .channel = 2,
+                           .swapping = true,
+                           .depth = 1e-3,
+                           .proxy = {0.01, t, -0.02},
+                           .force = {-1, 0.5, t},
+                           .stored = 0.125 + t,
+                           .refused = 1e-5,
+                           .credit = 1e-4};
+  }
   step.longest_hold = std::chrono::microseconds(2000 + tick);
   if (tick % 11 == 0) step.reasons |= Reason::kAcceleration;
   if (tick % 4 < 2) step.stiffness << 500, -1, 2, -1, 600, 3, 2, 3.5, 700 + t;
@@ -133,15 +144,21 @@ inline bool same(const std::optional<HandleStep>& a, const std::optional<HandleS
   return a->joints == b->joints && (!a->turn || same_turn(*a->turn, *b->turn)) &&
          (!a->grip || same_grip(*a->grip, *b->grip));
 }
+inline bool same(const std::optional<FieldStep>& a, const std::optional<FieldStep>& b) {
+  if (a.has_value() != b.has_value()) return false;
+  return !a || (a->generation == b->generation && a->channel == b->channel && a->swapping == b->swapping &&
+                same(a->depth, b->depth) && same(a->proxy, b->proxy) && same(a->force, b->force) &&
+                same(a->stored, b->stored) && same(a->refused, b->refused) && same(a->credit, b->credit));
+}
 inline bool same(const StepRecord& a, const StepRecord& b) {
   return a.tick == b.tick && a.scheduled == b.scheduled && a.hand.at == b.hand.at &&
          same(a.hand.position, b.hand.position) && same(a.hand.velocity, b.hand.velocity) && a.held == b.held &&
          same(a.was_applied, b.was_applied) && same(a.wanted, b.wanted) && same(a.permitted, b.permitted) &&
          same(a.force, b.force) && same(a.applied, b.applied) && same(a.energy, b.energy) && a.reasons == b.reasons &&
          a.mode == b.mode && a.rearmed == b.rearmed && a.disarmed == b.disarmed && a.buttons == b.buttons &&
-         a.longest_hold == b.longest_hold && same(a.handle, b.handle) && a.force_sequence == b.force_sequence &&
-         a.force_age == b.force_age && a.loop_age == b.loop_age && a.channel == b.channel &&
-         a.force_error.has_value() == b.force_error.has_value() &&
+         a.longest_hold == b.longest_hold && same(a.handle, b.handle) && same(a.field, b.field) &&
+         a.force_sequence == b.force_sequence && a.force_age == b.force_age && a.loop_age == b.loop_age &&
+         a.channel == b.channel && a.force_error.has_value() == b.force_error.has_value() &&
          same(a.force_error.value_or(0), b.force_error.value_or(0)) && a.force_way == b.force_way &&
          std::equal(a.stiffness.reshaped().begin(), a.stiffness.reshaped().end(), b.stiffness.reshaped().begin());
 }

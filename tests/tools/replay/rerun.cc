@@ -79,7 +79,7 @@ Step Rerun::take(const StepRecord& recorded, const Effort& held) {
     const bool has_port = settled_at_ == recorded.tick;
     return controller_.step(recorded.hand, applied, recorded.hand_force, wanted_in(recorded), handle,
                             has_port ? settled_ : EnergyTank::Settlement{},
-                            has_port ? grip_settled_ : EnergyTank::Settlement{});
+                            has_port ? grip_settled_ : EnergyTank::Settlement{}, recorded.field);
   }
   // For a rejected position the record contains only the rejection.
   ++missed_;

@@ -22,7 +22,7 @@ class Rerun {
 
   /// Throws as HapticController does.
   Rerun(const HapticController::Config& control, Held held)
-      : controller_(without_coupling(control)), max_missed_(control.max_missed), held_(held) {}
+      : controller_(alone(control)), max_missed_(control.max_missed), held_(held) {}
 
   /// Adds the energy that a coupling's tank settles in the next step, if that has the tick of `port`. Couplings of a
   /// step are passed in their recorded order. All their other effects are in the recorded requested force.
@@ -37,7 +37,9 @@ class Rerun {
   StepRecord step(const StepRecord& recorded);
 
  private:
-  static HapticController::Config without_coupling(HapticController::Config control) {
+  /// The forces of couplings and fields, and the energy from their tanks, are recorded.
+  static HapticController::Config alone(HapticController::Config control) {
+    control.hold.field.reset();
     control.coupling.reset();
     control.leaders.clear();
     return control;
