@@ -25,8 +25,8 @@ class BrickStore {
   using Owner = std::uint32_t;  ///< the number of a client's key, which stays the same if the client is restarted
 
   struct Config {
-    std::size_t bytes = std::size_t{8} << 20U;
-    std::size_t owner_bytes = std::size_t{4} << 20U;
+    std::size_t bytes = 8'000'000;
+    std::size_t owner_bytes = 4'000'000;
     Owner owners = 16;
     std::array<std::byte, 16> key{};  ///< random key of the hash table
   };

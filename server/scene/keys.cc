@@ -336,6 +336,8 @@ constexpr Count kProcessor{1023};  ///< the maximum number in the cpu_set_t of t
 constexpr Number kTimeout{.least = 1, .most = limits::kMaxTimeout / std::chrono::milliseconds(1)};
 /// Each observer requires 250 bytes per haptic step. For 1000 observers, this is 2 Gbit/s at 1 kHz.
 constexpr Count kObservers{1000};
+/// In MB. Half of the least cache has room for a field with all bricks (BrickField::kMostBricks).
+constexpr Number kFieldCache{.least = 4, .most = 1000};
 constexpr Count kNetworkThreads{kMostDevices / limits::kMaxDevices, 1};
 
 }  // namespace
@@ -431,6 +433,20 @@ void declare_scene(Table& scene, Draft& draft) {
     force.key("max_stiffness_n_per_m", control.hold.max_stiffness, kAboveZero,
               "Maximum stiffness of the engine's local model. A higher stiffness is reduced to it");
     declare_between(force, control.hold);
+  });
+
+  const Name field{"field", "renders objects that engines upload"};
+  scene.part(field, draft.scene.loop.control.hold.field, [&draft](Table& keys, field::Renderer::Config& renderer) {
+    Scene::Fields& fields = draft.scene.fields;
+    keys.key("allow", fields.channels, ListOf<Label>{}, "Names of the channels that may use fields",
+             Absent{.text = "all channels"});
+    keys.key("max_stiffness_n_per_m", renderer.max_stiffness, kAboveZero,
+             "Maximum stiffness of a material or a fixture. Stiffer ones are refused");
+    keys.key("push_j", renderer.push.push_j, kZeroOrMore,
+             "Energy that a moving object can give to the hand at once. 0: an object cannot push the hand");
+    keys.key("push_w", renderer.push.push_w, kZeroOrMore, "Rate at which this energy is refilled, up to push_j");
+    keys.key("cache_mb", fields.cache_bytes, kFieldCache,
+             "Size of the cache for uploaded bricks, for each network thread. A client can use half of it");
   });
 
   scene.tables("channel", draft.scene.channels, limits::kMaxChannels, [](Table& keys, Scene::Channel& channel) {

@@ -173,7 +173,7 @@ class LimiterResolver : SceneErrors {
       if (!listed) listed = chosen.parts.*part.config;
     });
     HeldForce::Config& hold = control.hold;
-    if (!hold.adaptive_local_model && !hold.output_estimator && !hold.learned_model) {
+    if (!hold.adaptive_local_model && !hold.output_estimator && !hold.learned_model && !hold.field) {
       hold.learned_model = chosen.learned_model;
     }
   }

@@ -36,7 +36,8 @@ bool take_out(Scene& scene, std::string_view key) {
   if (!draft.scene.teleoperation) {
     control.coupling.reset();
     control.leaders.clear();
-    limiter.shared_account = false;
+    limiter.shared_account =
+        control.hold.field && (control.hold.field->push.push_j > 0 || control.hold.field->push.push_w > 0);
   }
   if (!draft.simulated.rotation) {
     control.rotation.reset();
@@ -48,6 +49,7 @@ bool take_out(Scene& scene, std::string_view key) {
   }
   if (limiter.law == Law::kNone) {
     limiter.shared_account = false;
+    if (control.hold.field) control.hold.field->push = {};
     if (control.coupling) control.coupling->tank.reset();
   }
   if (!limiter.parts.adaptive_friction) control.friction_map.reset();

@@ -51,6 +51,7 @@ class SceneResolver : SceneErrors {
     resolve_teleoperation(directory);
     resolve_replay(directory);
     resolve_channels();
+    resolve_fields();
     resolve_count();
     // Some rules are only checked by the constructors.
     Scene& scene = draft_.scene;
@@ -268,6 +269,41 @@ class SceneResolver : SceneErrors {
     }
   }
 
+  void resolve_fields() {
+    Scene& scene = draft_.scene;
+    for (const std::string& allowed : scene.fields.channels) {
+      std::vector<std::string_view> names;
+      for (const Scene::Channel& channel : scene.channels) names.push_back(channel.name);
+      if (std::ranges::find(names, allowed) != names.end()) continue;
+      std::string known;
+      for (const std::string_view name : names) known += (known.empty() ? "" : ", ") + in_quotes(name);
+      blame("field.allow", {},
+            "expected names of channels, which are " + known + ", found " + in_quotes(allowed) +
+                did_you_mean(allowed, names));
+    }
+    HapticController::Config& control = scene.loop.control;
+    if (!control.hold.field) return;
+    const field::EnergyGate::Config& push = control.hold.field->push;
+    if (push.push_j == 0 && push.push_w == 0) return;
+    expect_shared_account(push.push_j > 0 ? "field.push_j" : "field.push_w");
+    control.limiter.shared_account = true;
+  }
+
+  /// `key` requires that energy can be credited to the account of the limiter.
+  void expect_shared_account(const std::string& key) const {
+    const LimiterConfig& limiter = draft_.scene.loop.control.limiter;
+    const Law law = limiter.law;
+    if (law != Law::kAolPlus && law != Law::kAol && law != Law::kAolBox) {
+      blame(key, {"limiter.kind"},
+            "expected the limiter \"aol+\", \"aol\" or \"aol-box\": other limiters have no energy account that ports "
+            "can share");
+    }
+    if (limiter.parts.latency_reserve) {
+      blame("limiter.latency_reserve", {},
+            "expected none with " + key + ": the reserve is not proved for an account that is shared by several ports");
+    }
+  }
+
   void resolve_safety() {
     Scene& scene = draft_.scene;
     // A device that moves a real hand must always be armed explicitly.
@@ -400,16 +436,7 @@ class SceneResolver : SceneErrors {
     const bool waves = coupling.method == CouplingMethod::kWaves;
     const bool shares = coupling.tank || (waves && law != Law::kNone);
     const std::string what = coupling.tank ? "teleoperation.energy_tank" : "teleoperation.method";
-    if (shares && law != Law::kAolPlus && law != Law::kAol && law != Law::kAolBox) {
-      blame(what, {"limiter.kind"},
-            "expected the limiter \"aol+\", \"aol\" or \"aol-box\": other limiters have no energy account that ports "
-            "can share");
-    }
-    if (shares && control.limiter.parts.latency_reserve) {
-      blame(
-          "limiter.latency_reserve", {},
-          "expected none with " + what + ": the reserve is not proved for an account that is shared by several ports");
-    }
+    if (shares) expect_shared_account(what);
     control.limiter.shared_account = shares;
     build("teleoperation", [&coupling] { Coupling{coupling}; });
     control.coupling = coupling;

@@ -29,6 +29,11 @@ SimulatedDevice::Config Scene::simulated() const {
   return std::visit([](const auto& config) { return stand_in(config); }, device);
 }
 
+bool Scene::may_use_fields(const Channel& channel) const {
+  return has_fields() &&
+         (fields.channels.empty() || std::ranges::find(fields.channels, channel.name) != fields.channels.end());
+}
+
 std::string Scene::name_of(std::uint32_t index) const { return count == 1 ? name : name + '-' + std::to_string(index); }
 
 std::vector<Scene> each_device(const std::vector<Scene>& scenes) {

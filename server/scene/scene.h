@@ -21,6 +21,7 @@
 #include "devices/simulated/simulated_device.h"
 #include "devices/spacemouse/spacemouse_device.h"
 #include "devices/woodenhaptics/woodenhaptics_device.h"
+#include "protocol/field/brick_store.h"
 #include "protocol/link.h"
 #include "server/haptic_loop.h"
 #include "server/network_loop.h"
@@ -69,6 +70,12 @@ struct Scene {
     std::string name;  ///< if empty, "NAME at HOST"
   };
 
+  /// Only used if loop.control.hold.field is set.
+  struct Fields {
+    std::vector<std::string> channels{};  ///< that can use fields; if empty, all of them
+    double cache_bytes = static_cast<double>(BrickStore::Config{}.bytes);  ///< for each network thread
+  };
+
   /// The law is in loop.control.coupling.
   struct Teleoperation {
     std::optional<Address> dial;               ///< if empty, the peer connects to this server
@@ -93,6 +100,7 @@ struct Scene {
   HapticLoop::Config loop;
   std::optional<std::uint32_t> cpu;  ///< pins the haptic thread
   std::vector<Channel> channels = {Channel{}};
+  Fields fields;
   Network network;
   bool has_network = false;
   std::optional<Teleoperation> teleoperation;
@@ -103,6 +111,8 @@ struct Scene {
   std::string name_of(std::uint32_t index) const;
   const Driver& driver() const;
   bool shares_thread() const { return driver().ids.empty(); }  ///< USB devices may block, so they have their own
+  bool has_fields() const { return loop.control.hold.field.has_value(); }
+  bool may_use_fields(const Channel& channel) const;
   bool dials() const { return teleoperation && teleoperation->dial; }
   /// For devices other than SimulatedDevice, for measuring the cost of a step.
   SimulatedDevice::Config simulated() const;

@@ -46,6 +46,7 @@ constexpr std::array kUnits = {
     Unit{"_pa", "Pa", 1},
     Unit{"_um", "µm", 1e6},
     Unit{"_us", "µs", 1e6},
+    Unit{"_j", "J", 1},
     Unit{"_m", "m", 1},
     Unit{"_n", "N", 1},
     Unit{"_s", "s", 1},

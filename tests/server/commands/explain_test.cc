@@ -26,9 +26,18 @@ std::function<Duration()> ticking() {
 
 /// Returns the effects of a device, the tables, and one key.
 std::set<std::string> optional_parts() {
-  std::set<std::string> keys = {
-      "device.hand", "device.environment", "device.rotation", "device.gripper",     "loop.max_speed_m_per_s", "safety",
-      "limiter",     "admittance",         "teleoperation",   "teleoperation.turn", "teleoperation.grip"};
+  std::set<std::string> keys = {"device.hand",
+                                "device.environment",
+                                "device.rotation",
+                                "device.gripper",
+                                "loop.max_speed_m_per_s",
+                                "safety",
+                                "limiter",
+                                "admittance",
+                                "field",
+                                "teleoperation",
+                                "teleoperation.turn",
+                                "teleoperation.grip"};
   std::istringstream reference(scene_reference());
   std::string table;
   for (std::string line; std::getline(reference, line);) {
