@@ -64,6 +64,12 @@ ServedDevice::Config served_config(const Assembly::Part& part, Mailboxes& mail) 
   ServedDevice::Config served{.about = description_of(scene, info),
                               .handle = part.handle ? *part.handle : handle_of(scene, info),
                               .mail = &mail};
+  if (const auto& renderer = scene.loop.control.hold.field) {
+    FieldLimits& limits = served.fields.emplace();
+    for (const Scene::Channel& channel : scene.channels) limits.allowed.push_back(scene.may_use_fields(channel));
+    limits.max_stiffness = renderer->max_stiffness;
+    limits.cache_bytes = static_cast<std::size_t>(scene.fields.cache_bytes);
+  }
   if (!scene.teleoperation) return served;
   for (const CoupledLeader& leader : scene.loop.control.leaders) served.leaders.push_back(leader.channel);
   served.coupling = couple_of(*scene.loop.control.coupling);
@@ -153,6 +159,7 @@ void Assembly::add_devices(std::vector<Part>& parts, const Config& config, std::
       capacities.ports = part.scene.teleoperation ? std::bit_ceil(couplings) * capacities.ports : 1;
     }
     capacities.flight_handles = !part.device.info().position_only();
+    capacities.fields = part.scene.has_fields();
     add_group_of(devices_.emplace_back(part, capacities), shard.number);
   }
 }

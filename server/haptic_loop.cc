@@ -47,6 +47,10 @@ void put_state(DeviceState& state, std::uint32_t device, const StepRecord& recor
   state.stiffness_wanted = record.stiffness;
   state.buttons = record.buttons;
   state.hand_force = record.hand_force;
+  state.field.reset();
+  if (const auto& field = record.field) {
+    state.field = {.generation = field->generation, .depth = field->depth, .proxy = field->proxy};
+  }
 }
 
 Coupling* coupling_of(HapticController& controller, std::uint32_t number) noexcept {
@@ -126,10 +130,24 @@ void HapticLoop::take_mail(LocalTime now) noexcept {
   for (std::size_t channel = 0; channel < config_.control.channels.size(); ++channel) {
     if (const RemoteForce* force = mail_.forces[channel].take()) controller_.observe(*force, channel);
   }
+  if (mail_.fields) take_fields(now);
   if (Couplings* const couplings = controller_.couplings()) take_ports(*couplings, now);
   // The last force of a released source may still have been in its mailbox and must not count as fresh. Releasing twice
   // is harmless because source numbers are never reused.
   for (std::size_t i = 0; i < releases; ++i) controller_.release(now, released[i].source, released[i].channel);
+}
+
+void HapticLoop::take_fields(LocalTime now) noexcept {
+  for (std::size_t channel = 0; channel < config_.control.channels.size(); ++channel) {
+    FieldBox& box = (*mail_.fields)[channel];
+    if (const PostedField* const posted = box.use.take()) {
+      controller_.use(posted->use, now, channel);
+      field_sources_[channel] = posted->use.source;
+      box.taken.store(posted->number, std::memory_order_release);
+    }
+    const ArrivedPose* const pose = box.pose.take();
+    if (pose != nullptr && pose->source == field_sources_[channel]) controller_.observe(pose->pose, channel);
+  }
 }
 
 void HapticLoop::take_ports(Couplings& couplings, LocalTime now) noexcept {

@@ -63,6 +63,7 @@ class HapticLoop {
   };
 
   void take_mail(LocalTime now) noexcept;
+  [[gnu::noinline]] void take_fields(LocalTime now) noexcept;
   void take_ports(Couplings& couplings, LocalTime now) noexcept;
   [[gnu::noinline]] void set_outputs(LocalTime now) noexcept;  // not inlined because it is rare
   HandleSample handle_in(const PositionSample& sample) noexcept;
@@ -89,6 +90,7 @@ class HapticLoop {
   std::array<std::uint32_t, kMostOutputs> outputs_set_{};  ///< OutputSettings::One::number of the settings in effect
   std::array<std::uint32_t, Couplings::kMost> peer_numbers_{};        ///< the number of each current peer; see kRenew
   std::array<std::optional<ArrivedPort>, Couplings::kMost> peers_{};  ///< received since the previous step
+  std::array<std::uint32_t, limits::kMaxChannels> field_sources_{};   ///< of the newest field of each channel
   Effort applied_;
   std::uint64_t tick_ = 0;
   LocalTime due_{};

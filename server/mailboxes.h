@@ -8,9 +8,12 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 
 #include "core/exchange/latest.h"
 #include "core/exchange/spsc_ring.h"
+#include "core/field/field_pose.h"
+#include "core/remote/field_use.h"
 #include "core/remote/remote_force.h"
 #include "core/teleoperation/port_state.h"
 #include "core/teleoperation/shares.h"
@@ -50,6 +53,24 @@ struct ArrivedPort {
   std::uint32_t peer = 0;  ///< consecutive number of the peer, see HapticOrder::kRenew
 };
 
+/// A field that the haptic thread must use from now on (FieldSlots).
+struct PostedField {
+  FieldUse use;
+  std::uint32_t number = 0;  ///< consecutive for each channel, from 1
+};
+
+struct ArrivedPose {
+  field::TimedPose pose;
+  std::uint32_t source = 0;  ///< as in FieldUse
+};
+
+/// The mailboxes of one channel for fields.
+struct FieldBox {
+  Latest<PostedField> use;
+  Latest<ArrivedPose> pose;
+  std::atomic<std::uint32_t> taken{0};  ///< number of the newest field that the haptic thread has taken
+};
+
 /// A Hello that was received by the first network thread and must be processed by another one.
 struct HandedHello {
   Address from{};
@@ -69,6 +90,7 @@ struct Mailboxes {
     std::size_t flight = 2048;  ///< 2 s at 1 kHz
     std::size_t datagrams = 4096;
     bool flight_handles = true;  ///< if false, only positions are stored
+    bool fields = false;
 
     /// For each device of a server that records. For more than 16 devices, the total size of the step queues is the
     /// same as for 16. For example, 512 devices have queues of 512 steps, which is half a second at 1 kHz.
@@ -93,10 +115,13 @@ struct Mailboxes {
       : steps(capacities.steps),
         ports(capacities.ports),
         flight(capacities.flight, capacities.flight_handles),
-        datagrams(capacities.datagrams) {}
+        datagrams(capacities.datagrams) {
+    if (capacities.fields) fields = std::make_unique<std::array<FieldBox, limits::kMaxChannels>>();
+  }
   Mailboxes() : Mailboxes(Capacities{}) {}
 
   std::array<Latest<RemoteForce>, limits::kMaxChannels> forces;
+  std::unique_ptr<std::array<FieldBox, limits::kMaxChannels>> fields;  ///< null if no channel can use fields
   SpscRing<HapticOrder> orders{kOrders};
   Latest<DeviceState> state;
   Latest<OutputSettings> outputs;

@@ -6,6 +6,7 @@
 #include <limits>
 #include <utility>
 
+#include "protocol/secrets/blake2b.h"
 #include "protocol/wire/header.h"
 #include "server/clients/requests.h"
 #include "server/clients/states.h"
@@ -50,6 +51,11 @@ NetworkLoop::NetworkLoop(const Config& config, Link& link, LocalTime now)
           {.keys = config.keys.size(), .needs_no_key = config.needs_no_key, .max_observers = config.max_observers}),
       next_connection_id_(config.first_connection_id / config.shard.of * config.shard.of + config.shard.number) {
   half_open_.reserve(config.max_half_open);
+  if (FieldIntake::needed(devices_)) {
+    FieldIntake::Config fields{.secret = crypto::blake2b_128(config.secret)};
+    for (const ClientKey& key : config.keys) fields.keys.push_back(key.name);
+    fields_ = std::make_unique<FieldIntake>(fields, devices_, clients_);
+  }
   const auto out = [this](LocalTime at, const Address& to, std::span<const std::byte> datagram) {
     send(at, kClient, to, datagram);
   };
@@ -66,6 +72,7 @@ LocalTime NetworkLoop::turn(LocalTime now) {
   publish(now);
   const bool more = drain(now);
   report(now);
+  LocalTime next = fields_ ? fields_->turn(now) : LocalTime::max();
   for (ServedClient& client : clients_) {
     if (client.session.open() && client.session.next_tick() > now) continue;  // usually nothing is due
     if (!client.gone) client.session.tick(now);
@@ -76,7 +83,10 @@ LocalTime NetworkLoop::turn(LocalTime now) {
   stats_.half_open_forgotten += std::erase_if(
       half_open_, [&](const ServedClient& client) { return now - client.arrived >= config_.half_open_timeout; });
 
-  LocalTime next = ports_.turn(now);
+  if (fields_) {
+    for (std::string& said : fields_->take_notices()) notice(true, std::move(said));
+  }
+  next = std::min(next, ports_.turn(now));
   for (Peer::Notice& said : ports_.take_notices()) notice(said.warning, std::move(said.text));
   if (more) return now;
   for (const ServedClient& client : clients_) next = std::min(next, client.session.next_tick());
@@ -124,7 +134,7 @@ void NetworkLoop::receive(LocalTime now, const Address& from, std::span<const st
       ++stats_.roamed;
     }
     if (newest) hear(now, *client);
-    take_refused(*client);
+    forces_.take_refused(*client);
     take_events(now, *client);  // before `measure`, which can wait
     if (newest) measure(now, *client);
   } else if (const auto waiting = std::find_if(half_open_.begin(), half_open_.end(), is_meant);
@@ -377,7 +387,11 @@ void NetworkLoop::publish(LocalTime now) {
 void NetworkLoop::take_events(LocalTime now, ServedClient& client) {
   while (const Session::Event* const event = client.session.next_event()) {
     if (const auto* force = std::get_if<Session::ForceArrived>(event)) {
-      take_force(now, client, force->command);
+      forces_.take(now, client, force->command);
+    } else if (const auto* brick = std::get_if<Session::BrickArrived>(event)) {
+      if (!fields_ || !fields_->take(now, client, brick->brick)) ++stats_.denied;
+    } else if (const auto* pose = std::get_if<Session::FieldPoseArrived>(event)) {
+      if (!fields_ || !fields_->take(now, client, pose->pose)) ++stats_.denied;
     } else if (const auto* port = std::get_if<Session::PortArrived>(event)) {
       if (!ports_.take(now, client, port->port)) ++stats_.denied;
     } else if (const auto* asked = std::get_if<Session::RequestArrived>(event)) {
@@ -399,97 +413,6 @@ void NetworkLoop::send_all(LocalTime now, ServedClient& client) {
   }
 }
 
-/// Stores the reported error and solver path of a force. Returns the number of the path.
-std::uint8_t NetworkLoop::note(const ForceCommand& command, const ServedClient& client, ServedDevice& device) {
-  ServedChannel& channel = device.channels[command.channel];
-  const bool named = command.way > 0 && command.way <= client.ways.size();
-  const std::uint8_t way = named ? device.mail->ways.number_of(client.ways[command.way - 1]) : std::uint8_t{0};
-  channel.doubt.observe(command.error, way);
-  channel.worst_error = std::max(channel.worst_error, command.error);
-  if (way > 0) {
-    channel.by_way.resize(std::max<std::size_t>(channel.by_way.size(), way + 1U));
-    ++channel.by_way[way];
-  }
-  return way;
-}
-
-void NetworkLoop::take_force(LocalTime now, ServedClient& client, const ForceCommand& command) {
-  const std::uint32_t index = client.device_of(command.device);
-  const bool there = index < devices_.size() && command.channel < devices_[index].channels.size();
-  if (!there || leases_.holder(index, command.channel) != client.id()) {
-    ++stats_.denied;
-    return;
-  }
-  ServedDevice& device = devices_[index];
-  ServedChannel& channel = device.channels[command.channel];
-  const auto answered = device.sampled.find(command.based_on_tick);
-  if (!answered) {
-    ++stats_.unanswerable;
-    ++client.refused.unknown_tick;
-    channel.lateness.refused(Lateness::Cause::kUnknownTick, 1);
-    return;
-  }
-  if (client.adaptation && client.adaptation->unusable()) {
-    ++stats_.unusable;
-    return;
-  }
-  leases_.renew(now, index, command.channel);
-  const double bound = device.about.max_force;  // N; 0 if unknown
-  if (bound > 0 && command.force.squaredNorm() > bound * bound) channel.lateness.cut();
-  const LinkStats& link = client.session.stats();
-  const std::uint64_t lost = link.lost + link.lost_outgoing;
-  channel.lateness.observe({.sampled = answered->at,
-                            .sent = answered->sent,
-                            .received = now,
-                            .round_trip = link.round_trip,
-                            .valid_for = command.valid_for,
-                            .lost = lost > std::exchange(client.lost, lost)});
-  RemoteForce& force = device.mail->forces[command.channel].back();  // contains an old value
-  force.sequence = command.sequence;
-  force.answers_tick = command.based_on_tick;
-  force.answers = answered->at;
-  force.received = now;
-  force.force = command.force;
-  force.model = command.model;
-  if (force.model && force.model->contact && force.model->contact->table) {
-    // The haptic loop flushes denormal numbers to zero and would refuse a table with such a step.
-    double& step = force.model->contact->table->step;
-    step = std::max(step, std::numeric_limits<double>::min());
-  }
-  force.valid_for = command.valid_for;
-  force.source = channel.holder;
-  force.topology_changed = command.topology_changed;
-  force.error = command.error;
-  force.way = note(command, client, device);
-  // If the client does not support this feature, it does not know the limits of the handle.
-  if (!client.has<kFeatureHandle>() && (command.torque || command.grip_force)) ++stats_.denied;
-  force.torque = client.has<kFeatureHandle>() ? command.torque : std::nullopt;
-  force.grip_force = client.has<kFeatureHandle>() ? command.grip_force : std::nullopt;
-  device.mail->forces[command.channel].put();
-  ++channel.forces;
-  ++stats_.forces;
-}
-
-/// Counts the forces that the session has refused for all channels of the client, because their channel is not known.
-void NetworkLoop::take_refused(ServedClient& client) {
-  const RefusedForces& all = client.session.stats().refused_forces;
-  const auto take = [&](std::uint64_t RefusedForces::*count, Lateness::Cause cause) {
-    if (const std::uint64_t before = std::exchange(client.refused.*count, all.*count); before != all.*count) {
-      blame(client, cause, all.*count - before);
-    }
-  };
-  take(&RefusedForces::not_finite, Lateness::Cause::kNotFinite);
-  take(&RefusedForces::out_of_bounds, Lateness::Cause::kOutOfBounds);
-  take(&RefusedForces::old_sequence, Lateness::Cause::kOldSequence);
-}
-
-void NetworkLoop::blame(const ServedClient& client, Lateness::Cause cause, std::uint64_t count) {
-  for (const Slot& slot : client.slots) {
-    ServedChannel& channel = devices_[slot.device].channels[slot.channel];
-    if (channel.holder == client.id()) channel.lateness.refused(cause, count);
-  }
-}
-
 void NetworkLoop::answer(LocalTime now, ServedClient& client, std::uint32_t id, Request request) {
   const auto find_device = [&client](auto& wanted) {
     if constexpr (requires { wanted.device; }) wanted.device = client.device_of(wanted.device);
@@ -499,7 +422,8 @@ void NetworkLoop::answer(LocalTime now, ServedClient& client, std::uint32_t id, 
                     .may_take_over = may_take_over(client),
                     .devices = devices_,
                     .clients = clients_,
-                    .leases = leases_};
+                    .leases = leases_,
+                    .fields = fields_.get()};
   Outcome outcome = tendon::answer(now, asker, request);
   if (outcome.code == Code::kDenied) ++stats_.denied;
   if (!outcome.warning.empty()) notice(true, std::move(outcome.warning));

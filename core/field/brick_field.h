@@ -26,7 +26,7 @@ namespace tendon::field {
 /// there if φ is positive.
 ///
 /// Source: Condat, Blu and Unser, "Beyond interpolation: optimal reconstruction by quasi-interpolation", ICIP 2005.
-/// Only the constructor allocates memory (2.3 MB). Thread-safe: only `at`.
+/// Only the constructor allocates memory (`memory()`, 2.3 MB). Thread-safe: only `at`.
 class BrickField {
  public:
   static constexpr int kSide = 8;
@@ -72,6 +72,7 @@ class BrickField {
 
   const Lattice& lattice() const noexcept { return lattice_; }
   std::size_t bricks() const noexcept { return used_; }
+  static std::size_t memory() noexcept { return kMostBricks * sizeof(Brick) + kMostCells * sizeof(Cell); }  ///< bytes
 
  private:
   static constexpr int kWide = kSide + 2;  ///< with the apron

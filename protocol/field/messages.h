@@ -8,6 +8,7 @@
 #include "core/base/expect.h"
 #include "core/base/time.h"
 #include "protocol/field/manifest.h"
+#include "protocol/field/pace.h"
 #include "protocol/messages.h"
 
 // The messages of an upload (OfferField, FieldBrick, FieldStatus) are generated from tendon.proto.
@@ -26,29 +27,17 @@ inline bool is_complete(const FieldStatus& status) noexcept {
   return std::ranges::all_of(status.missing, [](std::byte bits) { return bits == std::byte{}; });
 }
 
-/// Limits the rate of bricks (the generic cell rate algorithm of ATM, ITU-T I.371).
-class BrickPace {
+/// Limits the rate of bricks.
+class BrickPace : public Pace {
  public:
-  /// Up to `burst` can be sent at once after a pause. Throws std::invalid_argument if `bytes_per_s` is not in
-  /// 1 … 1e9, or if `burst` is negative.
-  BrickPace(double bytes_per_s, Duration burst) : burst_(burst) {
-    expect(bytes_per_s >= 1 && bytes_per_s <= 1e9, "bytes_per_s", bytes_per_s, "1 … 1e9");
-    expect_not_negative(seconds(burst), "burst_s");
-    interval_ = from_seconds(limits::kBrickBytes / bytes_per_s);
-  }
-
-  LocalTime next() const noexcept { return next_; }
-  /// Returns false if the rate is exceeded.
-  bool pass(LocalTime now) noexcept {
-    if (next_ > now) return false;
-    next_ = std::max(next_, now - burst_) + interval_;
-    return true;
-  }
+  /// Throws std::invalid_argument if `bytes_per_s` is not in 1 … 1e9, or if `burst` is negative.
+  BrickPace(double bytes_per_s, Duration burst) : Pace(interval_at(bytes_per_s), burst) {}
 
  private:
-  Duration interval_{};
-  Duration burst_;
-  LocalTime next_{};
+  static Duration interval_at(double bytes_per_s) {
+    expect(bytes_per_s >= 1 && bytes_per_s <= 1e9, "bytes_per_s", bytes_per_s, "1 … 1e9");
+    return from_seconds(limits::kBrickBytes / bytes_per_s);
+  }
 };
 
 }  // namespace tendon

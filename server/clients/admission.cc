@@ -11,10 +11,11 @@ namespace tendon {
 
 namespace {
 
-std::vector<std::string> in_common(const std::vector<std::string>& offered, Role role) {
+std::vector<std::string> in_common(const std::vector<std::string>& offered, Role role, bool has_fields) {
   std::vector<std::string> both;
   for (const std::string_view feature : Features::kSupported) {
-    const bool not_for_it = feature == kFeatureDiagnostics && role != Role::kObserver;
+    const bool not_for_it =
+        (feature == kFeatureDiagnostics && role != Role::kObserver) || (feature == kFeatureFields && !has_fields);
     const bool is_offered = std::find(offered.begin(), offered.end(), feature) != offered.end();
     if (is_offered && !not_for_it) both.emplace_back(feature);
   }
@@ -146,7 +147,9 @@ Welcome Admission::welcome_for(const ServerHandshake::Client& client, const Addr
                                const std::vector<ServedClient>& clients) {
   Welcome welcome;
   welcome.version = client.version;
-  welcome.features = in_common(client.hello.features, client.hello.role);
+  const bool has_fields = std::any_of(slots.begin(), slots.end(),
+                                      [&](const Slot& slot) { return devices[slot.device].fields.has_value(); });
+  welcome.features = in_common(client.hello.features, client.hello.role, has_fields);
   welcome.role = client.hello.role;
   const DeviceDescription& first = devices[slots.front().device].about;
   welcome.device_name = first.model;

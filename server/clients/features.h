@@ -16,9 +16,9 @@ namespace tendon {
 class Features {
  public:
   /// The optional features of this server. The order determines the bits.
-  static constexpr std::array kSupported = {kFeatureLocalModel, kFeatureChannels,     kFeatureDiagnostics,
-                                            kFeatureHandle,     kFeatureJoints,       kFeatureTeleoperation,
-                                            kFeatureOutputs,    kFeatureStateColumns, kFeatureWays};
+  static constexpr std::array kSupported = {
+      kFeatureLocalModel,    kFeatureChannels, kFeatureDiagnostics,  kFeatureHandle, kFeatureJoints,
+      kFeatureTeleoperation, kFeatureOutputs,  kFeatureStateColumns, kFeatureWays,   kFeatureFields};
 
   Features() = default;
   explicit Features(const std::vector<std::string>& names) {

@@ -12,6 +12,7 @@
 
 #include "core/base/expect.h"
 #include "server/clients/couple.h"
+#include "server/clients/field_intake.h"
 
 namespace tendon {
 
@@ -207,9 +208,16 @@ Outcome set_output(LocalTime /*now*/, const Asker& asker, const SetOutput& wante
   return {};
 }
 
-template <class Wanted>
-Outcome no_fields(LocalTime /*now*/, const Asker& /*asker*/, const Wanted& /*wanted*/) {
-  return {.code = Code::kUnsupported, .detail = "this server does not support the feature fields"};
+/// Calls a member of FieldIntake if the session has the feature and is one of a controller.
+template <class Wanted, Outcome (FieldIntake::*kDo)(LocalTime, const ServedClient&, const Wanted&)>
+Outcome with_fields(LocalTime now, const Asker& asker, const Wanted& wanted) {
+  if (asker.fields == nullptr || !asker.client.has<kFeatureFields>()) {
+    return {.code = Code::kUnsupported, .detail = "the session does not have the feature fields"};
+  }
+  if (asker.client.role != Role::kController) {
+    return {.code = Code::kDenied, .detail = "only a controller may upload or use a field"};
+  }
+  return (asker.fields->*kDo)(now, asker.client, wanted);
 }
 
 enum class From : std::uint8_t {
@@ -273,9 +281,9 @@ constexpr std::array kRequests = {
     row<Disengage, From::kControllers, disengage>("disengage a coupling"),
     row<SetScale, From::kControllers, set_scale>("set the scales of a coupling"),
     row<SetShare, From::kControllers, set_share>("set the share of a leader"),
-    row<OfferField, From::kAnybody, no_fields<OfferField>>("offer a field"),
-    row<UseField, From::kAnybody, no_fields<UseField>>("use a field"),
-    row<DropField, From::kAnybody, no_fields<DropField>>("drop a field"),
+    row<OfferField, From::kAnybody, with_fields<OfferField, &FieldIntake::offer>>("offer a field"),
+    row<UseField, From::kAnybody, with_fields<UseField, &FieldIntake::use>>("use a field"),
+    row<DropField, From::kAnybody, with_fields<DropField, &FieldIntake::drop>>("drop a field"),
 };
 static_assert(kRequests.size() == std::variant_size_v<Request>);
 constexpr bool in_order() {

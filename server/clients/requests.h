@@ -13,12 +13,15 @@
 
 namespace tendon {
 
+class FieldIntake;
+
 struct Asker {
   ServedClient& client;
   bool may_take_over = false;  ///< it does not need to wait until the lease expires
   std::vector<ServedDevice>& devices;
   const std::vector<ServedClient>& clients;
   Leases& leases;
+  FieldIntake* fields = nullptr;  ///< null if no device has fields
 };
 
 struct Outcome {

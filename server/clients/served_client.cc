@@ -92,7 +92,8 @@ std::vector<ServedDevice> served_devices(const std::vector<ServedDevice::Config>
                                                              .handle = config.handle,
                                                              .mail = config.mail,
                                                              .coupling = config.coupling,
-                                                             .leaders = config.leaders});
+                                                             .leaders = config.leaders,
+                                                             .fields = config.fields});
     device.about.device = device.handle.device = number_of(static_cast<std::uint32_t>(i));
     device.channels.resize(device.about.channels.size());
   }

@@ -146,6 +146,13 @@ struct ServedChannel {
   std::vector<std::uint64_t> by_way{};  ///< by index in Mailboxes::ways
 };
 
+/// For a device whose scene has [field].
+struct FieldLimits {
+  std::vector<bool> allowed{};  ///< for each channel
+  double max_stiffness = 0;     ///< N/m, of a material with its branch, and of a fixture
+  std::size_t cache_bytes = 0;  ///< of the network thread
+};
+
 struct ServedDevice {
   struct Config {
     DeviceDescription about;  ///< device number and holders are ignored
@@ -153,6 +160,7 @@ struct ServedDevice {
     std::optional<Couple> coupling{};
     std::vector<std::uint32_t> leaders{};  ///< channels of a follower's leaders; empty: the leader can use any
     std::optional<Peer::Config> dial{};    ///< the server to connect to, if any
+    std::optional<FieldLimits> fields{};   ///< requires Mailboxes::fields
     Mailboxes* mail = nullptr;             ///< must outlive the loop
   };
 
@@ -166,6 +174,7 @@ struct ServedDevice {
   std::vector<std::uint32_t> leaders{};  ///< channel of each leader; empty if there is one leader, on any channel
   std::array<std::uint32_t, Shares::kMost> peers{};   ///< number of peers so far for each coupling
   std::array<PortFrame, Shares::kMost> peer_ports{};  ///< last port of the peer for each coupling
+  std::optional<FieldLimits> fields{};                ///< empty if no channel can use fields
   Outputs outputs{};
   std::optional<Health> told{};  ///< the last report to observers
   std::uint64_t reports = 0;

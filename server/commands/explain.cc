@@ -13,7 +13,10 @@
 #include <variant>
 
 #include "core/control/preset.h"
+#include "core/field/brick_field.h"
+#include "core/field/field.h"
 #include "devices/simulated/simulated_device.h"
+#include "server/clients/field_slots.h"
 
 namespace tendon {
 namespace {
@@ -62,13 +65,30 @@ class Playback final : public Device {
   std::size_t next_ = 0;
 };
 
+/// A sphere of 30 mm with its surface at the origin, in bricks of 2 mm.
+const field::Field& measured_field() {
+  static const field::BrickField kBricks = [] {
+    field::BrickField bricks;
+    const Vec3 centre(0, 0, -0.03);
+    const Vec3 half = Vec3::Constant(0.04);
+    sample([&](const Vec3& x) { return (x - centre).norm() - 0.03; }, centre - half, centre + half, 2e-3, bricks);
+    return bricks;
+  }();
+  static const field::Field kField{.bricks = &kBricks};
+  return kField;
+}
+
 class Trial {
  public:
   Trial(const Scene& scene, std::unique_ptr<Device> device)
       : device_(std::move(device)),
         safe_(made_safe(scene, *device_)),
+        mail_(std::make_unique<Mailboxes>(
+            Mailboxes::Capacities{.steps = 2, .flight = 2, .datagrams = 1, .fields = scene.has_fields()})),
         loop_(scene.loop, safe_ ? static_cast<Device&>(*safe_) : *device_, *mail_),
-        period_(scene.loop.period) {}
+        period_(scene.loop.period) {
+    if (mail_->fields) mail_->fields->front().use.put({.use = {&measured_field(), 1, 1}, .number = 1});
+  }
   explicit Trial(const Scene& scene) : Trial(scene, std::make_unique<SimulatedDevice>(scene.simulated())) {}
 
   double steps(const std::function<Duration()>& processor_time) {
@@ -110,8 +130,7 @@ class Trial {
 
   std::unique_ptr<Device> device_;
   std::unique_ptr<SafeDevice> safe_;
-  std::unique_ptr<Mailboxes> mail_ =
-      std::make_unique<Mailboxes>(Mailboxes::Capacities{.steps = 2, .flight = 2, .datagrams = 1});
+  std::unique_ptr<Mailboxes> mail_;
   HapticLoop loop_;
   Duration period_;
   LocalTime now_{std::chrono::seconds(1)};
@@ -181,6 +200,42 @@ namespace {
 /// N/m. The highest stiffness of this limiter, 2 b/T (core/PROOFS.md, "Operational stiffness").
 double operational_stiffness(const LimiterConfig& limiter) {
   return 2 * limiter.friction.viscous / seconds(limiter.longest_hold);
+}
+
+std::string megabytes(double bytes) {
+  std::ostringstream text;
+  text << std::fixed << std::setprecision(1) << bytes / 1e6 << " MB";
+  return text.str();
+}
+
+void put_fields(const Scene& scene, std::ostream& text) {
+  const field::Renderer::Config& renderer = *scene.loop.control.hold.field;
+  const double most = operational_stiffness(scene.loop.control.limiter);
+  std::string channels;
+  std::size_t count = 0;
+  for (const Scene::Channel& channel : scene.channels) {
+    if (!scene.may_use_fields(channel)) continue;
+    channels += (channels.empty() ? "" : ", ") + channel.name;
+    ++count;
+  }
+  const double slots = static_cast<double>(count * FieldSlots::memory());
+  text << "Fields: in " << channels << "; " << megabytes(slots) << " for " << FieldSlots::kCount
+       << " fields of each channel, and " << megabytes(scene.fields.cache_bytes)
+       << " for uploaded bricks, for each network thread\n  ";
+  if (renderer.max_stiffness > most) {
+    text << renderer.max_stiffness << " > 2b/T = " << std::llround(most) << " N/m: the limiter will clip";
+  } else {
+    text << renderer.max_stiffness << " ≤ 2b/T = " << std::llround(most)
+         << " N/m: a field cannot give out energy, even without the limiter, if the sum of its stiffnesses does not "
+            "exceed this (core/field/README.md, Theorem 1)";
+  }
+  text << "\n  a moving object gives the hand ";
+  if (renderer.push.push_j == 0) {
+    text << "no energy";
+  } else {
+    text << "at most " << renderer.push.push_j << " J + " << renderer.push.push_w << " W · t";
+  }
+  text << '\n';
 }
 
 /// This assumes that the configuration of both ends is the same.
@@ -277,6 +332,7 @@ std::string in_words(const Scene& scene, const Explanation& explanation) {
          << scene.name_of(scene.count - 1) << "; their steps take " << std::llround(100 * share)
          << " % of a processor; each device requires 1 MB of memory, without a recording\n";
   }
+  if (scene.has_fields()) put_fields(scene, text);
   if (const auto& coupling = scene.loop.control.coupling) put_coupling(*coupling, scene.loop.control.limiter, text);
   for (const CoupledLeader& leader : scene.loop.control.leaders) {
     text << "  " << scene.channels[leader.channel].name << " has a share of " << leader.share << "\n";

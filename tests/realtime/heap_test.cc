@@ -12,6 +12,7 @@
 #include "devices/safety/safe_device.h"
 #include "devices/simulated/profiles.h"
 #include "devices/simulated/simulated_device.h"
+#include "server/clients/field_slots.h"
 #include "server/haptic_loop.h"
 #include "tests/realtime/heap_guard.h"
 
@@ -124,6 +125,69 @@ TEST(FieldRenderer, TenThousandStepsMakeNoHeapCall) {
   }
   EXPECT_EQ(calls, 0U);
   EXPECT_GT(pressed, 3000);
+}
+
+// Two engines take turns: they post fields, move and swap them, send true forces, and leave.
+TEST(HapticLoop, WithFieldsMakesNoHeapCall) {
+  SimulatedDevice::Config hand = find_device_profile("falcon")->device();
+  hand.hand = OperatorHand::Config{.stiffness = 300,
+                                   .damping = 3,
+                                   .mass = 0.05,
+                                   .motion = ScriptedMotion(ScriptedMotion::Sine{.amplitude = 0.015, .frequency = 2})};
+  SimulatedDevice device(hand);
+  HapticLoop::Config config;
+  config.control.limiter = {.law = Law::kAolPlus, .friction = {0.3, 0.8}, .longest_hold = milliseconds(2)};
+  config.control.limiter.shared_account = true;
+  config.control.max_force = 8;
+  config.control.max_slew = 1000;
+  config.control.hold.field = field::Renderer::Config{.push = {.push_j = 0.01, .push_w = 0.1}};
+  const auto mail = std::make_unique<Mailboxes>(Mailboxes::Capacities{.steps = 16, .fields = true});
+  HapticLoop loop(config, device, *mail);
+  FieldSlots slots(mail->fields->front());
+  const auto fill = [](field::BrickField& bricks) {
+    field::sample([](const Vec3& x) { return 0.005 - x.x(); }, Vec3::Constant(-0.02), Vec3::Constant(0.02), 2e-3,
+                  bricks);
+  };
+  std::uint64_t calls = 0;
+  std::uint64_t touched = 0;
+  std::uint32_t generation = 0;
+  LocalTime now(std::chrono::seconds(1));
+  for (std::uint64_t n = 1; n <= 20'000; ++n) {
+    const auto source = static_cast<std::uint32_t>(1 + n / 2000 % 2);
+    const auto step_of = [n](std::uint64_t period) { return n % period == 0; };
+    if (step_of(50)) {
+      const FieldName name{static_cast<std::byte>(n / 50 % 2)};
+      slots.use({.materials = {{.stiffness = 300.0 + static_cast<double>(n % 400), .friction = 0.2}}}, name, fill,
+                ++generation, source);
+    }
+    if (step_of(4))
+      slots.move({.pose = {.at = now, .pose = {.position = Vec3(1e-6 * static_cast<double>(n % 999), 0, 0)}},
+                  .source = source});
+    if (step_of(1999)) mail->orders.try_push({.kind = HapticOrder::Kind::kRelease, .source = source});
+    if (step_of(1499)) slots.stop(source);
+    slots.turn(source);
+    if (step_of(10)) {
+      RemoteForce truth;
+      truth.sequence = n;
+      truth.answers_tick = n - 5;
+      truth.received = now;
+      truth.force = Vec3(-1, 0, 0);
+      truth.field = generation;
+      truth.source = source;
+      mail->forces[0].put(truth);
+    }
+    {
+      const HeapGuard guard;
+      now = loop.step(now);
+      calls += guard.calls();
+    }
+    while (const StepRecord* const step = mail->steps.front()) {
+      touched += step->field && step->field->depth > 0 ? 1 : 0;
+      mail->steps.pop();
+    }
+  }
+  EXPECT_EQ(calls, 0U);
+  EXPECT_GT(touched, 2000U);
 }
 
 // Four leaders engage, hold the clutch, stop sending, and change their shares.
