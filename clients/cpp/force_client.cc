@@ -140,6 +140,33 @@ bool ForceClient::set_output(std::uint32_t output, const OutputSetting& setting)
   return welcome_ && agreed_to(kFeatureOutputs) && refused_field(wanted).empty() && give_order(wanted);
 }
 
+bool ForceClient::use(Field field) {
+  if (!config_.fields) return false;
+  upload_.use(std::move(field));
+  return true;
+}
+
+bool ForceClient::pose(LocalTime at, const ObjectPose& pose) {
+  const auto clock = server_clock();
+  if (!clock || upload_.progress().generation == 0) return false;
+  connection_.session()->send(FieldPose{.device = lease_.place().device,
+                                        .channel = lease_.place().channel,
+                                        .sequence = ++poses_,
+                                        .time = clock->to_peer(at),
+                                        .position = pose.position,
+                                        .orientation = pose.orientation,
+                                        .velocity = pose.velocity,
+                                        .angular_velocity = pose.angular_velocity});
+  return true;
+}
+
+void ForceClient::upload(LocalTime now) {
+  Session* const session = connection_.session();
+  if (session == nullptr || !welcome_ || !agreed_to(kFeatureFields)) return;
+  upload_.turn(now, *session, lease_.place().device, lease_.place().channel, lease_.holds());
+  while (upload_.send_brick(now, *session)) connection_.flush(now);
+}
+
 bool ForceClient::take_lease() {
   Session* const session = connection_.session();
   return session != nullptr && lease_.ask(*session);
@@ -157,6 +184,7 @@ LocalTime ForceClient::turn(LocalTime now) {
   const LocalTime begun = now;  // next() advances `now` to the receive time
   while (const auto event = connection_.next(now)) take(now, *event);
   if (connection_.session() != nullptr && now >= lease_.due() && !take_lease()) lease_.ask_at(now + kAskLeaseAgain);
+  if (config_.fields) upload(now);
   connection_.flush(now);  // send everything that is due before the engine computes
   if (call(now)) connection_.flush(link_.present(now));
   return connection_.more() ? begun : next_turn();
@@ -182,6 +210,7 @@ void ForceClient::greet(LocalTime now) {
   if (config_.diagnostics) hello.features.emplace_back(kFeatureDiagnostics);
   if (config_.joints) hello.features.emplace_back(kFeatureJoints);
   if (config_.outputs) hello.features.emplace_back(kFeatureOutputs);
+  if (config_.fields) hello.features.emplace_back(kFeatureFields);
   if (!config_.ways.empty()) hello.features.emplace_back(kFeatureWays);
   hello.ways = config_.ways;
   if (claims()) hello.claims = {{.device = config_.device, .channel = config_.channel, .role = role_}};
@@ -215,6 +244,8 @@ void ForceClient::open(LocalTime now, const Welcome& welcome) {
   peer_reports_.clear();
   if (config_.state_hz > 0) session.request(SetStateRate{.hz = config_.state_hz, .device = lease_.place().device});
   sequence_ = 0;
+  poses_ = 0;
+  upload_.begin();
   answered_tick_ = 0;
   if (config_.deadband) deadband_ = HandleDeadband::of_forces(*config_.deadband);  // no force was sent in this session
   stats_.phase = Phase::kOpen;
@@ -226,6 +257,7 @@ void ForceClient::end(Phase phase, Code code, std::string reason) {
   stats_.code = code;
   stats_.reason = std::move(reason);
   lease_.close();
+  upload_.end();
   unseen_ = false;
   newest_.reset();
   pressed_ = 0;
@@ -269,6 +301,8 @@ void ForceClient::take_event(LocalTime now, const Session::Event& event) {
     device_report_ = of_device->report;
   } else if (const auto* of_peer = std::get_if<Session::PeerReportArrived>(&event)) {
     take_report(of_peer->report);
+  } else if (const auto* of_field = std::get_if<Session::FieldStatusArrived>(&event)) {
+    upload_.take(now, of_field->status, connection_.session()->stats().smoothed_round_trip);
   } else if (const auto* answered = std::get_if<Session::RequestAnswered>(&event)) {
     take_answer(now, *answered);
   } else if (const auto* asked = std::get_if<Session::RequestArrived>(&event)) {
@@ -280,6 +314,7 @@ void ForceClient::take_answer(LocalTime now, const Session::RequestAnswered& ans
   if (answered.device) description_ = answered.device;
   if (answered.handle) handle_ = answered.handle;
   if (answered.id == order_) order_answer_ = answered;
+  upload_.take(now, answered);
   if (answered.id == deadband_request_) {
     predicts_ = answered.code == Code::kOk && period_ > Duration::zero() &&
                 config_.state_deadband->max_silence > Duration::zero();
@@ -356,6 +391,11 @@ void ForceClient::send(LocalTime now, const Touch& touch, const DeviceState& ans
   ForceCommand command = to_command(touch, answered);
   command.device = lease_.place().device;
   command.channel = lease_.place().channel;
+  if (touch.is_truth) {
+    command.field = upload_.progress().generation;
+    if (command.field == 0) return;
+    command.model.reset();
+  }
   leave_out(touch, answered, command);
   if (!in_bounds(command)) {
     ++stats_.forces_unusable;
@@ -364,7 +404,7 @@ void ForceClient::send(LocalTime now, const Touch& touch, const DeviceState& ans
   }
   HandleDeadband::Value felt{.vector = command.force, .turning = {}, .grip = command.grip_force};
   if (command.torque) felt.turning = command.torque->torque;
-  if (deadband_ && !deadband_->passes(now, felt) && !touch.topology_changed) {
+  if (deadband_ && !touch.is_truth && !deadband_->passes(now, felt) && !touch.topology_changed) {
     ++stats_.forces_alike;
     return;
   }
@@ -402,6 +442,7 @@ LocalTime ForceClient::next_turn() const {
   LocalTime next = connection_.next_turn();
   if (connection_.session() == nullptr) return next;
   if (!physics_ || lease_.holds()) next = std::min(next, next_call());
+  if (config_.fields && welcome_ && agreed_to(kFeatureFields)) next = std::min(next, upload_.due());
   return std::min(next, lease_.due());
 }
 

@@ -12,6 +12,8 @@
 #include <string_view>
 #include <vector>
 
+#include "clients/cpp/field/field.h"
+#include "clients/cpp/field/field_upload.h"
 #include "clients/cpp/touch.h"
 #include "protocol/bandwidth/deadband.h"
 #include "protocol/connection.h"
@@ -95,6 +97,7 @@ class ForceClient {
     /// Requests the joints (DeviceState::joints, HandleDescription::joints): 16 bytes per joint and state.
     bool joints = false;
     bool outputs = false;  ///< requests access to the outputs (HandleDescription::outputs), for set_output()
+    bool fields = false;   ///< requests that the server renders fields, for use(). Only for controllers
     /// Names of the methods with which this engine computes forces, for observers and recordings. Touch::way is an
     /// index into them, starting at 1. At most limits::kMaxWays unique names of 1 to limits::kMaxLabel bytes.
     std::vector<std::string> ways{};
@@ -183,6 +186,16 @@ class ForceClient {
   /// rearm() does, without Config::outputs or the server's kFeatureOutputs, or for a `setting` out of bounds.
   bool set_output(std::uint32_t output, const OutputSetting& setting);
 
+  /// Uploads a field in this session and in later ones, and renders it while `holds()`. The callback should then return
+  /// Touch::truth or Touch::unknown, or a force that is added. Replaces the last field. Returns false, without effect,
+  /// if Config::fields is false. Throws std::invalid_argument with the name of a number that is out of bounds.
+  bool use(Field field);
+  void stop_using() noexcept { upload_.drop(); }  ///< a field
+  /// Moves the object of the field. `at` is the time of the pose, which should be half a round trip after now, on the
+  /// local clock. Returns false if no field is in use, or before the first round trip.
+  bool pose(LocalTime at, const ObjectPose& pose);
+  const FieldUpload::Progress& field() const noexcept { return upload_.progress(); }
+
   /// The server's answer to the most recent of these requests in this session; empty if there is none.
   const std::optional<Session::RequestAnswered>& order_answer() const noexcept { return order_answer_; }
 
@@ -236,6 +249,7 @@ class ForceClient {
   }
   bool claims() const noexcept { return !config_.device.empty() || !config_.channel.empty(); }
   void take_report(const PeerReport& report);
+  void upload(LocalTime now);
   void take_event(LocalTime now, const Session::Event& event);
   void take_answer(LocalTime now, const Session::RequestAnswered& answered);
   void take_request(LocalTime now, const Session::RequestArrived& arrived);
@@ -272,7 +286,9 @@ class ForceClient {
   bool predicts_ = false;                            ///< the server omits predictable states
   LocalTime next_call_{};
   std::optional<HandleDeadband> deadband_;
-  std::uint64_t sequence_ = 0;       ///< of the newest force
+  std::uint64_t sequence_ = 0;  ///< of the newest force
+  std::uint64_t poses_ = 0;     ///< sent in this session
+  FieldUpload upload_;
   std::uint64_t answered_tick_ = 0;  ///< state tick that the newest force answers
   std::optional<LinkReport> report_;
   std::optional<DeviceReport> device_report_;

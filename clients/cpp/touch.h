@@ -14,6 +14,12 @@ struct Touch {
   Touch() = default;
   /// Implicit so that a callback can return a Vec3.
   Touch(const Vec3& f) : force(f) {}  // NOLINT(google-explicit-constructor)
+  /// The true force of a field (ForceClient::use) at the state. It is not rendered, but corrects the field.
+  static Touch truth(const Vec3& f) {
+    Touch touch(f);
+    touch.is_truth = true;
+    return touch;
+  }
 
   Vec3 force = Vec3::Zero();  ///< N, acting on the hand: a wall that resists motion along +x pushes along −x
   // The optional fields below allow the device loop to extrapolate the force until the next answer
@@ -33,6 +39,7 @@ struct Touch {
   std::optional<Mat3> angular_stiffness{};
   std::optional<double> grip_force{};   ///< N, on the fingers in the gripper; > 0 opens them
   std::optional<Duration> valid_for{};  ///< clamped to 1 µs … limits::kMaxValidFor; empty: Config::valid_for
+  bool is_truth = false;                ///< not sent without a field; the stiffness is ignored
   bool unknown = false;                 ///< no force for this state: nothing is sent and the other fields are ignored
 };
 

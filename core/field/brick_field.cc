@@ -278,17 +278,18 @@ BrickField::Weights weights_of(const std::function<double(const Vec3&)>& signed_
   return weights;
 }
 
-void sample(const std::function<double(const Vec3&)>& signed_distance, const Vec3& low, const Vec3& high,
-            double spacing, BrickField& field) {
+SampledField sampled(const std::function<double(const Vec3&)>& signed_distance, const Vec3& low, const Vec3& high,
+                     double spacing) {
   constexpr double kScaledBand = 16;
   const double side = BrickField::kSide * spacing;
-  BrickField::Lattice lattice{.origin = low, .spacing = spacing, .scale = kScaledBand * spacing / kBiggestWeight};
+  SampledField field{.lattice = {.origin = low, .spacing = spacing, .scale = kScaledBand * spacing / kBiggestWeight}};
+  BrickField::Lattice& lattice = field.lattice;
   for (std::size_t a = 0; a < 3; ++a) {
     const double wanted = std::ceil((high - low)[static_cast<Eigen::Index>(a)] / side);
     expect(wanted >= 1 && wanted <= BrickField::kMostCells - 1, "extent", wanted, "1 … 65535 bricks along each axis");
     lattice.bricks[a] = static_cast<std::uint16_t>(wanted);
   }
-  field.reset(lattice);
+  if (const std::string why = lattice.refused(); !why.empty()) throw std::invalid_argument(why);
   for (std::uint16_t k = 0; k < lattice.bricks[2]; ++k) {
     for (std::uint16_t j = 0; j < lattice.bricks[1]; ++j) {
       for (std::uint16_t i = 0; i < lattice.bricks[0]; ++i) {
@@ -299,10 +300,21 @@ void sample(const std::function<double(const Vec3&)>& signed_distance, const Vec
                           k * BrickField::kSide + in_brick[2]);
           near = std::abs(signed_distance(low + spacing * node)) < BrickField::kBand * spacing;
         }
-        if (near) field.put({i, j, k}, weights_of(signed_distance, lattice, {i, j, k}));
+        if (!near) continue;
+        expect(field.bricks.size() < BrickField::kMostBricks, "bricks", static_cast<double>(field.bricks.size() + 1),
+               "at most " + std::to_string(BrickField::kMostBricks));
+        field.bricks.push_back({.place = {i, j, k}, .weights = weights_of(signed_distance, lattice, {i, j, k})});
       }
     }
   }
+  return field;
+}
+
+void sample(const std::function<double(const Vec3&)>& signed_distance, const Vec3& low, const Vec3& high,
+            double spacing, BrickField& field) {
+  const SampledField from = sampled(signed_distance, low, high, spacing);
+  field.reset(from.lattice);
+  for (const SampledField::Brick& brick : from.bricks) field.put(brick.place, brick.weights);
   field.finish();
 }
 

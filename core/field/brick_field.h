@@ -103,8 +103,22 @@ class BrickField {
 BrickField::Weights weights_of(const std::function<double(const Vec3&)>& signed_distance,
                                const BrickField::Lattice& lattice, const BrickField::Place& place);
 
-/// Fills `field` with the bricks of `signed_distance` between `low` and `high`, with the scale for a band of 16 h.
-/// Throws as `reset` and `put`. Realtime-safe: no.
+/// The bricks of a field, as they are uploaded.
+struct SampledField {
+  struct Brick {
+    BrickField::Place place{};
+    BrickField::Weights weights{};
+  };
+  BrickField::Lattice lattice{};
+  std::vector<Brick> bricks{};
+};
+
+/// Returns the bricks of `signed_distance` between `low` and `high`, with the scale for a band of 16 h. Throws
+/// std::invalid_argument as `reset`, and if there are more than kMostBricks. Realtime-safe: no.
+SampledField sampled(const std::function<double(const Vec3&)>& signed_distance, const Vec3& low, const Vec3& high,
+                     double spacing);
+
+/// Fills `field` with the bricks of sampled(). Realtime-safe: no.
 void sample(const std::function<double(const Vec3&)>& signed_distance, const Vec3& low, const Vec3& high,
             double spacing, BrickField& field);
 

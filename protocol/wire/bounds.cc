@@ -8,7 +8,9 @@
 #include <optional>
 
 #include "core/base/rotation.h"
+#include "core/field/field.h"
 #include "protocol/limits.h"
+#include "protocol/link.h"
 #include "protocol/wire/fields/reader.h"
 #include "protocol/wire/fields/writer.h"
 #include "protocol/wire/generated/frame_fields.h"
@@ -81,10 +83,10 @@ Numbers numbers_of(const ForceCommand& command) noexcept {
 }
 
 /// Encodes a request and returns the name of a field that would be refused.
-template <class Wanted, class List>
-std::string_view refused(Wanted& wanted, List list) noexcept {
+template <std::size_t kMost = 128, class Wanted, class List>
+std::string_view refused(Wanted& wanted, List list) {
   wanted.device = 0;
-  std::array<wire::Byte, 128> bytes;
+  std::array<wire::Byte, kMost> bytes;
   wire::Writer out(bytes.data());
   list(out, wanted);
   wire::Reader in(bytes.data(), out.at());
@@ -101,6 +103,13 @@ bool is_finite(const ForceCommand& command) noexcept { return numbers_of(command
 std::string_view refused_field(SetOutput wanted) noexcept { return refused(wanted, wire::kSetOutputFields); }
 std::string_view refused_field(SetScale wanted) noexcept { return refused(wanted, wire::kSetScaleFields); }
 std::string_view refused_field(SetShare wanted) noexcept { return refused(wanted, wire::kSetShareFields); }
+std::string_view refused_field(UseField wanted) {
+  if (wanted.materials.size() > field::Field::kMostMaterials) return "materials";  // the Writer truncates them
+  if (wanted.fixtures.size() > field::Field::kMostFixtures) return "fixtures";
+  wanted.channel = 0;
+  wanted.generation = 1;
+  return refused<kMaxDatagram>(wanted, wire::kUseFieldFields);
+}
 
 std::string_view objection(const ForceCommand& command) noexcept {
   if (in_bounds(command)) return {};

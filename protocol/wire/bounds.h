@@ -17,10 +17,12 @@ inline bool bounded(double value) noexcept { return std::abs(value) <= limits::k
 /// Checks the force, the model and the error of `command`, using the bounds of a receiver (WIRE.md).
 bool in_bounds(const ForceCommand& command) noexcept;
 
-/// Returns the first field out of bounds, or an empty string, in static storage. Ignores device and channel.
+/// Returns the first field out of bounds, or an empty string, in static storage. Ignores device and channel, and the
+/// generation of a field.
 std::string_view refused_field(SetOutput wanted) noexcept;
 std::string_view refused_field(SetScale wanted) noexcept;
 std::string_view refused_field(SetShare wanted) noexcept;
+std::string_view refused_field(UseField wanted);
 
 /// Returns false if `command` contains NaN, or infinity except for the `valid_radius` of a model.
 bool is_finite(const ForceCommand& command) noexcept;

@@ -65,15 +65,48 @@ LocalTime Server::turn(LocalTime now) {
       if (const auto* wanted = std::get_if<TakeLease>(&request->request)) {
         give_lease(request->id, *wanted);
       } else {
-        session_->answer(request->id, Code::kOk, "");
+        const Code code = answer_to(now, request->request);
+        session_->answer(request->id, code, code == Code::kOk ? "" : "refused by Z");
       }
     } else if (const auto* end = std::get_if<Session::Closed>(&*event)) {
       closed = end->code;
       session_.reset();
+    } else if (fields) {
+      take_field(now, *event);
     }
   }
+  while (session_ && fields) {
+    const auto status = fields->next_status(now);
+    if (!status) break;
+    session_->send(*status);
+  }
   flush(now);
-  return session_ ? std::min(session_->next_tick(), next_state_) : LocalTime::max();
+  const LocalTime status_due = fields ? fields->due() : LocalTime::max();
+  return session_ ? std::min({session_->next_tick(), next_state_, status_due}) : LocalTime::max();
+}
+
+void Server::take_field(LocalTime now, const Session::Event& event) {
+  if (const auto* brick = std::get_if<Session::BrickArrived>(&event)) {
+    if (const auto refused = fields->take(now, brick->brick)) refused_fields.push_back(*refused);
+  } else if (const auto* pose = std::get_if<Session::FieldPoseArrived>(&event)) {
+    poses.push_back(pose->pose);
+  }
+}
+
+Code Server::answer_to(LocalTime now, const Request& request) {
+  if (!fields) return Code::kOk;
+  if (const auto* part = std::get_if<OfferField>(&request)) {
+    const auto refused = fields->take(now, *part);
+    if (refused) refused_fields.push_back(*refused);
+    return refused ? refused->code : Code::kOk;
+  }
+  if (const auto* use = std::get_if<UseField>(&request)) {
+    return fields->ready(use->field) ? Code::kOk : Code::kInvalid;
+  }
+  if (const auto* drop = std::get_if<DropField>(&request)) {
+    return fields->drop(drop->field) ? Code::kOk : Code::kInvalid;
+  }
+  return Code::kOk;
 }
 
 void Server::give_lease(std::uint32_t id, const TakeLease& wanted) {

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "clients/cpp/force_client.h"
+#include "protocol/field/receiver.h"
 #include "protocol/handshake.h"
 #include "protocol/link.h"
 #include "protocol/session.h"
@@ -100,6 +101,12 @@ class Server {
   std::vector<Code> lease_answers;  ///< the answers to take_lease, followed by kOk
   int snatches = 0;                 ///< leases that are taken by another client immediately
 
+  /// The fields of the client; empty if they are not supported.
+  std::optional<BrickStore> bricks;
+  std::optional<FieldReceiver> fields;
+  std::vector<FieldReceiver::Refusal> refused_fields;
+  std::vector<FieldPose> poses;
+
   std::vector<LocalTime> attempts;  ///< contains an entry for each Hello with a valid cookie
   std::vector<Hello> hellos;
   std::vector<std::pair<LocalTime, ForceCommand>> forces;
@@ -116,6 +123,8 @@ class Server {
   }
   void hello(LocalTime now, const Address& from, std::span<const std::byte> datagram);
   void give_lease(std::uint32_t id, const TakeLease& wanted);
+  void take_field(LocalTime now, const Session::Event& event);
+  Code answer_to(LocalTime now, const Request& request);
   void flush(LocalTime now);
 
   Link& link_;

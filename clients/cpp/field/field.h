@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <vector>
+
+#include "protocol/field/sender.h"
+#include "protocol/messages.h"
+
+namespace tendon {
+
+/// An object that a server renders at its own rate (ForceClient::use). The solid is the union of all bricks and
+/// primitives. Lengths are in m, in the frame of the object.
+struct Field {
+  struct Sampling {
+    double spacing = 1e-3;      ///< m, of the nodes; walls must be at least twice as thick
+    std::uint8_t material = 0;  ///< of all bricks
+  };
+
+  /// Samples a signed distance (m, negative inside the solid) between `low` and `high`. It is called at least once for
+  /// each node near the surface. Throws std::invalid_argument if the spacing is not in 0.00025 … 0.008, or if there are
+  /// too many bricks: a larger spacing needs fewer.
+  static Field from(const std::function<double(const Vec3&)>& signed_distance, const Vec3& low, const Vec3& high,
+                    const Sampling& sampling);
+
+  FieldLattice lattice{};
+  std::vector<FieldSender::Brick> bricks{};                   ///< at most 1023
+  std::vector<field::Primitive> primitives{};                 ///< at most 32
+  std::vector<FieldMaterial> materials{{.stiffness = 1000}};  ///< 1 … 16; bricks and primitives contain an index
+  std::vector<FieldFixture> fixtures{};                       ///< at most 4
+};
+
+/// The pose of the object of a field, and how it changes, in the base frame of the device.
+struct ObjectPose {
+  Vec3 position = Vec3::Zero();          ///< m, of the origin of the object
+  Quat orientation{};                    ///< from the frame of the object to the base frame
+  Vec3 velocity = Vec3::Zero();          ///< m/s
+  Vec3 angular_velocity = Vec3::Zero();  ///< rad/s, in the axes of the base frame
+};
+
+}  // namespace tendon
