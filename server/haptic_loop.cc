@@ -47,9 +47,10 @@ void put_state(DeviceState& state, std::uint32_t device, const StepRecord& recor
   state.stiffness_wanted = record.stiffness;
   state.buttons = record.buttons;
   state.hand_force = record.hand_force;
-  state.field.reset();
   if (const auto& field = record.field) {
     state.field = {.generation = field->generation, .depth = field->depth, .proxy = field->proxy};
+  } else {
+    state.field.reset();
   }
 }
 

@@ -90,7 +90,7 @@ class HapticLoop {
   std::array<std::uint32_t, kMostOutputs> outputs_set_{};  ///< OutputSettings::One::number of the settings in effect
   std::array<std::uint32_t, Couplings::kMost> peer_numbers_{};        ///< the number of each current peer; see kRenew
   std::array<std::optional<ArrivedPort>, Couplings::kMost> peers_{};  ///< received since the previous step
-  std::array<std::uint32_t, limits::kMaxChannels> field_sources_{};   ///< of the newest field of each channel
+  std::array<std::uint32_t, limits::kMaxChannels> field_sources_{};  ///< the source of the newest field of each channel
   Effort applied_;
   std::uint64_t tick_ = 0;
   LocalTime due_{};

@@ -18,7 +18,6 @@
 #include "protocol/session.h"
 #include "server/clients/admission.h"
 #include "server/clients/field_intake.h"
-#include "server/clients/force_intake.h"
 #include "server/clients/leases.h"
 #include "server/clients/port_exchange.h"
 #include "server/clients/reports.h"
@@ -119,6 +118,8 @@ class NetworkLoop {
   std::vector<Notice> take_notices();
 
  private:
+  static constexpr std::size_t kMaxNotices = 64;
+
   bool drain(LocalTime& now);  ///< `now` is updated
   void receive(LocalTime now, const Address& from, std::span<const std::byte> datagram);
   void greet(LocalTime now, const Address& from, std::span<const std::byte> datagram);
@@ -129,6 +130,10 @@ class NetworkLoop {
   void refuse(LocalTime now, const Address& from, const ServerHandshake::Client& client, Refusal refusal);
   void open(LocalTime now, ServedClient client);
   void take_events(LocalTime now, ServedClient& client);
+  void take_force(LocalTime now, ServedClient& client, const ForceCommand& command);
+  std::uint8_t note(const ForceCommand& command, const ServedClient& client, ServedDevice& device);
+  void take_refused(ServedClient& client);
+  void blame(const ServedClient& client, Lateness::Cause cause, std::uint64_t count);
   void answer(LocalTime now, ServedClient& client, std::uint32_t id, Request request);
   void dispossess(LocalTime now, ServedClient& loser, const ServedClient& winner, const TakeLease& lost);
   bool may_take_over(const ServedClient& client) const;
@@ -161,8 +166,6 @@ class NetworkLoop {
   ServerHandshake handshake_;
   Admission admission_;
   Leases leases_{devices_};
-  Stats stats_;
-  ForceIntake forces_{devices_, leases_, stats_};
   Reports reports_;
   std::vector<ServedClient> clients_;
   PortExchange ports_{devices_, clients_, leases_};
@@ -170,6 +173,7 @@ class NetworkLoop {
   std::vector<ServedClient> half_open_;  ///< oldest first
   std::uint32_t next_connection_id_;
 
+  Stats stats_;
   std::vector<Notice> notices_;
   std::vector<Foreign> foreign_;
 };

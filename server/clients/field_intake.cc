@@ -16,7 +16,7 @@ namespace {
 
 constexpr Duration kNoticeEvery = std::chrono::seconds(1);  ///< of a client
 constexpr std::size_t kMostFieldNotices = 16;
-constexpr std::size_t kCellsOfABrick = 64;  ///< of the coarse lattice, which take as long as a brick to build
+constexpr std::size_t kCellsOfABrick = 64;  ///< number of cells that take as long to build as a brick
 
 std::string named_field(const FieldName& name) { return "field " + short_name(name) + ": "; }
 
@@ -53,7 +53,7 @@ field::Fixture fixture_of(const FieldFixture& sent) {
   return fixture;
 }
 
-field::Field field_of(const UseField& wanted) {
+field::Field field_of(const FieldManifest& manifest, const UseField& wanted) {
   field::Field field;
   field.materials.clear();
   for (const FieldMaterial& sent : wanted.materials) field.materials.push_back(material_of(sent));
@@ -61,6 +61,7 @@ field::Field field_of(const UseField& wanted) {
     field.fixtures.push_back(fixture_of(sent));
     field.fixtures.back().most_force = sent.most_force.value_or(std::numeric_limits<double>::infinity());
   }
+  for (std::size_t i = 0; i < manifest.primitives(); ++i) field.primitives.push_back(manifest.primitive(i));
   return field;
 }
 
@@ -166,7 +167,7 @@ Outcome FieldIntake::use(LocalTime now, const ServedClient& client, const UseFie
 
 Outcome FieldIntake::pass_on(LocalTime now, Guest& guest, Channel& channel, const FieldManifest& manifest,
                              const UseField& wanted, std::uint32_t source) {
-  field::Field field = field_of(wanted);
+  field::Field field = field_of(manifest, wanted);
   std::string objection = objection_to(field, manifest, devices_[wanted.device].fields->max_stiffness);
   if (!objection.empty()) return {.code = Code::kInvalid, .detail = named_field(wanted.field) + std::move(objection)};
   const std::size_t bricks = manifest.bricks();

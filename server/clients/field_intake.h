@@ -22,7 +22,7 @@ namespace tendon {
 
 /// Receives the fields and poses of all clients of a network loop, and passes them to the haptic threads. The bricks of
 /// all clients are in one store, in which each key can only find its own. A client can only use a field in a channel
-/// that it holds and that allows fields (FieldLimits). If it leaves, its offers are dropped, but its bricks remain.
+/// that it holds and that allows fields (FieldLimits). When a client leaves, its offers are removed, but its bricks stay in the store.
 /// The constructor allocates the store, and the slots of each channel that allows fields.
 /// Thread-safe: no. Realtime-safe: no.
 class FieldIntake {

@@ -15,9 +15,9 @@
 namespace tendon {
 
 /// Passes the fields of one channel to the haptic thread, which only receives pointers. A field does not change while
-/// the haptic thread can use it. There are kCount slots: for the field in use, for a posted one that the haptic thread
-/// has not taken yet, and for the next one. The haptic thread takes a posted field in its next step. If several fields
-/// are requested before, the newest one wins.
+/// the haptic thread can use it. One of the kCount slots contains the field in use, one contains the posted field, which
+/// the haptic thread takes in its next step, and the last one is free for the next field. If several fields are requested
+/// within a step, the newest one wins.
 /// Only the constructor allocates the memory of bricks. Thread-safe: no. Realtime-safe: no.
 class FieldSlots {
  public:

@@ -149,7 +149,7 @@ struct ServedChannel {
 /// For a device whose scene has [field].
 struct FieldLimits {
   std::vector<bool> allowed{};  ///< for each channel
-  double max_stiffness = 0;     ///< N/m, of a material with its branch, and of a fixture
+  double max_stiffness = 0;     ///< N/m, maximum stiffness of a material with its branch, and of a fixture
   std::size_t cache_bytes = 0;  ///< of the network thread
 };
 

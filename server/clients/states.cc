@@ -25,8 +25,10 @@ void leave_out_what_no_frame_carries(DeviceState& state) {
   if (state.joints &&
       !(std::ranges::all_of(state.joints->angle, fits) && std::ranges::all_of(state.joints->velocity, fits)))
     state.joints.reset();
-  if (state.field && !(fits(state.field->depth) && (state.field->proxy.array().abs() <= limits::kMaxValue).all()))
-    state.field.reset();
+}
+
+bool fits_a_frame(const FieldState& field) {
+  return std::abs(field.depth) <= limits::kMaxValue && (field.proxy.array().abs() <= limits::kMaxValue).all();
 }
 
 void leave_out_handle(DeviceState& state) {
@@ -53,7 +55,7 @@ bool publish_state(ServedClient& client, Subscription& subscription, const Devic
   }
   if (!client.has<kFeatureHandle>()) leave_out_handle(told);
   if (!client.has<kFeatureJoints>()) told.joints.reset();
-  if (!client.has<kFeatureFields>()) told.field.reset();
+  if (told.field && !(client.has<kFeatureFields>() && fits_a_frame(*told.field))) told.field.reset();
   told.buttons = subscription.pressed;
   // The client uses these rounded values for its prediction.
   if (client.has<kFeatureStateColumns>() && fits_columns(told)) round_to_columns(told);

@@ -336,7 +336,7 @@ constexpr Count kProcessor{1023};  ///< the maximum number in the cpu_set_t of t
 constexpr Number kTimeout{.least = 1, .most = limits::kMaxTimeout / std::chrono::milliseconds(1)};
 /// Each observer requires 250 bytes per haptic step. For 1000 observers, this is 2 Gbit/s at 1 kHz.
 constexpr Count kObservers{1000};
-/// In MB. Half of the least cache has room for a field with all bricks (BrickField::kMostBricks).
+/// A client can use half of the cache, which must store at least one field of BrickField::kMostBricks bricks.
 constexpr Number kFieldCache{.least = 4, .most = 1000};
 constexpr Count kNetworkThreads{kMostDevices / limits::kMaxDevices, 1};
 

@@ -12,6 +12,7 @@
 
 #include "protocol/connection.h"
 #include "protocol/field/sender.h"
+#include "tests/support/field_shape.h"
 
 namespace tendon {
 
@@ -31,9 +32,9 @@ class FieldEngine {
     connection_.greet(now, config.hello);
   }
 
-  FieldSender& upload(const FieldLattice& lattice, std::vector<FieldSender::Brick> bricks) {
-    const auto& kept = bricks_.emplace_back(std::move(bricks));
-    return uploads.emplace_back(FieldSender::Config{}, lattice, kept);
+  FieldSender& upload(const FieldShape& shape) {
+    const auto& kept = bricks_.emplace_back(shape.bricks);
+    return uploads.emplace_back(FieldSender::Config{}, shape.lattice, kept, shape.primitives);
   }
 
   /// Returns the number of the request, or 0 if the session accepts none now.

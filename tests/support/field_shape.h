@@ -9,6 +9,7 @@
 
 #include "core/base/bytes.h"
 #include "core/field/brick_field.h"
+#include "core/field/primitives.h"
 #include "protocol/field/sender.h"
 
 namespace tendon {
@@ -17,8 +18,9 @@ namespace tendon {
 struct FieldShape {
   FieldLattice lattice;
   std::vector<FieldSender::Brick> bricks;
+  std::vector<field::Primitive> primitives{};
 
-  /// The same, as the haptic thread uses it.
+  /// The bricks, as the haptic thread uses it.
   field::BrickField built() const {
     field::BrickField field;
     field.reset(lattice);

@@ -45,7 +45,7 @@ TEST_F(FieldRefusals, AnObserverUploadsNothing) {
   FieldEngine::Config config;
   config.hello.role = Role::kObserver;
   const Engine one = engine("127.0.0.1:4000", config);
-  one->upload(ball().lattice, ball().bricks);
+  one->upload(ball());
   run(milliseconds(200), {&one});
   EXPECT_EQ(one->welcome->features, std::vector<std::string>({"channels", "fields"}));
   ASSERT_FALSE(one->answers.empty());

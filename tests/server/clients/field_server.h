@@ -85,7 +85,7 @@ class FieldServer : public Servers {
   }
   /// Uploads a shape. Returns false if this takes longer than 10 s.
   bool upload(const Engine& to, const FieldShape& shape) {
-    const FieldSender& sender = to->upload(shape.lattice, shape.bricks);
+    const FieldSender& sender = to->upload(shape);
     for (int i = 0; i < 1000 && !sender.complete(); ++i) run(std::chrono::milliseconds(10), {&to});
     return sender.complete();
   }

@@ -104,6 +104,20 @@ TEST_F(FieldUse, AnUploadSurvivesLossReorderingAndDuplicates) {
   EXPECT_EQ(assembly_->network().stats().denied, 0U);
 }
 
+TEST_F(FieldUse, PrimitivesNeedNoBrick) {
+  start({scene_of(kStir)});
+  way_ = milliseconds(100);
+  const Engine one = engine("127.0.0.1:4000");
+  FieldShape shape;
+  shape.primitives.push_back({.shape = field::Sphere{.centre = Vec3(0.028, 0, 0), .radius = 0.02}});
+  ASSERT_TRUE(upload(one, shape));
+  EXPECT_EQ(one->uploads.back().sent(), 0U);
+  EXPECT_EQ(answer_to(one->use(newest(one), 1), one).code, Code::kOk);
+  double deepest = 0;
+  run(seconds(1), {&one}, [&] { deepest = std::max(deepest, last_.field->depth); });
+  EXPECT_GT(deepest, 1e-3);
+}
+
 TEST_F(FieldUse, ARestartedEngineSendsNothing) {
   start({scene_of(kStir)});
   Engine one = engine("127.0.0.1:4000");
@@ -138,7 +152,7 @@ const std::string kTwoChannels = "[[channel]]\nname = \"liver\"\n[[channel]]\nna
 const ClientKey kLiver{.name = "liver", .role = Role::kController, .key = Ratchet(1).next()};
 const ClientKey kPeg{.name = "peg", .role = Role::kController, .key = Ratchet(2).next()};
 
-/// The manifest of a field with 1000 bricks that nobody has.
+/// A field of 1000 different bricks.
 FieldShape big(std::uint8_t first) {
   FieldShape shape{.lattice = {.bricks = {10, 10, 10}}, .bricks = std::vector<FieldSender::Brick>(1000)};
   for (std::size_t i = 0; i < 1000; ++i) {
@@ -219,6 +233,27 @@ TEST_F(FieldUse, AnEngineThatDiesLeavesNoForce) {
   run(milliseconds(2500), {});  // controller_timeout is 2 s
   EXPECT_FALSE(last_.field);
   EXPECT_EQ(last_.wanted.norm(), 0);
+  EXPECT_GE(least_energy_, -1e-9);
+}
+
+TEST_F(FieldUse, WhoTakesTheLeaseStopsTheField) {
+  start({scene_of(kStir + "[[channel]]\nname = \"ball\"\nlease_ms = 100\n")});
+  const Engine first = engine("127.0.0.1:4000", claiming("ball"));
+  ASSERT_TRUE(upload(first, ball()));
+  EXPECT_EQ(answer_to(first->use(newest(first), 9), first).code, Code::kOk);
+  run(milliseconds(100), {&first});
+  EXPECT_EQ(last_.field->generation, 9U);
+  const Engine second = engine("127.0.0.1:4001", claiming("ball"));
+  run(milliseconds(100), {&first, &second});
+  ASSERT_EQ(answer_to(second->ask(TakeLease{}), second).code, Code::kOk);
+  run(milliseconds(10), {&first, &second});
+  EXPECT_FALSE(last_.field);
+  first->move({.time = PeerTime(now_.time_since_epoch()), .position = Vec3(1, 0, 0)});
+  ASSERT_TRUE(upload(second, ball()));
+  EXPECT_EQ(answer_to(second->use(newest(second), 1), second).code, Code::kOk) << "with its own generations";
+  double deepest = 0;
+  run(seconds(1), {&first, &second}, [&] { deepest = std::max(deepest, last_.field ? last_.field->depth : 0); });
+  EXPECT_GT(deepest, 1e-3) << "where the first engine has moved the ball does not matter";
   EXPECT_GE(least_energy_, -1e-9);
 }
 

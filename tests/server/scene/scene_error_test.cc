@@ -176,7 +176,7 @@ TEST(SceneError, FindsAnUnknownKeyInEveryTable) {
         << error_of(text);
   }
   EXPECT_EQ(error_of_minimal_and("[other]\nzzzzzz = 1\n"),
-            "s.toml:4: other: unknown table; expected one of device, loop, safety, limiter, admittance, force, "
+            "s.toml:4: other: unknown table; expected one of device, loop, safety, limiter, admittance, force, field, "
             "channel, teleoperation, network, discovery, recording");
 }
 
@@ -489,7 +489,7 @@ TEST(SceneError, SurvivesTheDeepestNestingThatFits) {
   std::string deep = "[a";
   while (deep.size() + 4 < kMaxSceneBytes) deep += ".a";
   EXPECT_EQ(error_of(deep + "]\n"),
-            "s.toml:1: a: unknown table; expected one of device, loop, safety, limiter, admittance, force, channel, "
+            "s.toml:1: a: unknown table; expected one of device, loop, safety, limiter, admittance, force, field, channel, "
             "teleoperation, network, discovery, recording");
   EXPECT_TRUE(error_of("a = " + std::string(16'000, '[')).starts_with("s.toml:1: not TOML: "));
 }

@@ -92,9 +92,9 @@ TEST(SceneField, ExplainSaysWhetherTheLimiterClipsAndWhatAnObjectGives) {
   says("allow = [\"peg\"]\n", "Fields: in peg; 6.9 MB ");
   says("", "  a moving object gives the hand no energy\n");
   says("push_j = 0.05\npush_w = 1\n", "  a moving object gives the hand at most 0.05 J + 1 W · t\n");
-  // 0.8 N·s/m and a hold of 2 ms
-  says("", "  1500 > 2b/T = ");
-  says("max_stiffness_n_per_m = 200\n", "  200 ≤ 2b/T = ");
+  // The viscous bound is 0.5 N·s/m, and the longest hold is 2 ms.
+  says("", "  1500 > 2b/T = 500 N/m: the limiter will clip\n");
+  says("max_stiffness_n_per_m = 200\n", "  200 ≤ 2b/T = 500 N/m: ");
   EXPECT_EQ(in_words(minimal_and(""), {}).find("Fields:"), std::string::npos);
 }
 
