@@ -143,7 +143,7 @@ Newest<Value, Told>& of(Newest<Value, Told>& streams) noexcept {
   return streams;
 }
 
-/// The frames of the feature "fields". Other sessions do not pay for them.
+/// The frames of the feature "fields", which are only allocated if they are used.
 struct FieldFrames {
   Streams<Newest<FieldPose>, Newest<FieldStatus>> to_send;
   NewestBrick brick_to_send;
@@ -498,8 +498,8 @@ void Session::State::fill_with() {
   (fill_from(of<Value>(to_send)), ...);
 }
 
-/// Adds as much as possible, most urgent first, and the rest to the next datagram. A state fits in any case,
-/// and so does a force with a pose.
+/// Adds as much as possible, most urgent first, and the rest to the next datagram. A state
+/// always fits, and a force always fits together with a pose.
 void Session::State::fill(LocalTime now) {
   if (config.states_in_columns) fill_columns();
   fill_with<DeviceState, PortFrame, ForceCommand>();

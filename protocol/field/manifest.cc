@@ -72,7 +72,7 @@ class Numbers {
   std::size_t size_ = 0;
 };
 
-/// Returns an empty shape; `kind` is that of the manifest, 1 … 4.
+/// Returns a default shape of the given kind (1 … 4).
 Shape shape_of(unsigned kind) noexcept {
   switch (kind) {
     case 1:

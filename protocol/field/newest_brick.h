@@ -11,7 +11,7 @@ namespace tendon {
 /// A copy of the newest brick of a session. Memory is only allocated for the first one. Thread-safe: no.
 class NewestBrick {
  public:
-  bool waiting = false;  ///< the brick was not taken yet
+  bool waiting = false;  ///< true until the brick is sent or returned as an event
 
   void put(const FieldBrick& brick) {
     waiting = true;

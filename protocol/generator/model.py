@@ -193,7 +193,7 @@ class Field:
 
     @property
     def size(self) -> tuple[int, int]:
-        """Returns the least and the most bytes."""
+        """Returns the minimum and the maximum number of bytes."""
         assert self.bound.bytes and self.bound.bytes.most
         return int(self.bound.bytes.least), int(self.bound.bytes.most)
 

@@ -88,7 +88,7 @@ def _split(entry: str, indent: str) -> list[str]:
 def _comment(text: str, indent: str) -> list[str]:
     if not text:
         return []
-    if re.match(r"[a-z]+[,:;]? ", text) and not text.startswith(("rad", "m, ")):
+    if re.match(r"[a-z]+[,:;]? ", text) and not text.startswith(("rad", "m, ", "s, ")):
         text = capitalized(text)
     line = f"{indent}/** {text} */"
     if len(line) <= WIDTH and "\n" not in text:

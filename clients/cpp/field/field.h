@@ -10,8 +10,8 @@
 
 namespace tendon {
 
-/// An object that a server renders at its own rate (ForceClient::use). The solid is the union of all bricks and
-/// primitives. Lengths are in m, in the frame of the object.
+/// The shape of an object that is rendered by the server (ForceClient::use): the union of all bricks and primitives, in
+/// the frame of the object. All lengths are in m.
 struct Field {
   struct Sampling {
     double spacing = 1e-3;      ///< m, of the nodes; walls must be at least twice as thick
@@ -33,7 +33,7 @@ struct Field {
 
 /// The pose of the object of a field, and how it changes, in the base frame of the device.
 struct ObjectPose {
-  Vec3 position = Vec3::Zero();          ///< m, of the origin of the object
+  Vec3 position = Vec3::Zero();          ///< m, position of the origin of the object
   Quat orientation{};                    ///< from the frame of the object to the base frame
   Vec3 velocity = Vec3::Zero();          ///< m/s
   Vec3 angular_velocity = Vec3::Zero();  ///< rad/s, in the axes of the base frame

@@ -15,15 +15,15 @@
 
 namespace tendon {
 
-/// Uploads the field of a client and uses it in its channel, in each session again. A field that was replaced is
-/// dropped. Does not use sockets, clocks or threads. Thread-safe: no. Realtime-safe: no.
+/// Uploads a field and uses it in the channel of the client. This is repeated in each session. If the field is replaced,
+/// the previous one is removed from the server. Thread-safe: no. Realtime-safe: no.
 class FieldUpload {
  public:
   struct Progress {
-    std::uint32_t generation = 0;  ///< of the field in use; 0: none
-    bool current = false;          ///< the field in use is that of the last use()
+    std::uint32_t generation = 0;  ///< of the field that is rendered, or 0 if there is none
+    bool current = false;          ///< true if this is the field of the last call of use()
     std::uint64_t bricks_sent = 0;
-    std::string refused{};  ///< why the server has refused the field; empty: it has not
+    std::string refused{};  ///< the error message of the server, or empty if there is none
   };
 
   /// Replaces the field. Throws std::invalid_argument with the name of a number that is out of bounds.
@@ -38,7 +38,7 @@ class FieldUpload {
   void take(LocalTime now, const FieldStatus& status, Duration round_trip);
   void take(LocalTime now, const Session::RequestAnswered& answered);
 
-  /// Sends what is due, except bricks. `holds`: the client holds the channel.
+  /// Sends what is due, except bricks. `holds` is true if the client has the lease of the channel.
   void turn(LocalTime now, Session& session, std::uint32_t device, std::uint32_t channel, bool holds);
   /// Sends a brick if one is due. The caller must then send a datagram.
   bool send_brick(LocalTime now, Session& session);

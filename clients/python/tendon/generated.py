@@ -111,7 +111,7 @@ class Mode(IntEnum):
 
 
 class FieldFixtureKind(IntEnum):
-    """The shape that a fixture pulls to."""
+    """The shape of a fixture."""
 
     POINT = 1
     LINE = 2
@@ -383,94 +383,97 @@ class ForceCommand:
     # unknown. Servers treat an index that is larger than the number of ways as 0
     way: int = 0
     # With the feature "fields" only:
-    # If it is not 0, force is not rendered. It is the true force at the state `based_on_tick`, from which the server
-    # learns the error of the field with this generation (UseField.generation). The model is ignored
+    # If it is not 0, force is not rendered. It is the true force for the state `based_on_tick`, which is used for
+    # correcting the field with this generation (UseField.generation). The model is ignored
     field: int = 0
 
 
 @dataclass(frozen=True, slots=True)
 class OfferField:
-    """A part of the manifest of a field, which lists its bricks and primitives. Parts are sent in order."""
+    """A part of the manifest of a field, which contains its primitives and a list of its bricks. Parts are sent in
+    order."""
 
-    field: bytes  # the BLAKE2b-256 of the manifest, which is the name of the field
+    field: bytes  # the BLAKE2b-256 hash of the manifest, which is used as the name of the field
     size: int  # the size of the whole manifest in bytes
-    offset: int  # the place of the first byte of `part` in the manifest
+    offset: int  # the offset of this part in the manifest in bytes
     part: bytes
 
 
 @dataclass(frozen=True, slots=True)
 class FieldMaterial:
-    """A spring, beside a spring in series with a damper, with Coulomb friction (core/field/material.h)."""
+    """A viscoelastic material: a spring in parallel with a Maxwell element, which is a spring in series with a damper,
+    and Coulomb friction (core/field/material.h)."""
 
     stiffness: float  # N/m
-    branch_stiffness: float = 0.0  # N/m, of the spring in series with the damper, or 0 if there is none
-    relaxation: float = 0.0  # s, the time constant of the damper; ignored without this spring
+    # N/m. The stiffness of the spring in series with the damper, or 0 if there is no damper
+    branch_stiffness: float = 0.0
+    relaxation: float = 0.0  # s. The time constant of the damper. It is ignored if there is no damper
     friction: float = 0.0  # the coefficient of friction
 
 
 @dataclass(frozen=True, slots=True)
 class FieldFixture:
-    """A spring from the hand to the nearest position on a point, a line or a plane, in the frame of the object
-    (core/field/fixture.h)."""
+    """A spring that pulls the hand to a point, a line or a plane, in the frame of the object (core/field/fixture.h)."""
 
     kind: FieldFixtureKind
-    at: Vec3  # m, the point, or a point of the line or plane
-    normal: Vec3  # the direction of the line, or the normal of the plane; any for a point
+    at: Vec3  # m, the position of the point, or of any point on the line or plane
+    normal: Vec3  # The direction of the line or the normal of the plane. It is ignored if the fixture is a point
     stiffness: float  # N/m
-    most_force: float | None = None  # N, the largest force. None if the force is not limited
+    most_force: float | None = None  # N, the maximum force. None if the force is not limited
 
 
 @dataclass(frozen=True, slots=True)
 class UseField:
-    """Renders a field in a channel from now on, instead of the field that the channel has used. The server must have
-    the whole field (FieldStatus), and the client must hold the lease of the channel, as for a ForceCommand."""
+    """Uses a field in a channel instead of the previous one. The field must be complete on the server (FieldStatus),
+    and the client must have the lease of the channel, as for a ForceCommand."""
 
     device: int
     channel: int
-    generation: int  # increases with each UseField of a session, device and channel
-    field: bytes  # the name of the field
-    materials: Sequence[FieldMaterial]  # the materials that the manifest refers to, from number 0
+    generation: int  # A number that is increased with each UseField of a session, device and channel
+    field: bytes  # the hash of the manifest
+    materials: Sequence[FieldMaterial]  # the materials, which are numbered from 0 in the manifest
     fixtures: Sequence[FieldFixture] = ()
 
 
 @dataclass(frozen=True, slots=True)
 class DropField:
-    """Forgets a field. A channel that uses it stops. Its bricks stay in the cache of the server."""
+    """Removes a field from the server. If the field is used in a channel, it is no longer rendered. The bricks are kept
+    in the cache of the server."""
 
-    field: bytes  # the name of the field
+    field: bytes  # the hash of the manifest
 
 
 @dataclass(frozen=True, slots=True)
 class FieldBrick:
     """The weights of a brick (core/field/brick_field.h). Client → server, unreliable."""
 
-    hash: bytes  # the BLAKE2b-128 of the weights
-    weights: bytes  # 8³ int16, little-endian, x fastest
+    hash: bytes  # the BLAKE2b-128 hash of the weights
+    weights: bytes  # 8³ numbers (int16, little-endian), where x is the fastest index
 
 
 @dataclass(frozen=True, slots=True)
 class FieldStatus:
-    """What a server still needs of a field. Bit i % 8 of byte i / 8 is set if brick i of the manifest is missing. The
-    last of the 1024 bits is set if the manifest is not complete; the bits of unknown bricks are then 0. Absent bytes
-    are 0. Server → client, unreliable; for each field the newest one wins."""
+    """Reports which bricks of a field are missing on the server. Bit i % 8 of byte i / 8 is set if brick i of the
+    manifest is missing. The last one of the 1024 bits is set if the manifest is incomplete, and the bits of unknown
+    bricks are 0. Server → client, unreliable; for each field the newest one wins."""
 
-    field: bytes  # the name of the field
-    missing: bytes
+    field: bytes  # the hash of the manifest
+    missing: bytes  # the bits, where zeros at the end may be omitted
 
 
 @dataclass(frozen=True, slots=True)
 class FieldPose:
-    """The pose of the object of a channel, in the base frame of the device. It should be the pose that the engine
-    expects for the time of its arrival. The server extrapolates it with its velocities for at most 50 ms. Client →
-    server, unreliable; for each device and channel the highest sequence wins."""
+    """The pose of the object of a channel in the base frame of the device. The engine should send the pose that it
+    expects at the time when the message arrives. The server uses the velocities to extrapolate the pose by at most 50
+    ms. Client → server, unreliable; for each device and channel the highest sequence wins."""
 
     device: int
     channel: int
     sequence: int  # 1, 2, 3 … per session, device and channel
-    time_ns: int  # The time that the pose is for, on the clock of the SERVER, like DeviceState.sampled_ns
-    position: Vec3  # m, of the origin of the object. A server only accepts positions within 10 m
+    time_ns: int  # The time of the pose, on the clock of the SERVER as in DeviceState.sampled_ns
+    position: Vec3  # m, the position of the origin of the object, which must be within 10 m
     orientation: Quat  # the rotation from the frame of the object to the base frame
-    velocity: Vec3 = ZERO  # m/s, of the origin of the object
+    velocity: Vec3 = ZERO  # m/s, the velocity of the origin of the object
     angular_velocity: Vec3 = ZERO  # rad/s, the angular velocity in the axes of the base frame
 
 

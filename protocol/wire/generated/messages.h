@@ -25,7 +25,7 @@
 
 namespace tendon {
 
-/// The shape that a fixture pulls to. Part of the wire: never renumber.
+/// The shape of a fixture. Part of the wire: never renumber.
 enum class FieldFixtureKind : std::uint8_t {
   kPoint = 1,
   kLine = 2,
@@ -147,78 +147,84 @@ struct ForceCommand {
   /// it is unknown. Servers treat an index that is larger than the number of ways as 0
   std::uint32_t way = 0;
   // With the feature "fields" only:
-  /// If it is not 0, force is not rendered. It is the true force at the state `based_on_tick`, from which the server
-  /// learns the error of the field with this generation (UseField::generation). The model is ignored
+  /// If it is not 0, force is not rendered. It is the true force for the state `based_on_tick`, which is used for
+  /// correcting the field with this generation (UseField::generation). The model is ignored
   std::uint32_t field = 0;
 };
 
-/// A part of the manifest of a field, which lists its bricks and primitives. Parts are sent in order.
+/// A part of the manifest of a field, which contains its primitives and a list of its bricks. Parts are sent in order.
 struct OfferField {
-  std::array<std::byte, 32> field{};  ///< 32 bytes: the BLAKE2b-256 of the manifest, which is the name of the field
-  std::uint32_t size = 0;             ///< 1 … 65 535: the size of the whole manifest in bytes
-  std::uint32_t offset = 0;           ///< 0 … 65 535: the place of the first byte of `part` in the manifest
-  std::vector<std::byte> part{};      ///< 1 … 1000 bytes
+  /// 32 bytes: the BLAKE2b-256 hash of the manifest, which is used as the name of the field
+  std::array<std::byte, 32> field{};
+  std::uint32_t size = 0;         ///< 1 … 65 535: the size of the whole manifest in bytes
+  std::uint32_t offset = 0;       ///< 0 … 65 535: the offset of this part in the manifest in bytes
+  std::vector<std::byte> part{};  ///< 1 … 1000 bytes
 };
 
-/// A spring, beside a spring in series with a damper, with Coulomb friction (core/field/material.h).
+/// A viscoelastic material: a spring in parallel with a Maxwell element, which is a spring in series with a damper, and
+/// Coulomb friction (core/field/material.h).
 struct FieldMaterial {
-  double stiffness = 0;         ///< N/m, > 0
-  double branch_stiffness = 0;  ///< N/m, ≥ 0: of the spring in series with the damper, or 0 if there is none
-  double relaxation = 0;        ///< s, 0.01 … 10 or 0: the time constant of the damper; ignored without this spring
-  double friction = 0;          ///< 0 … 2: the coefficient of friction
+  double stiffness = 0;  ///< N/m, > 0
+  /// N/m, ≥ 0. The stiffness of the spring in series with the damper, or 0 if there is no damper
+  double branch_stiffness = 0;
+  double relaxation = 0;  ///< s, 0.01 … 10 or 0. The time constant of the damper. It is ignored if there is no damper
+  double friction = 0;    ///< 0 … 2: the coefficient of friction
 };
 
-/// A spring from the hand to the nearest position on a point, a line or a plane, in the frame of the object
-/// (core/field/fixture.h).
+/// A spring that pulls the hand to a point, a line or a plane, in the frame of the object (core/field/fixture.h).
 struct FieldFixture {
   FieldFixtureKind kind = FieldFixtureKind::kPoint;
-  Vec3 at = Vec3::Zero();       ///< m, the point, or a point of the line or plane
-  Vec3 normal = Vec3::UnitZ();  ///< unit vector: the direction of the line, or the normal of the plane; any for a point
-  double stiffness = 0;         ///< N/m, > 0
-  std::optional<double> most_force{};  ///< N, > 0: the largest force. Empty if the force is not limited
+  Vec3 at = Vec3::Zero();  ///< m, the position of the point, or of any point on the line or plane
+  /// unit vector. The direction of the line or the normal of the plane. It is ignored if the fixture is a point
+  Vec3 normal = Vec3::UnitZ();
+  double stiffness = 0;                ///< N/m, > 0
+  std::optional<double> most_force{};  ///< N, > 0: the maximum force. Empty if the force is not limited
 };
 
-/// Renders a field in a channel from now on, instead of the field that the channel has used. The server must have the
-/// whole field (FieldStatus), and the client must hold the lease of the channel, as for a ForceCommand.
+/// Uses a field in a channel instead of the previous one. The field must be complete on the server (FieldStatus), and
+/// the client must have the lease of the channel, as for a ForceCommand.
 struct UseField {
-  std::uint32_t device = 0;                ///< 0 … 15
-  std::uint32_t channel = 0;               ///< 0 … 7
-  std::uint32_t generation = 0;            ///< ≥ 1: increases with each UseField of a session, device and channel
-  std::array<std::byte, 32> field{};       ///< 32 bytes: the name of the field
-  std::vector<FieldMaterial> materials{};  ///< 1 … 16: the materials that the manifest refers to, from number 0
+  std::uint32_t device = 0;   ///< 0 … 15
+  std::uint32_t channel = 0;  ///< 0 … 7
+  /// ≥ 1. A number that is increased with each UseField of a session, device and channel
+  std::uint32_t generation = 0;
+  std::array<std::byte, 32> field{};       ///< 32 bytes: the hash of the manifest
+  std::vector<FieldMaterial> materials{};  ///< 1 … 16: the materials, which are numbered from 0 in the manifest
   std::vector<FieldFixture> fixtures{};    ///< at most 4
 };
 
-/// Forgets a field. A channel that uses it stops. Its bricks stay in the cache of the server.
+/// Removes a field from the server. If the field is used in a channel, it is no longer rendered. The bricks are kept in
+/// the cache of the server.
 struct DropField {
-  std::array<std::byte, 32> field{};  ///< 32 bytes: the name of the field
+  std::array<std::byte, 32> field{};  ///< 32 bytes: the hash of the manifest
 };
 
 /// The weights of a brick (core/field/brick_field.h). Client → server, unreliable.
 struct FieldBrick {
-  std::array<std::byte, 16> hash{};      ///< 16 bytes: the BLAKE2b-128 of the weights
-  std::span<const std::byte> weights{};  ///< 1024 bytes: 8³ int16, little-endian, x fastest
+  std::array<std::byte, 16> hash{};  ///< 16 bytes: the BLAKE2b-128 hash of the weights
+  /// 1024 bytes: 8³ numbers (int16, little-endian), where x is the fastest index
+  std::span<const std::byte> weights{};
 };
 
-/// What a server still needs of a field. Bit i % 8 of byte i / 8 is set if brick i of the manifest is missing. The last
-/// of the 1024 bits is set if the manifest is not complete; the bits of unknown bricks are then 0. Absent bytes are 0.
-/// Server → client, unreliable; for each field the newest one wins.
+/// Reports which bricks of a field are missing on the server. Bit i % 8 of byte i / 8 is set if brick i of the manifest
+/// is missing. The last one of the 1024 bits is set if the manifest is incomplete, and the bits of unknown bricks are
+/// 0. Server → client, unreliable; for each field the newest one wins.
 struct FieldStatus {
-  std::array<std::byte, 32> field{};     ///< 32 bytes: the name of the field
-  std::array<std::byte, 128> missing{};  ///< 0 … 128 bytes
+  std::array<std::byte, 32> field{};     ///< 32 bytes: the hash of the manifest
+  std::array<std::byte, 128> missing{};  ///< 0 … 128 bytes: the bits, where zeros at the end may be omitted
 };
 
-/// The pose of the object of a channel, in the base frame of the device. It should be the pose that the engine expects
-/// for the time of its arrival. The server extrapolates it with its velocities for at most 50 ms. Client → server,
-/// unreliable; for each device and channel the highest sequence wins.
+/// The pose of the object of a channel in the base frame of the device. The engine should send the pose that it expects
+/// at the time when the message arrives. The server uses the velocities to extrapolate the pose by at most 50 ms.
+/// Client → server, unreliable; for each device and channel the highest sequence wins.
 struct FieldPose {
-  std::uint32_t device = 0;    ///< 0 … 15
-  std::uint32_t channel = 0;   ///< 0 … 7
-  std::uint64_t sequence = 0;  ///< 1, 2, 3 … per session, device and channel
-  PeerTime time{};             ///< The time that the pose is for, on the clock of the SERVER, like DeviceState::sampled
-  Vec3 position = Vec3::Zero();  ///< m, of the origin of the object. A server only accepts positions within 10 m
+  std::uint32_t device = 0;      ///< 0 … 15
+  std::uint32_t channel = 0;     ///< 0 … 7
+  std::uint64_t sequence = 0;    ///< 1, 2, 3 … per session, device and channel
+  PeerTime time{};               ///< The time of the pose, on the clock of the SERVER as in DeviceState::sampled
+  Vec3 position = Vec3::Zero();  ///< m, the position of the origin of the object, which must be within 10 m
   Quat orientation{};            ///< the rotation from the frame of the object to the base frame
-  Vec3 velocity = Vec3::Zero();  ///< m/s, of the origin of the object
+  Vec3 velocity = Vec3::Zero();  ///< m/s, the velocity of the origin of the object
   Vec3 angular_velocity = Vec3::Zero();  ///< rad/s, the angular velocity in the axes of the base frame
 };
 

@@ -191,8 +191,8 @@ export interface ForceCommand {
   readonly way?: number | undefined;
   // With the feature "fields" only:
   /**
-   * If it is not 0, force is not rendered. It is the true force at the state `basedOnTick`, from which the server
-   * learns the error of the field with this generation (UseField.generation). The model is ignored
+   * If it is not 0, force is not rendered. It is the true force for the state `basedOnTick`, which is used for
+   * correcting the field with this generation (UseField.generation). The model is ignored
    */
   readonly field?: number | undefined;
 }
@@ -251,103 +251,109 @@ export interface ForceTable {
   readonly force: readonly number[];
 }
 
-/** A part of the manifest of a field, which lists its bricks and primitives. Parts are sent in order. */
+/**
+ * A part of the manifest of a field, which contains its primitives and a list of its bricks. Parts are sent in order.
+ */
 export interface OfferField {
-  /** The BLAKE2b-256 of the manifest, which is the name of the field */
+  /** The BLAKE2b-256 hash of the manifest, which is used as the name of the field */
   readonly field: Uint8Array;
   /** The size of the whole manifest in bytes */
   readonly size: number;
-  /** The place of the first byte of `part` in the manifest */
+  /** The offset of this part in the manifest in bytes */
   readonly offset: number;
   readonly part: Uint8Array;
 }
 
 /**
- * Renders a field in a channel from now on, instead of the field that the channel has used. The server must have the
- * whole field (FieldStatus), and the client must hold the lease of the channel, as for a ForceCommand.
+ * Uses a field in a channel instead of the previous one. The field must be complete on the server (FieldStatus), and
+ * the client must have the lease of the channel, as for a ForceCommand.
  */
 export interface UseField {
   readonly device: number;
   readonly channel: number;
-  /** Increases with each UseField of a session, device and channel */
+  /** A number that is increased with each UseField of a session, device and channel */
   readonly generation: number;
-  /** The name of the field */
+  /** The hash of the manifest */
   readonly field: Uint8Array;
-  /** The materials that the manifest refers to, from number 0 */
+  /** The materials, which are numbered from 0 in the manifest */
   readonly materials: readonly FieldMaterial[];
   readonly fixtures?: readonly FieldFixture[] | undefined;
 }
 
-/** Forgets a field. A channel that uses it stops. Its bricks stay in the cache of the server. */
+/**
+ * Removes a field from the server. If the field is used in a channel, it is no longer rendered. The bricks are kept in
+ * the cache of the server.
+ */
 export interface DropField {
-  /** The name of the field */
+  /** The hash of the manifest */
   readonly field: Uint8Array;
 }
 
-/** A spring, beside a spring in series with a damper, with Coulomb friction (core/field/material.h). */
+/**
+ * A viscoelastic material: a spring in parallel with a Maxwell element, which is a spring in series with a damper, and
+ * Coulomb friction (core/field/material.h).
+ */
 export interface FieldMaterial {
   /** N/m */
   readonly stiffness: number;
-  /** N/m, of the spring in series with the damper, or 0 if there is none */
+  /** N/m. The stiffness of the spring in series with the damper, or 0 if there is no damper */
   readonly branchStiffness?: number | undefined;
-  /** S, the time constant of the damper; ignored without this spring */
+  /** s. The time constant of the damper. It is ignored if there is no damper */
   readonly relaxation?: number | undefined;
   /** The coefficient of friction */
   readonly friction?: number | undefined;
 }
 
-/**
- * A spring from the hand to the nearest position on a point, a line or a plane, in the frame of the object
- * (core/field/fixture.h).
- */
+/** A spring that pulls the hand to a point, a line or a plane, in the frame of the object (core/field/fixture.h). */
 export interface FieldFixture {
   readonly kind: FieldFixtureKind;
-  /** m, the point, or a point of the line or plane */
+  /** m, the position of the point, or of any point on the line or plane */
   readonly at: Vec3;
-  /** The direction of the line, or the normal of the plane; any for a point */
+  /** The direction of the line or the normal of the plane. It is ignored if the fixture is a point */
   readonly normal: Vec3;
   /** N/m */
   readonly stiffness: number;
-  /** N, the largest force. Absent if the force is not limited */
+  /** N, the maximum force. Absent if the force is not limited */
   readonly mostForce?: number | undefined;
 }
 
 /** The weights of a brick (core/field/brick_field.h). Client → server, unreliable. */
 export interface FieldBrick {
-  /** The BLAKE2b-128 of the weights */
+  /** The BLAKE2b-128 hash of the weights */
   readonly hash: Uint8Array;
-  /** 8³ int16, little-endian, x fastest */
+  /** 8³ numbers (int16, little-endian), where x is the fastest index */
   readonly weights: Uint8Array;
 }
 
 /**
- * What a server still needs of a field. Bit i % 8 of byte i / 8 is set if brick i of the manifest is missing. The last
- * of the 1024 bits is set if the manifest is not complete; the bits of unknown bricks are then 0. Absent bytes are 0.
+ * Reports which bricks of a field are missing on the server. Bit i % 8 of byte i / 8 is set if brick i of the manifest
+ * is missing. The last one of the 1024 bits is set if the manifest is incomplete, and the bits of unknown bricks are 0.
  * Server → client, unreliable; for each field the newest one wins.
  */
 export interface FieldStatus {
-  /** The name of the field */
+  /** The hash of the manifest */
   readonly field: Uint8Array;
+  /** The bits, where zeros at the end may be omitted */
   readonly missing: Uint8Array;
 }
 
 /**
- * The pose of the object of a channel, in the base frame of the device. It should be the pose that the engine expects
- * for the time of its arrival. The server extrapolates it with its velocities for at most 50 ms. Client → server,
- * unreliable; for each device and channel the highest sequence wins.
+ * The pose of the object of a channel in the base frame of the device. The engine should send the pose that it expects
+ * at the time when the message arrives. The server uses the velocities to extrapolate the pose by at most 50 ms. Client
+ * → server, unreliable; for each device and channel the highest sequence wins.
  */
 export interface FieldPose {
   readonly device: number;
   readonly channel: number;
   /** 1, 2, 3 … per session, device and channel */
   readonly sequence: bigint;
-  /** The time that the pose is for, on the clock of the SERVER, like DeviceState.sampledNs */
+  /** The time of the pose, on the clock of the SERVER as in DeviceState.sampledNs */
   readonly timeNs: Nanoseconds;
-  /** m, of the origin of the object. A server only accepts positions within 10 m */
+  /** m, the position of the origin of the object, which must be within 10 m */
   readonly position: Vec3;
   /** The rotation from the frame of the object to the base frame */
   readonly orientation: Quat;
-  /** m/s, of the origin of the object */
+  /** m/s, the velocity of the origin of the object */
   readonly velocity: Vec3;
   /** rad/s, the angular velocity in the axes of the base frame */
   readonly angularVelocity: Vec3;

@@ -542,8 +542,8 @@ export const DeviceStateSchema: GenMessage<DeviceState> = /*@__PURE__*/
  * DeviceState messages, because all values except for the positions are sent in single precision. Entry k of a column
  * belongs to the k-th device in `devices`, in the order of their numbers. Vectors have three entries (x, y, z). If one
  * of the last five columns is empty, all of its values are 0. The frame is dropped if any other column has the wrong
- * length, if there are no devices, or if a value is out of bounds. A state with a field has no columns, like all states
- * with other members: it is sent as a DeviceState.
+ * length, if there are no devices, or if a value is out of bounds. A state with a field is
+ * not sent in columns, but as a DeviceState.
  *
  * @generated from message tendon.v1.DeviceStates
  */
@@ -763,8 +763,8 @@ export type ForceCommand = Message<"tendon.v1.ForceCommand"> & {
 
   /**
    * With the feature "fields" only:
-   * If it is not 0, force_n is not rendered. It is the true force at the state `based_on_tick`, from which the server
-   * learns the error of the field with this generation (UseField.generation). The model is ignored
+   * If it is not 0, force_n is not rendered. It is the true force for the state `based_on_tick`, which is used for
+   * correcting the field with this generation (UseField.generation). The model is ignored
    *
    * @generated from field: uint32 field = 16;
    */
@@ -935,13 +935,13 @@ export const ForceTableSchema: GenMessage<ForceTable> = /*@__PURE__*/
   messageDesc(file_tendon, 11);
 
 /**
- * A part of the manifest of a field, which lists its bricks and primitives. Parts are sent in order.
+ * A part of the manifest of a field, which contains its primitives and a list of its bricks. Parts are sent in order.
  *
  * @generated from message tendon.v1.OfferField
  */
 export type OfferField = Message<"tendon.v1.OfferField"> & {
   /**
-   * [32, 32] bytes: the BLAKE2b-256 of the manifest, which is the name of the field
+   * [32, 32] bytes: the BLAKE2b-256 hash of the manifest, which is used as the name of the field
    *
    * @generated from field: bytes field = 1;
    */
@@ -955,7 +955,7 @@ export type OfferField = Message<"tendon.v1.OfferField"> & {
   size: number;
 
   /**
-   * [0, 65535]: the place of the first byte of `part` in the manifest
+   * [0, 65535]: the offset of this part in the manifest in bytes
    *
    * @generated from field: uint32 offset = 3;
    */
@@ -977,8 +977,8 @@ export const OfferFieldSchema: GenMessage<OfferField> = /*@__PURE__*/
   messageDesc(file_tendon, 12);
 
 /**
- * Renders a field in a channel from now on, instead of the field that the channel has used. The server must have the
- * whole field (FieldStatus), and the client must hold the lease of the channel, as for a ForceCommand.
+ * Uses a field in a channel instead of the previous one. The field must be complete on the server (FieldStatus), and
+ * the client must have the lease of the channel, as for a ForceCommand.
  *
  * @generated from message tendon.v1.UseField
  */
@@ -998,21 +998,23 @@ export type UseField = Message<"tendon.v1.UseField"> & {
   channel: number;
 
   /**
-   * [1, …]: increases with each UseField of a session, device and channel
+   * A number that is increased with each UseField of a session, device and channel
+   *
+   * [1, …]
    *
    * @generated from field: uint32 generation = 3;
    */
   generation: number;
 
   /**
-   * [32, 32] bytes: the name of the field
+   * [32, 32] bytes: the hash of the manifest
    *
    * @generated from field: bytes field = 4;
    */
   field: Uint8Array;
 
   /**
-   * [1, 16] entries: the materials that the manifest refers to, from number 0
+   * [1, 16] entries: the materials, which are numbered from 0 in the manifest
    *
    * @generated from field: repeated tendon.v1.FieldMaterial materials = 5;
    */
@@ -1034,13 +1036,14 @@ export const UseFieldSchema: GenMessage<UseField> = /*@__PURE__*/
   messageDesc(file_tendon, 13);
 
 /**
- * Forgets a field. A channel that uses it stops. Its bricks stay in the cache of the server.
+ * Removes a field from the server. If the field is used in a channel, it is no longer rendered. The bricks are kept in
+ * the cache of the server.
  *
  * @generated from message tendon.v1.DropField
  */
 export type DropField = Message<"tendon.v1.DropField"> & {
   /**
-   * [32, 32] bytes: the name of the field
+   * [32, 32] bytes: the hash of the manifest
    *
    * @generated from field: bytes field = 1;
    */
@@ -1055,7 +1058,8 @@ export const DropFieldSchema: GenMessage<DropField> = /*@__PURE__*/
   messageDesc(file_tendon, 14);
 
 /**
- * A spring, beside a spring in series with a damper, with Coulomb friction (core/field/material.h).
+ * A viscoelastic material: a spring in parallel with a Maxwell element, which is a spring in series with a damper, and
+ * Coulomb friction (core/field/material.h).
  *
  * @generated from message tendon.v1.FieldMaterial
  */
@@ -1068,14 +1072,18 @@ export type FieldMaterial = Message<"tendon.v1.FieldMaterial"> & {
   stiffnessNpm: number;
 
   /**
-   * [0, 1e12]: of the spring in series with the damper, or 0 if there is none
+   * The stiffness of the spring in series with the damper, or 0 if there is no damper
+   *
+   * [0, 1e12]
    *
    * @generated from field: double branch_stiffness_npm = 2;
    */
   branchStiffnessNpm: number;
 
   /**
-   * [0.01, 10] or 0: the time constant of the damper; ignored without this spring
+   * The time constant of the damper. It is ignored if there is no damper
+   *
+   * [0.01, 10] or 0
    *
    * @generated from field: double relaxation_s = 3;
    */
@@ -1097,8 +1105,7 @@ export const FieldMaterialSchema: GenMessage<FieldMaterial> = /*@__PURE__*/
   messageDesc(file_tendon, 15);
 
 /**
- * A spring from the hand to the nearest position on a point, a line or a plane, in the frame of the object
- * (core/field/fixture.h).
+ * A spring that pulls the hand to a point, a line or a plane, in the frame of the object (core/field/fixture.h).
  *
  * @generated from message tendon.v1.FieldFixture
  */
@@ -1109,14 +1116,14 @@ export type FieldFixture = Message<"tendon.v1.FieldFixture"> & {
   kind: FieldFixtureKind;
 
   /**
-   * the point, or a point of the line or plane
+   * the position of the point, or of any point on the line or plane
    *
    * @generated from field: tendon.v1.Vec3 at_m = 2;
    */
   atM?: Vec3 | undefined;
 
   /**
-   * the direction of the line, or the normal of the plane; any for a point
+   * The direction of the line or the normal of the plane. It is ignored if the fixture is a point
    *
    * @generated from field: tendon.v1.Vec3 normal = 3;
    */
@@ -1130,7 +1137,7 @@ export type FieldFixture = Message<"tendon.v1.FieldFixture"> & {
   stiffnessNpm: number;
 
   /**
-   * (0, 1e12]: the largest force. Absent if the force is not limited
+   * (0, 1e12]: the maximum force. Absent if the force is not limited
    *
    * @generated from field: optional double most_force_n = 5;
    */
@@ -1151,14 +1158,14 @@ export const FieldFixtureSchema: GenMessage<FieldFixture> = /*@__PURE__*/
  */
 export type FieldBrick = Message<"tendon.v1.FieldBrick"> & {
   /**
-   * [16, 16] bytes: the BLAKE2b-128 of the weights
+   * [16, 16] bytes: the BLAKE2b-128 hash of the weights
    *
    * @generated from field: bytes hash = 1;
    */
   hash: Uint8Array;
 
   /**
-   * [1024, 1024] bytes: 8³ int16, little-endian, x fastest
+   * [1024, 1024] bytes: 8³ numbers (int16, little-endian), where x is the fastest index
    *
    * @generated from field: bytes weights = 2;
    */
@@ -1173,21 +1180,21 @@ export const FieldBrickSchema: GenMessage<FieldBrick> = /*@__PURE__*/
   messageDesc(file_tendon, 17);
 
 /**
- * What a server still needs of a field. Bit i % 8 of byte i / 8 is set if brick i of the manifest is missing. The last
- * of the 1024 bits is set if the manifest is not complete; the bits of unknown bricks are then 0. Absent bytes are 0.
+ * Reports which bricks of a field are missing on the server. Bit i % 8 of byte i / 8 is set if brick i of the manifest
+ * is missing. The last one of the 1024 bits is set if the manifest is incomplete, and the bits of unknown bricks are 0.
  *
  * @generated from message tendon.v1.FieldStatus
  */
 export type FieldStatus = Message<"tendon.v1.FieldStatus"> & {
   /**
-   * [32, 32] bytes: the name of the field
+   * [32, 32] bytes: the hash of the manifest
    *
    * @generated from field: bytes field = 1;
    */
   field: Uint8Array;
 
   /**
-   * [0, 128] bytes
+   * [0, 128] bytes: the bits, where zeros at the end may be omitted
    *
    * @generated from field: bytes missing = 2;
    */
@@ -1202,8 +1209,8 @@ export const FieldStatusSchema: GenMessage<FieldStatus> = /*@__PURE__*/
   messageDesc(file_tendon, 18);
 
 /**
- * The pose of the object of a channel, in the base frame of the device. It should be the pose that the engine expects
- * for the time of its arrival. The server extrapolates it with its velocities for at most 50 ms.
+ * The pose of the object of a channel in the base frame of the device. The engine should send the pose that it expects
+ * at the time when the message arrives. The server uses the velocities to extrapolate the pose by at most 50 ms.
  *
  * @generated from message tendon.v1.FieldPose
  */
@@ -1230,7 +1237,7 @@ export type FieldPose = Message<"tendon.v1.FieldPose"> & {
   sequence: bigint;
 
   /**
-   * The time that the pose is for, on the clock of the SERVER, like DeviceState.sampled_ns
+   * The time of the pose, on the clock of the SERVER as in DeviceState.sampled_ns
    *
    * [-2^60, 2^60]
    *
@@ -1239,7 +1246,7 @@ export type FieldPose = Message<"tendon.v1.FieldPose"> & {
   timeNs: bigint;
 
   /**
-   * of the origin of the object. A server only accepts positions within 10 m
+   * the position of the origin of the object, which must be within 10 m
    *
    * @generated from field: tendon.v1.Vec3 position_m = 5;
    */
@@ -1253,7 +1260,7 @@ export type FieldPose = Message<"tendon.v1.FieldPose"> & {
   orientation?: Quat | undefined;
 
   /**
-   * of the origin of the object
+   * the velocity of the origin of the object
    *
    * @generated from field: tendon.v1.Vec3 velocity_mps = 7;
    */
@@ -3580,7 +3587,7 @@ export const ModeSchema: GenEnum<Mode> = /*@__PURE__*/
   enumDesc(file_tendon, 0);
 
 /**
- * The shape that a fixture pulls to.
+ * The shape of a fixture.
  *
  * @generated from enum tendon.v1.FieldFixtureKind
  */
