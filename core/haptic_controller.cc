@@ -32,9 +32,9 @@ HapticController::HapticController(const Config& config)
     }
     couplings_.emplace(*config.coupling, config.leaders);
   }
-  if (const auto& field = config.hold.field; field && (field->push.push_j > 0 || field->push.push_w > 0)) {
-    if (!config.limiter.shared_account) {
-      throw std::invalid_argument("field: push_j and push_w expect a limiter with a shared_account, to be credited");
+  if (const auto& field = config.hold.field; field && !config.limiter.shared_account) {
+    if (field->push.push_j > 0 || field->push.push_w > 0) {
+      throw std::invalid_argument("field.push: expected a limiter with a shared_account, which the tank credits");
     }
   }
   if (config.friction_map) {

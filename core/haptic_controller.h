@@ -152,14 +152,14 @@ class HapticController {
   /// Takes a newer remote force for `channel`, an index into `channels`. Returns false if it is not sound (HeldForce).
   bool observe(const RemoteForce& force, std::size_t channel = 0) noexcept { return held_.observe(channel, force); }
 
-  /// Takes a newer pose of the object of a channel. Its time is on the clock of `Motion::at` (HeldForce::observe).
+  /// Updates the pose of the object of a channel (HeldForce::observe). The pose must use the same clock as `Motion::at`.
   bool observe(const field::TimedPose& pose, std::size_t channel = 0) noexcept { return held_.observe(channel, pose); }
 
-  /// Renders a field in a channel from now on, or stops it (HeldForce::use).
+  /// Starts to use a field in a channel, replaces it, or stops using it. See HeldForce::use.
   bool use(const FieldUse& use, LocalTime now, std::size_t channel = 0) noexcept {
     return held_.use(channel, use, now);
   }
-  /// Returns the generation of the field in use, or 0. The fields of the previous generations are not used any more.
+  /// Returns the generation of the current field, or 0. Previous fields are no longer used and can be deleted.
   std::uint32_t field(std::size_t channel = 0) const noexcept { return held_.field(channel); }
 
   /// Must be called when the remote environment `source` of a channel has disconnected.

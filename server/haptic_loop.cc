@@ -96,6 +96,9 @@ void HapticLoop::take_mail(LocalTime now) noexcept {
     Coupling* const coupling = coupling_of(controller_, order->coupling);
     switch (order->kind) {
       case HapticOrder::Kind::kRelease:
+        if (controller_.field(order->channel) != 0) {
+          note({.kind = FieldInput::Kind::kRelease, .channel = order->channel, .source = order->source}, now);
+        }
         controller_.release(now, order->source, order->channel);
         released[releases++] = {.source = order->source, .channel = order->channel};
         break;
@@ -129,13 +132,39 @@ void HapticLoop::take_mail(LocalTime now) noexcept {
     mail_.orders.pop();
   }
   for (std::size_t channel = 0; channel < config_.control.channels.size(); ++channel) {
-    if (const RemoteForce* force = mail_.forces[channel].take()) controller_.observe(*force, channel);
+    const RemoteForce* const force = mail_.forces[channel].take();
+    if (force == nullptr) continue;
+    if (controller_.observe(*force, channel) && force->field != 0) {
+      note({.kind = FieldInput::Kind::kTruth,
+            .channel = static_cast<std::uint32_t>(channel),
+            .source = force->source,
+            .generation = force->field,
+            .answers_tick = force->answers_tick,
+            .received = force->received,
+            .truth = force->force},
+           now);
+    }
   }
   if (mail_.fields) take_fields(now);
   if (Couplings* const couplings = controller_.couplings()) take_ports(*couplings, now);
   // The last force of a released source may still have been in its mailbox and must not count as fresh. Releasing twice
   // is harmless because source numbers are never reused.
-  for (std::size_t i = 0; i < releases; ++i) controller_.release(now, released[i].source, released[i].channel);
+  for (std::size_t i = 0; i < releases; ++i) {
+    if (controller_.field(released[i].channel) != 0) {
+      note({.kind = FieldInput::Kind::kRelease, .channel = released[i].channel, .source = released[i].source}, now);
+    }
+    controller_.release(now, released[i].source, released[i].channel);
+  }
+}
+
+/// Adds a message for a field to the recording.
+void HapticLoop::note(FieldInput input, LocalTime now) noexcept {
+  if (!mail_.field_tape || !config_.record) return;
+  input.tick = tick_ + 1;
+  input.at = now;
+  if (!mail_.field_tape->inputs.try_push(input)) {
+    mail_.field_tape->inputs_lost.fetch_add(1, std::memory_order_relaxed);
+  }
 }
 
 void HapticLoop::take_fields(LocalTime now) noexcept {
@@ -143,11 +172,22 @@ void HapticLoop::take_fields(LocalTime now) noexcept {
     FieldBox& box = (*mail_.fields)[channel];
     if (const PostedField* const posted = box.use.take()) {
       controller_.use(posted->use, now, channel);
+      note({.kind = posted->use.field != nullptr ? FieldInput::Kind::kUse : FieldInput::Kind::kStop,
+            .channel = static_cast<std::uint32_t>(channel),
+            .source = posted->use.source,
+            .generation = posted->use.generation},
+           now);
       field_sources_[channel] = posted->use.source;
       box.taken.store(posted->number, std::memory_order_release);
     }
     const ArrivedPose* const pose = box.pose.take();
-    if (pose != nullptr && pose->source == field_sources_[channel]) controller_.observe(pose->pose, channel);
+    if (pose == nullptr || pose->source != field_sources_[channel]) continue;
+    controller_.observe(pose->pose, channel);
+    note({.kind = FieldInput::Kind::kPose,
+          .channel = static_cast<std::uint32_t>(channel),
+          .source = pose->source,
+          .pose = pose->pose},
+         now);
   }
 }
 

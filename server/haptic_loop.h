@@ -64,6 +64,7 @@ class HapticLoop {
 
   void take_mail(LocalTime now) noexcept;
   [[gnu::noinline]] void take_fields(LocalTime now) noexcept;
+  void note(FieldInput input, LocalTime now) noexcept;
   void take_ports(Couplings& couplings, LocalTime now) noexcept;
   [[gnu::noinline]] void set_outputs(LocalTime now) noexcept;  // not inlined because it is rare
   HandleSample handle_in(const PositionSample& sample) noexcept;

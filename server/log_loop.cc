@@ -77,10 +77,11 @@ std::unique_ptr<PartRecorder> recorder_of(const std::vector<LogLoop::Watched>& d
   PartRecorder::Config config;
   config.path = first.recording->path;
   const auto is_coupled = [](const Scene& scene) { return scene.teleoperation.has_value(); };
-  config.run = {.scene = scene_record(first), .ports = is_coupled(first), .started = started};
+  config.run = {
+      .scene = scene_record(first), .ports = is_coupled(first), .fields = first.has_fields(), .started = started};
   for (std::size_t i = 1; i < devices.size(); ++i) {
     const Scene& scene = devices[i].scene;
-    config.run.more_devices.push_back({scene.name, scene_record(scene), is_coupled(scene)});
+    config.run.more_devices.push_back({scene.name, scene_record(scene), is_coupled(scene), scene.has_fields()});
   }
   config.rotate_bytes = static_cast<std::uint64_t>(first.recording->rotate_bytes);
   config.rotate_after = from_seconds(first.recording->rotate_after);
@@ -140,7 +141,23 @@ void LogLoop::say(Level level, const DeviceLog& device, const std::string& text)
   say(level, devices_.size() == 1 ? text : device.of.scene.name + ": " + text);
 }
 
-/// Returns the number of steps lost since the last call, including steps with missing ports, which cannot be replayed.
+/// Records the fields, and what their channels have received until step `until`.
+void LogLoop::record_fields(std::size_t number, std::uint64_t until) {
+  FieldTape& tape = *devices_[number].of.mail.field_tape;
+  for (const FieldInput* input = tape.inputs.front(); input != nullptr && input->tick <= until;
+       input = tape.inputs.front()) {
+    // The data were pushed before the haptic thread could use the field.
+    for (const auto* data = tape.data.front(); data != nullptr; data = tape.data.front()) {
+      if (recorder_) recorder_->record(**data, number);
+      tape.data.pop();
+    }
+    if (recorder_) recorder_->record(*input, number);
+    tape.inputs.pop();
+  }
+}
+
+/// Returns the number of steps lost since the last call, including steps with missing ports or inputs of fields, which
+/// cannot be replayed.
 std::uint64_t LogLoop::record_steps(std::size_t number) {
   DeviceLog& device = devices_[number];
   Mailboxes& mail = device.of.mail;
@@ -155,11 +172,15 @@ std::uint64_t LogLoop::record_steps(std::size_t number) {
   if (!recorder_) take_ports(std::numeric_limits<std::uint64_t>::max());
   while (const StepRecord* step = mail.steps.front()) {
     take_ports(step->tick);  // the haptic thread pushes the ports of a step before the step
+    if (mail.field_tape) record_fields(number, step->tick);
     if (recorder_) recorder_->record(*step, number, mail.ways.name_of(step->force_way));
     mail.steps.pop();
   }
   const std::uint64_t steps = news(mail.steps_lost, device.reported.steps_lost);
-  return steps + news(mail.ports_lost, device.reported.ports_lost);
+  const std::uint64_t ports = news(mail.ports_lost, device.reported.ports_lost);
+  if (!mail.field_tape) return steps + ports;
+  return steps + ports + news(mail.field_tape->inputs_lost, device.reported.inputs_lost) +
+         news(mail.field_tape->data_lost, device.reported.field_data_lost);
 }
 
 void LogLoop::record_all(LocalTime now) {
@@ -208,7 +229,7 @@ void LogLoop::take_notices_of_recorder() {
 void LogLoop::report_health(LocalTime now, std::uint64_t unsent, DeviceLog& device) {
   Health health = device.of.haptic.health();
   health.at = now;
-  health.steps_lost = device.reported.steps_lost + device.reported.ports_lost;
+  health.steps_lost = device.reported.steps_lost + device.reported.ports_lost + device.reported.inputs_lost;
   const HapticLoop::Stats haptic = device.of.haptic.stats();
   if (haptic.fault != HapticController::Fault::kNone) health.fault = describe(haptic.fault);
   if (device.of.safe != nullptr) {

@@ -69,6 +69,8 @@ class LogLoop {
     DeviceCounts counts{};
     std::uint64_t steps_lost = 0;
     std::uint64_t ports_lost = 0;
+    std::uint64_t inputs_lost = 0;
+    std::uint64_t field_data_lost = 0;
     std::array<PortPhase, limits::kMaxChannels> phase{};
   };
   struct DeviceLog {
@@ -89,6 +91,7 @@ class LogLoop {
   void round(LocalTime now, std::uint64_t unsent, bool last);
   void say(Notice::Level level, const DeviceLog& device, const std::string& text);
   void say(Notice::Level level, std::string text) { notices_.push_back({level, std::move(text)}); }
+  void record_fields(std::size_t number, std::uint64_t until);
   std::uint64_t record_steps(std::size_t number);
   void record_all(LocalTime now);
   void record_left_out(LocalTime now);

@@ -71,6 +71,15 @@ struct FieldBox {
   std::atomic<std::uint32_t> taken{0};  ///< number of the newest field that the haptic thread has taken
 };
 
+/// What is recorded about the fields of a device.
+struct FieldTape {
+  SpscRing<FieldInput> inputs{1024};  ///< from the haptic thread, before the step
+  std::atomic<std::uint64_t> inputs_lost{0};
+  /// From the network thread, before the field can be used. The ring can contain up to eight fields that were recorded before.
+  SpscRing<std::shared_ptr<const FieldData>> data{8};
+  std::atomic<std::uint64_t> data_lost{0};
+};
+
 /// A Hello that was received by the first network thread and must be processed by another one.
 struct HandedHello {
   Address from{};
@@ -83,7 +92,7 @@ struct HandedHello {
 /// what happens if it is full. The name of a solver path in `ways` is written before the first force with its number.
 /// The constructor allocates all memory, before the loops run.
 struct Mailboxes {
-  /// Numbers of elements, which must be powers of two. The defaults, for a server that records, require about 19 MB.
+  /// Numbers of elements, which must be powers of two. The defaults, for a server that records, require about 21 MB.
   struct Capacities {
     std::size_t steps = 16384;  ///< 16 s at 1 kHz, for slow disks
     std::size_t ports = 1;      ///< for each coupling
@@ -114,14 +123,16 @@ struct Mailboxes {
   explicit Mailboxes(const Capacities& capacities)
       : steps(capacities.steps),
         ports(capacities.ports),
-        flight(capacities.flight, capacities.flight_handles),
+        flight(capacities.flight, capacities.flight_handles, capacities.fields),
         datagrams(capacities.datagrams) {
     if (capacities.fields) fields = std::make_unique<std::array<FieldBox, limits::kMaxChannels>>();
+    if (capacities.fields && capacities.steps > 1) field_tape = std::make_unique<FieldTape>();
   }
   Mailboxes() : Mailboxes(Capacities{}) {}
 
   std::array<Latest<RemoteForce>, limits::kMaxChannels> forces;
   std::unique_ptr<std::array<FieldBox, limits::kMaxChannels>> fields;  ///< null if no channel can use fields
+  std::unique_ptr<FieldTape> field_tape;  ///< null if no channel can use fields, or if the steps are not recorded
   SpscRing<HapticOrder> orders{kOrders};
   Latest<DeviceState> state;
   Latest<OutputSettings> outputs;

@@ -8,11 +8,12 @@
 
 namespace tendon {
 
-/// A channel renders `field` from now on (core/field/README.md). If `field` is null, it stops if `source` uses a field.
+/// A request of an engine to use a field in a channel (core/field/README.md). If `field` is null, the channel stops using
+/// the field of `source`.
 struct FieldUse {
   const field::Field* field = nullptr;  ///< valid (Field::expect_valid); not owned, and not changed while it is in use
-  std::uint32_t generation = 0;         ///< > 0, chosen by the source; a true force names it (RemoteForce::field)
-  std::uint32_t source = 0;             ///< as in RemoteForce
+  std::uint32_t generation = 0;  ///< > 0; chosen by the engine, and contained in its true forces (RemoteForce::field)
+  std::uint32_t source = 0;      ///< as in RemoteForce
 };
 
 /// The fields in a haptic step. `generation` to `proxy` are of the first channel that touches its field, or of the
@@ -20,10 +21,10 @@ struct FieldUse {
 struct FieldStep {
   std::uint32_t generation = 0;
   std::uint8_t channel = 0;
-  bool swapping = false;      ///< a field appears or is replaced
-  double depth = 0;           ///< m, from the proxy to the hand; 0 without contact
+  bool swapping = false;      ///< true for a short time after a field was used or replaced
+  double depth = 0;           ///< m, distance between proxy and hand, or 0 if there is no contact
   Vec3 proxy = Vec3::Zero();  ///< m, base frame
-  Vec3 force = Vec3::Zero();  ///< N, on the hand; part of `wanted`
+  Vec3 force = Vec3::Zero();  ///< N, on the hand; already included in Step::wanted
   double stored = 0;          ///< H, J
   double refused = 0;         ///< J that the gates refused in this step
   double credit = 0;          ///< J from the tanks, credited to the account before the force was bounded

@@ -44,9 +44,9 @@ struct HandleWanted {
 /// over `ramp_in`, starting from the current force. A fresh force that arrives during the decay is ramped in over (1 −
 /// gain) · ramp_in. The force does not jump if an engine returns, stutters or takes over.
 ///
-/// While a field is in use, other forces of the channel are ignored, and the mode is Active without any message. The
-/// field starts without a force, while the force before it fades out over ramp_in. When the engine stops using the
-/// field or disconnects, the last force of the field is held and faded out, as if it had expired, and the next force is
+/// While the channel uses a field, its other forces are ignored. The mode is Active even if no messages are received. The
+/// force of a new field starts at zero, and the previous force fades out over ramp_in. If the engine stops using the
+/// field or disconnects, the last force is held and faded out like a force that has expired. The next force is then
 /// ramped in.
 /// Thread-safe: no. Realtime-safe: yes.
 class HeldForce {
@@ -89,14 +89,14 @@ class HeldForce {
   /// Returns false and does nothing if the part `field` is not listed, or if the generation of a field is 0.
   bool use(const FieldUse& use, LocalTime now) noexcept;
 
-  /// Takes a pose of the object, also before its field is used. Returns false if the part `field` is not listed, and as
-  /// FieldPose::observe.
+  /// Updates the pose of the object. This is also possible before the field is used. Returns false if the part `field`
+  /// is not listed, or if the pose is not valid (FieldPose::observe).
   bool observe(const field::TimedPose& pose) noexcept { return renderer_ && renderer_->observe(pose); }
 
   /// Must be called when the remote environment `source` has disconnected. Its force expires at `now`.
   void release(std::uint32_t source, LocalTime now) noexcept;
 
-  /// The next fresh force is ramped in, and a field starts without a force.
+  /// The next fresh force is ramped in. The force of a field starts at zero.
   void disengage() noexcept;
 
   /// Returns the demand for `hand.position`, `hand.at` and `orientation`, without the force of a field. Must be called
@@ -104,7 +104,7 @@ class HeldForce {
   /// not used.
   Wanted wanted(const Motion& hand, const Quat* orientation = nullptr) noexcept;
 
-  std::uint32_t field() const noexcept { return generation_; }  ///< generation of the field in use, or 0
+  std::uint32_t field() const noexcept { return generation_; }  ///< generation of the current field, or 0
 
   /// H₀ of the field at `x` (J), or 0 if there is none.
   double stored(const Vec3& x) const noexcept { return generation_ != 0 ? renderer_->stored(x) : 0; }
@@ -136,9 +136,9 @@ class HeldForce {
   std::unique_ptr<OutputEstimator> estimator_;  ///< 100 kB, only when listed
   std::unique_ptr<LearnedModel> learned_;       ///< 32 kB, only when listed
   std::unique_ptr<field::Renderer> renderer_;   ///< 100 kB, only when listed
-  std::uint32_t generation_ = 0;                ///< of the field in use; 0 if there is none. `newest_` is empty then
-  std::uint32_t source_ = 0;                    ///< of the field in use
-  bool left_field_ = false;                     ///< `newest_` is the last force of a field
+  std::uint32_t generation_ = 0;  ///< generation of the current field, or 0. With a field, `newest_` is empty
+  std::uint32_t source_ = 0;      ///< source of the current field
+  bool left_field_ = false;       ///< `newest_` is the last force of a field
 };
 
 }  // namespace tendon

@@ -68,6 +68,7 @@ class FieldManifest {
   std::string refused_head() const;  ///< requires kHead bytes
   std::string refused() const;       ///< of all bytes
 
+  std::span<const std::byte> bytes() const noexcept { return bytes_; }
   bool has_head() const noexcept { return bytes_.size() >= kHead; }
   FieldLattice lattice() const noexcept;    ///< requires the head
   std::size_t bricks() const noexcept;      ///< 0 if the head is incomplete

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <memory>
 #include <stdexcept>
 #include <utility>
 
@@ -195,12 +196,40 @@ Outcome FieldIntake::pass_on(LocalTime now, Guest& guest, Channel& channel, cons
     }
     shape.finish();
   };
+  record(now, guest, channel, manifest, wanted, field, source);
   channel.slots.use(std::move(field), bricks > 0 ? std::optional(wanted.field) : std::nullopt, fill, wanted.generation,
                     source);
   channel.source = source;
   channel.generation = wanted.generation;
   channel.name = wanted.field;
   return {};
+}
+
+/// Passes the field to the log thread. The bricks are only copied if they are not those of the field before.
+void FieldIntake::record(LocalTime now, const Guest& guest, Channel& channel, const FieldManifest& manifest,
+                         const UseField& wanted, const field::Field& field, std::uint32_t source) {
+  const auto& tape = devices_[wanted.device].mail->field_tape;
+  if (!tape) return;
+  const auto data =
+      std::make_shared<FieldData>(FieldData{.at = now,
+                                            .channel = wanted.channel,
+                                            .source = source,
+                                            .generation = wanted.generation,
+                                            .manifest = {manifest.bytes().begin(), manifest.bytes().end()},
+                                            .weights = {},
+                                            .materials = field.materials,
+                                            .fixtures = field.fixtures});
+  for (std::size_t i = 0; i < manifest.bricks() && channel.recorded != wanted.field; ++i) {
+    const BrickBytes* const brick = guest.receiver.brick(manifest.hash(i));
+    if (brick == nullptr) break;  // a field that has been used and recorded before
+    data->weights.insert(data->weights.end(), brick->begin(), brick->end());
+  }
+  if (data->weights.size() != manifest.bricks() * limits::kBrickBytes) data->weights.clear();
+  if (tape->data.try_push(data)) {
+    channel.recorded = wanted.field;
+  } else {
+    tape->data_lost.fetch_add(1, std::memory_order_relaxed);
+  }
 }
 
 Outcome FieldIntake::drop(LocalTime /*now*/, const ServedClient& client, const DropField& wanted) {

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -72,6 +73,7 @@ class FieldIntake {
     std::uint32_t source = 0;  ///< the client to which the rest belongs
     std::uint32_t generation = 0;
     FieldName name{};
+    std::optional<FieldName> recorded{};  ///< the field whose bricks were recorded last
   };
 
   Guest& guest_of(const ServedClient& client);
@@ -79,6 +81,8 @@ class FieldIntake {
   bool holds(const ServedClient& client, std::uint32_t device, std::uint32_t channel) const;
   Outcome pass_on(LocalTime now, Guest& guest, Channel& channel, const FieldManifest& manifest, const UseField& wanted,
                   std::uint32_t source);
+  void record(LocalTime now, const Guest& guest, Channel& channel, const FieldManifest& manifest,
+              const UseField& wanted, const field::Field& field, std::uint32_t source);
   void note(LocalTime now, const ServedClient& client, Guest& guest, const std::string& refused);
 
   const std::vector<ServedDevice>& devices_;

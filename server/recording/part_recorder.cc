@@ -51,6 +51,19 @@ void PartRecorder::record(const PortRecord& port, std::size_t device) {
   if (recorder_) recorder_->record(port, device);
 }
 
+void PartRecorder::record(const FieldInput& input, std::size_t device) {
+  if (recorder_) recorder_->record(input, device);
+}
+
+void PartRecorder::record(const FieldData& data, std::size_t device) {
+  if (recorder_) recorder_->record(data, device);
+  FieldData& newest = fields_[{device, data.channel}];
+  std::vector<std::byte> weights = std::move(newest.weights);
+  const bool as_before = data.weights.empty() && newest.manifest == data.manifest;
+  newest = data;
+  if (as_before) newest.weights = std::move(weights);
+}
+
 void PartRecorder::record(const DatagramRecord& datagram) {
   if (!recorder_) {
     ++missing_.datagrams;
@@ -122,6 +135,10 @@ bool PartRecorder::open_part(LocalTime now) {
   if (recorder_->failed()) {
     stop(now, recorder_->status().error);
     return false;
+  }
+  for (auto& [place, data] : fields_) {
+    data.at = now;
+    recorder_->record(data, place[0]);
   }
   ++closed_.parts;
   closed_.path = sink_->path();

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -28,6 +30,8 @@ namespace tendon {
 /// With Keep::kFaults, the duration of a part is at most one minute. If a fault starts in a part, within 60 s after its
 /// end, or within 10 s before its start, the part is kept. Other parts are deleted as soon as possible, except for
 /// those that are kept because of their number (Config::one_in). If the process is killed, undecided parts are kept.
+///
+/// A part begins with the newest field of each channel, so that it can be replayed if previous parts were deleted.
 ///
 /// The records must be passed in the same order as to Recorder.
 /// Thread-safe: no, only used by the log thread. Realtime-safe: no.
@@ -73,6 +77,8 @@ class PartRecorder {
 
   void record(const StepRecord& step, std::size_t device = 0, std::string_view force_way = {});
   void record(const PortRecord& port, std::size_t device = 0);
+  void record(const FieldInput& input, std::size_t device = 0);
+  void record(const FieldData& data, std::size_t device = 0);
   void record(const DatagramRecord& datagram);
   void lost(const LossRecord& loss);
   void tick(LocalTime now);
@@ -104,6 +110,7 @@ class PartRecorder {
     LocalTime ended;
   };
   std::vector<Undecided> undecided_;
+  std::map<std::array<std::size_t, 2>, FieldData> fields_;  ///< the newest one of each device and channel
   std::vector<bool> faulty_;
   std::optional<LocalTime> fault_;  ///< start of the newest fault
   bool stays_ = false;              ///< the current part must be kept

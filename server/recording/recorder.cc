@@ -22,6 +22,9 @@ Recorder::Recorder(const Config& config, ByteSink& sink)
       datagram_channel_(add_channel(writer_, recording::kDatagram)),
       loss_channel_(add_channel(writer_, recording::kLoss)) {
   port_channels_.push_back(config_.ports ? add_channel(writer_, recording::kPort) : 0);
+  FieldChannels& first = field_channels_.emplace_back();
+  if (config_.fields)
+    first = {add_channel(writer_, recording::kFieldInput), add_channel(writer_, recording::kFieldData)};
   write(scene_channel_, config_.started, recording::encode(config_.scene));
   for (const Device& device : config_.more_devices) {
     const auto of_device = [&](const recording::Channel& channel) {
@@ -31,6 +34,8 @@ Recorder::Recorder(const Config& config, ByteSink& sink)
     write(of_device(recording::kScene), config_.started, recording::encode(device.scene));
     step_channels_.push_back(of_device(recording::kStep));
     port_channels_.push_back(device.ports ? of_device(recording::kPort) : 0);
+    FieldChannels& channels = field_channels_.emplace_back();
+    if (device.fields) channels = {of_device(recording::kFieldInput), of_device(recording::kFieldData)};
   }
   settle(writer_.flush_chunk());
 }
@@ -46,6 +51,14 @@ void Recorder::record(const StepRecord& step, std::size_t device, std::string_vi
 
 void Recorder::record(const PortRecord& port, std::size_t device) {
   if (recording()) write(port_channels_[device], port.at, recording::encode(port));
+}
+
+void Recorder::record(const FieldInput& input, std::size_t device) {
+  if (recording()) write(field_channels_[device].input, input.at, recording::encode(input));
+}
+
+void Recorder::record(const FieldData& data, std::size_t device) {
+  if (recording()) write(field_channels_[device].data, data.at, recording::encode(data));
 }
 
 void Recorder::record(const DatagramRecord& datagram) {

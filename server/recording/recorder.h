@@ -30,11 +30,13 @@ class Recorder {
   struct Device {
     std::string name;  ///< used in the topics /NAME/scene and /NAME/haptic/step
     SceneRecord scene;
-    bool ports = false;  ///< it has a coupling
+    bool ports = false;   ///< it has a coupling
+    bool fields = false;  ///< engines may use fields
   };
   struct Config {
     SceneRecord scene;
-    bool ports = false;  ///< the first device has a coupling
+    bool ports = false;   ///< the first device has a coupling
+    bool fields = false;  ///< engines may use fields with the first device
     std::vector<Device> more_devices{};
     LocalTime started{};  ///< log time of the scene
     /// The most that is lost if the process is killed. Each flush requires a write(2) and about 300 bytes in the file.
@@ -60,6 +62,9 @@ class Recorder {
   void record(const StepRecord& step, std::size_t device = 0, std::string_view force_way = {});
   /// The device must have `ports`. Must be called before recording the step with the same tick.
   void record(const PortRecord& port, std::size_t device = 0);
+  /// The device must have `fields`. As for a port, and after the FieldData of a field to use.
+  void record(const FieldInput& input, std::size_t device = 0);
+  void record(const FieldData& data, std::size_t device = 0);
   void record(const DatagramRecord& datagram);
   void lost(const LossRecord& loss);  ///< previous records were dropped by the caller
 
@@ -91,6 +96,11 @@ class Recorder {
   std::uint16_t scene_channel_;
   std::vector<std::uint16_t> step_channels_;  ///< by device
   std::vector<std::uint16_t> port_channels_;  ///< by device; 0 if it has no coupling
+  struct FieldChannels {
+    std::uint16_t input = 0;
+    std::uint16_t data = 0;
+  };
+  std::vector<FieldChannels> field_channels_;  ///< by device; 0 without fields
   std::uint16_t datagram_channel_;
   std::uint16_t loss_channel_;
   std::optional<LocalTime> chunk_opened_;

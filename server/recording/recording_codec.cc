@@ -11,28 +11,12 @@
 #include "protocol/link.h"
 #include "protocol/wire/header.h"
 #include "recording.pb.h"
+#include "server/recording/vector_codec.h"
 
 namespace tendon::recording {
 namespace {
 
-namespace pb = tendon::recording::v1;
-
-void put(pb::Vec3* out, const Vec3& v) {
-  out->set_x(v.x());
-  out->set_y(v.y());
-  out->set_z(v.z());
-}
-
-Vec3 vec3(const pb::Vec3& v) { return {v.x(), v.y(), v.z()}; }
-
-void put(pb::Quat* out, const Quat& q) {
-  out->set_w(q.w);
-  out->set_x(q.x);
-  out->set_y(q.y);
-  out->set_z(q.z);
-}
-
-Quat quat(const pb::Quat& q) { return {q.w(), q.x(), q.y(), q.z()}; }
+using recording::put;
 
 void put(pb::Turn* out, const TurnStep& turn) {
   put(out->mutable_orientation(), turn.hand.orientation);
@@ -211,14 +195,6 @@ void put(pb::Reason* out, Reasons reasons) {
   out->set_disarmed(reasons.has(Reason::kDisarmed));
   out->set_damped(reasons.has(Reason::kDamped));
   out->set_acceleration(reasons.has(Reason::kAcceleration));
-}
-
-template <class Message>
-Message parse(std::string_view bytes) {
-  Message message;
-  if (!message.ParseFromArray(bytes.data(), static_cast<int>(bytes.size())))
-    throw std::invalid_argument("the data are not a " + message.GetTypeName());
-  return message;
 }
 
 Joints joints_in(const pb::Step& in) {

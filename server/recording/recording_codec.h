@@ -53,6 +53,8 @@ struct Channel {
 inline constexpr Channel kScene = {"/scene", "tendon.recording.v1.Scene"};
 inline constexpr Channel kStep = {"/haptic/step", "tendon.recording.v1.Step"};
 inline constexpr Channel kPort = {"/haptic/port", "tendon.recording.v1.Port"};
+inline constexpr Channel kFieldInput = {"/haptic/field", "tendon.recording.v1.FieldInput"};
+inline constexpr Channel kFieldData = {"/field/data", "tendon.recording.v1.FieldData"};
 inline constexpr Channel kDatagram = {"/net/datagram", "tendon.recording.v1.Datagram"};
 inline constexpr Channel kClock = {"/merge/clock", "tendon.recording.v1.Clock"};
 inline constexpr Channel kLoss = {"/recording/lost", "tendon.recording.v1.Lost"};
@@ -65,6 +67,8 @@ std::string encode(const SceneRecord& scene);
 /// `force_way` is the name of Step::force_way. The number is only valid in this run.
 std::string encode(const StepRecord& step, std::string_view force_way = {});
 std::string encode(const PortRecord& port);
+std::string encode(const FieldInput& input);
+std::string encode(const FieldData& data);
 std::string encode(const ClockRecord& clock);
 std::string encode(const DatagramRecord& datagram);
 std::string encode(const LossRecord& loss);
@@ -73,6 +77,8 @@ std::string encode(const LossRecord& loss);
 SceneRecord decode_scene(std::string_view message);
 StepRecord decode_step(std::string_view message, LocalTime at, SolverPaths& ways);
 PortRecord decode_port(std::string_view message, LocalTime at);
+FieldInput decode_field_input(std::string_view message, LocalTime at);
+FieldData decode_field_data(std::string_view message, LocalTime at);
 DatagramRecord decode_datagram(std::string_view message, LocalTime at);
 LossRecord decode_loss(std::string_view message, LocalTime at);
 

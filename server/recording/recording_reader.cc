@@ -12,7 +12,8 @@
 namespace tendon {
 namespace {
 
-constexpr std::array kKinds = {&recording::kScene, &recording::kStep, &recording::kPort, &recording::kDatagram,
+constexpr std::array kKinds = {&recording::kScene,      &recording::kStep,      &recording::kPort,
+                               &recording::kFieldInput, &recording::kFieldData, &recording::kDatagram,
                                &recording::kLoss};
 
 bool has_form(const McapReader::Channel& channel, const recording::Channel& kind) {
@@ -88,6 +89,8 @@ std::optional<RecordingReader::Record> RecordingReader::decode(const McapReader:
   newest_ = recording::local_time(message.log_time, *unix_offset_);
   if (belongs(channel, recording::kStep)) return recording::decode_step(message.data, newest_, ways_);
   if (belongs(channel, recording::kPort)) return recording::decode_port(message.data, newest_);
+  if (belongs(channel, recording::kFieldInput)) return recording::decode_field_input(message.data, newest_);
+  if (belongs(channel, recording::kFieldData)) return recording::decode_field_data(message.data, newest_);
   if (is(channel, recording::kDatagram)) return recording::decode_datagram(message.data, newest_);
   return recording::decode_loss(message.data, newest_);
 }

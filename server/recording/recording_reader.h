@@ -23,11 +23,11 @@ namespace tendon {
 ///
 /// All records in complete, valid chunks are returned. If chunks are damaged, error messages are added to `damage()`,
 /// and a LossRecord with Cause::kDisk is returned for each gap. If the scene is missing, the time of a record is the
-/// wall clock. Unknown channels are ignored, and by default also the scenes, steps and ports of all devices except for
+/// wall clock. Unknown channels are ignored, and by default also the scenes, steps, ports and fields of all devices except for
 /// the first one. Throws std::runtime_error if this is not a Tendon recording. Thread-safe: no. Realtime-safe: no.
 class RecordingReader {
  public:
-  using Record = std::variant<SceneRecord, StepRecord, DatagramRecord, LossRecord, PortRecord>;
+  using Record = std::variant<SceneRecord, StepRecord, DatagramRecord, LossRecord, PortRecord, FieldInput, FieldData>;
   enum class Devices : std::uint8_t { kFirst, kAll };
 
   explicit RecordingReader(const std::filesystem::path& path, Devices devices = Devices::kFirst);
@@ -38,7 +38,7 @@ class RecordingReader {
 
   /// In the order of the scenes. The first name is empty because it may be specified in the scene.
   const std::vector<std::string>& devices() const noexcept { return devices_; }
-  std::size_t device() const noexcept { return device_; }  ///< of the last scene, step or port
+  std::size_t device() const noexcept { return device_; }  ///< of the last scene, step, port or field
 
   /// True if the server was killed or the disk was full. Only valid after `next` has returned nothing.
   bool truncated() const noexcept { return mcap_.truncated(); }

@@ -5,7 +5,11 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <vector>
 
+#include "core/field/field_pose.h"
+#include "core/field/fixture.h"
+#include "core/field/material.h"
 #include "core/haptic_controller.h"
 #include "protocol/link.h"
 
@@ -35,6 +39,42 @@ struct PortRecord {
   PortState sent{};
   std::optional<PortState> peer{};  ///< the newest since the previous step, if any
   LocalTime peer_arrived{};
+};
+
+/// A message for the field of a channel that was received before the haptic step `tick`. To be replayed with the
+/// StepRecord of this step.
+struct FieldInput {
+  enum class Kind : std::uint8_t {
+    kUse = 1,      ///< a field, whose FieldData has the same channel, source and generation
+    kStop = 2,     ///< the source stops using its field
+    kRelease = 3,  ///< the source has disconnected
+    kPose = 4,
+    kTruth = 5,  ///< RemoteForce::field
+  };
+  std::uint64_t tick = 0;
+  LocalTime at{};  ///< time when the haptic thread received it
+  Kind kind = Kind::kUse;
+  std::uint32_t channel = 0;
+  std::uint32_t source = 0;
+  std::uint32_t generation = 0;    ///< kUse, kTruth
+  std::uint64_t answers_tick = 0;  ///< kTruth
+  LocalTime received{};            ///< kTruth
+  Vec3 truth = Vec3::Zero();       ///< kTruth, N
+  field::TimedPose pose{};         ///< kPose
+};
+
+/// A field that a client has uploaded (core/field/field.h).
+struct FieldData {
+  LocalTime at{};
+  std::uint32_t channel = 0;
+  std::uint32_t source = 0;
+  std::uint32_t generation = 0;
+  std::vector<std::byte> manifest{};  ///< protocol/field/manifest.h
+  /// Weights of all bricks, in the order of the manifest. Empty if the previous FieldData of the channel has the same
+  /// manifest.
+  std::vector<std::byte> weights{};
+  std::vector<field::Material> materials{};
+  std::vector<field::Fixture> fixtures{};
 };
 
 /// Offset of the follower's clock from the leader's clock.

@@ -29,6 +29,12 @@ void require_same_again(const RecordingReader::Record& record, const SolverPaths
     fuzz::require(recording::encode(recording::decode_datagram(bytes, datagram->at)) == bytes);
   } else if (const auto* loss = std::get_if<LossRecord>(&record)) {
     fuzz::require(recording::decode_loss(recording::encode(*loss), loss->at) == *loss);
+  } else if (const auto* input = std::get_if<FieldInput>(&record)) {
+    const auto bytes = recording::encode(*input);
+    fuzz::require(recording::encode(recording::decode_field_input(bytes, input->at)) == bytes);
+  } else if (const auto* data = std::get_if<FieldData>(&record)) {
+    const auto bytes = recording::encode(*data);
+    fuzz::require(recording::encode(recording::decode_field_data(bytes, data->at)) == bytes);
   }
 }
 

@@ -75,7 +75,7 @@ struct Rig {
   HapticController controller;
   std::uint64_t tick = 0;
   Vec3 applied = Vec3::Zero();
-  double jump = 0;  ///< N, between the last two steps
+  double jump = 0;  ///< N, change of the force in the last step
 };
 
 TEST(FieldControl, AFieldUnderTheHandStartsWithNoForce) {
@@ -228,7 +228,7 @@ TEST(FieldControl, APoseWithoutATankCannotPush) {
     double credit = 0;
     double work = 0;  // on the hand
     double least = 0;
-    for (int k = 0; k < 1500; ++k) {  // the plane rises by 20 mm and stays
+    for (int k = 0; k < 1500; ++k) {  // the plane moves up by 20 mm in 0.2 s
       EXPECT_TRUE(
           rig.controller.observe(TimedPose{.at = rig.now(), .pose = {.position = {0, 0, std::min(0.02, 1e-4 * k)}}}));
       const Step step = rig.at(body.x);

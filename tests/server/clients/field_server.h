@@ -33,7 +33,9 @@ class FieldServer : public Servers {
   }
 
   void start(const std::vector<Scene>& scenes, const std::vector<ClientKey>& keys = {}, std::size_t networks = 1) {
-    Assembly::Config config{.watched = Mailboxes::Capacities{.steps = 16, .flight = 2, .datagrams = 1}};
+    Assembly::Config config;
+    records_ = scenes.front().recording.has_value();
+    if (!records_) config.watched = Mailboxes::Capacities{.steps = 16, .flight = 2, .datagrams = 1};
     config.network.secret.fill(std::byte{7});
     config.network.keys = keys;
     serve(scenes, networks, config);
@@ -114,7 +116,8 @@ class FieldServer : public Servers {
   void step() {
     for (auto& group : assembly_->haptic_groups()) group.turn(now_);
     for (std::size_t i = 0; i < assembly_->networks(); ++i) assembly_->turn_network(i, now_);
-    for (std::size_t i = 0; i < assembly_->devices().size(); ++i) {
+    if (records_) assembly_->log().turn(now_, 0);
+    for (std::size_t i = 0; i < assembly_->devices().size() && !records_; ++i) {
       while (const StepRecord* const record = mail(i).steps.front()) {
         least_energy_ = std::min(least_energy_, record->energy);
         if (i == 0) last_ = *record;
@@ -135,6 +138,7 @@ class FieldServer : public Servers {
     }
   }
 
+  bool records_ = false;  ///< by the LogLoop. `watch_` is not called then
   std::uint64_t seed_ = 0;
   std::size_t count_ = 0;
   std::vector<std::pair<LocalTime, Datagram>> under_way_;

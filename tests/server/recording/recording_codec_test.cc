@@ -168,6 +168,85 @@ TEST(RecordingCodec, APortComesBackWithAllThatItHad) {
   EXPECT_THROW(recording::decode_port(recording::encode(odd), port.at), std::invalid_argument);
 }
 
+FieldInput an_input(FieldInput::Kind kind) {
+  FieldInput input{.tick = 77, .at = testing::ms(77), .kind = kind, .channel = 1, .source = 5, .generation = 3};
+  if (kind == FieldInput::Kind::kTruth) {
+    input.answers_tick = 40;
+    input.received = testing::ms(76);
+    input.truth = {1, -2, 0.1};
+  }
+  if (kind == FieldInput::Kind::kPose) {
+    input.pose = {.at = testing::ms(99),
+                  .pose = {.position = {0.1, 0.2, -0.3}, .turn = {.w = 0.5, .x = 0.5, .y = -0.5, .z = 0.5}},
+                  .velocity = {1, 2, 3},
+                  .angular_velocity = {4, 5, 6}};
+  }
+  return input;
+}
+
+FieldData a_field() {
+  return {.at = testing::ms(70),
+          .channel = 1,
+          .source = 5,
+          .generation = 3,
+          .manifest = {std::byte{1}, std::byte{0}, std::byte{255}},
+          .weights = std::vector<std::byte>(1024, std::byte{7}),
+          .materials = {{.stiffness = 900, .branch = 300, .tau = 0.1, .friction = 0.4}, {.stiffness = 500}},
+          .fixtures = {{.kind = field::Fixture::Kind::kPlane,
+                        .at = {0.1, 0.2, 0.3},
+                        .direction = {1, 0, 0},
+                        .stiffness = 100,
+                        .most_force = 2}}};
+}
+
+TEST(RecordingCodec, InputsAndDataOfFieldsComeBackWithAllThatTheyHad) {
+  using Kind = FieldInput::Kind;
+  for (const Kind kind : {Kind::kUse, Kind::kStop, Kind::kRelease, Kind::kPose, Kind::kTruth}) {
+    const FieldInput input = an_input(kind);
+    const FieldInput read = recording::decode_field_input(recording::encode(input), input.at);
+    EXPECT_EQ(recording::encode(read), recording::encode(input));
+    EXPECT_EQ(read.kind, kind);
+    EXPECT_EQ(read.pose.at, kind == Kind::kPose ? input.pose.at : LocalTime{});
+    if (kind == Kind::kTruth) {
+      EXPECT_EQ(read.received, input.received);
+    }
+  }
+  EXPECT_THROW(recording::decode_field_input(recording::encode(an_input(static_cast<Kind>(9))), testing::ms(77)),
+               std::invalid_argument);
+  const FieldData data = a_field();
+  const FieldData read = recording::decode_field_data(recording::encode(data), data.at);
+  EXPECT_EQ(recording::encode(read), recording::encode(data));
+  EXPECT_EQ(read.manifest, data.manifest);
+  EXPECT_EQ(read.weights, data.weights);
+  EXPECT_EQ(read.fixtures[0].kind, field::Fixture::Kind::kPlane);
+  pb::FieldData message;
+  ASSERT_TRUE(message.ParseFromString(recording::encode(data)));
+  message.mutable_fixtures(0)->set_kind(3);
+  EXPECT_THROW(recording::decode_field_data(message.SerializeAsString(), data.at), std::invalid_argument);
+}
+
+TEST(RecordingCodec, FieldsAreInTheFileOfADeviceThatAllowsThem) {
+  MemorySink sink;
+  Recorder::Config config = testing::sample_config();
+  config.fields = true;
+  config.more_devices.push_back({.name = "left", .scene = config.scene, .fields = true});
+  Recorder recorder(config, sink);
+  recorder.record(a_field(), 1);
+  recorder.record(an_input(FieldInput::Kind::kUse), 1);
+  recorder.record(testing::sample_step(77), 1);
+  recorder.record(an_input(FieldInput::Kind::kPose));
+  recorder.close();
+  RecordingReader reader(testing::stream(sink.bytes()), "x", RecordingReader::Devices::kAll);
+  std::vector<std::size_t> kinds;
+  std::vector<std::size_t> devices;
+  while (const auto record = reader.next()) {
+    kinds.push_back(record->index());
+    devices.push_back(reader.device());
+  }
+  EXPECT_EQ(kinds, (std::vector<std::size_t>{0, 0, 6, 5, 1, 5}));
+  EXPECT_EQ(devices, (std::vector<std::size_t>{0, 1, 1, 1, 1, 0}));
+}
+
 TEST(RecordingCodec, APortIsInTheFileBeforeItsStepAndOnlyOfACoupledDevice) {
   for (const bool coupled : {true, false}) {
     MemorySink sink;

@@ -26,6 +26,7 @@
 #include "tests/tools/lab/recordings/report.h"
 #include "tests/tools/lab/recordings/run_summary.h"
 #include "tests/tools/lab/recordings/trace.h"
+#include "tests/tools/replay/field_rerun.h"
 #include "tests/tools/replay/rerun.h"
 
 namespace tendon::replay {
@@ -97,6 +98,7 @@ Gaps read_run(const Options& options, const Chosen& chosen, Rerun::Held held, co
               const VisitDatagram& visit_datagram) {
   Gaps gaps;
   std::vector<std::optional<Rerun>> reruns(chosen.names.size());
+  std::vector<std::optional<FieldRerun>> fields(chosen.names.size());
   const auto read_part = [&](const std::filesystem::path& file) {
     RecordingReader reader(file, RecordingReader::Devices::kAll);
     while (const auto record = reader.next()) {
@@ -113,11 +115,22 @@ Gaps read_run(const Options& options, const Chosen& chosen, Rerun::Held held, co
       const auto* scene = std::get_if<SceneRecord>(&*record);
       const auto* port = std::get_if<PortRecord>(&*record);
       const auto* step = std::get_if<StepRecord>(&*record);
-      if (scene != nullptr && !rerun) rerun.emplace(control_of(*scene, options), held);
+      if (scene != nullptr && !rerun) {
+        const HapticController::Config control = control_of(*scene, options);
+        rerun.emplace(control, held);
+        if (options.fields) fields[device].emplace(control);
+      }
       if ((port != nullptr || step != nullptr) && !rerun)
         throw std::runtime_error(file.string() + ": the scene is missing, so the law of the run is unknown");
       if (port != nullptr) rerun->settled(*port);
-      if (step != nullptr) visit(device, *step, rerun->step(*step));
+      if (fields[device]) {
+        if (const auto* data = std::get_if<FieldData>(&*record)) fields[device]->take(*data);
+        if (const auto* input = std::get_if<FieldInput>(&*record)) fields[device]->take(*input);
+      }
+      if (step == nullptr) continue;
+      StepRecord again = rerun->step(*step);
+      if (fields[device]) again.field = fields[device]->step(*step);
+      visit(device, *step, again);
     }
     gaps.truncated = gaps.truncated || reader.truncated();
     if (gaps.without_steps.empty()) gaps.without_steps = reader.without_steps();

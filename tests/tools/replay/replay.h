@@ -20,6 +20,7 @@ struct Options {
   std::optional<std::string> device = {};
   std::optional<std::filesystem::path> csv = {};
   std::optional<std::filesystem::path> picture = {};  ///< .svg or .png, both runs of at most two devices side by side
+  bool fields = false;                                ///< renders the recorded fields again
   bool json = false;
   bool progress = false;  ///< rewrites a progress line on stderr
 };
@@ -30,6 +31,9 @@ struct Options {
 /// results of the law must be bitwise identical: interval, account, bound, force, mode, reasons. Returns false at the
 /// first differing step of a device and prints both values, or if no step of a device could be compared. Steps after a
 /// gap cannot be compared, because the state of the law is unknown there; they are reported.
+///
+/// With `fields`, the fields are also rendered again (FieldRerun) and compared. Otherwise, their recorded forces and
+/// credits are used.
 ///
 /// With `law` or `settings`, another law receives the recorded motion and forces, and its account uses its own force.
 /// The hand moves as recorded, so the result shows what the law would have permitted, not where the hand would have

@@ -47,6 +47,7 @@ int main(int argc, char** argv) {
       ->allow_extra_args(false);
   app.add_option("--files", files, "Folder of the files in the scene")->type_name("DIR")->default_val(".");
   app.add_option("--device", device, "Only this device of the recording")->type_name("NAME");
+  app.add_flag("--field", options.fields, "Also render the recorded fields again, and verify their forces");
   app.add_option("--csv", csv, "Write a row for each step to this file")->type_name("FILE.csv");
   app.add_option("--out", picture, "Draw both runs side by side (requires gnuplot)")->type_name("FILE.svg|FILE.png");
   auto* const merged = app.add_option("--merge", follower,
@@ -60,7 +61,7 @@ int main(int argc, char** argv) {
       app.add_option("--repair", mended, "Copy the valid part of a damaged or truncated RECORDING to this file")
           ->type_name("FILE.mcap")
           ->excludes(merged);
-  for (const char* const other : {"PART", "--law", "--set", "--device", "--csv", "--out"}) {
+  for (const char* const other : {"PART", "--law", "--set", "--device", "--field", "--csv", "--out"}) {
     merged->excludes(app.get_option(other));
     repaired->excludes(app.get_option(other));
   }

@@ -143,6 +143,21 @@ std::string difference(const StepRecord& recorded, const StepRecord& again) {
     number("grip.energy_j", recorded.grip()->energy, again.grip()->energy);
     number("grip.force_commanded_n", recorded.grip()->force, again.grip()->force);
   }
+  if (recorded.field.has_value() != again.field.has_value()) {
+    say("field", recorded.field ? "in use" : "none", again.field ? "in use" : "none");
+  } else if (recorded.field) {
+    const FieldStep& was = *recorded.field;
+    const FieldStep& is = *again.field;
+    if (was.generation != is.generation) {
+      say("field.generation", std::to_string(was.generation), std::to_string(is.generation));
+    }
+    if (!same(was.force, is.force)) say("field.force_n", digits(was.force), digits(is.force));
+    if (!same(was.proxy, is.proxy)) say("field.proxy_m", digits(was.proxy), digits(is.proxy));
+    number("field.depth_m", was.depth, is.depth);
+    number("field.stored_j", was.stored, is.stored);
+    number("field.refused_j", was.refused, is.refused);
+    number("field.credited_j", was.credit, is.credit);
+  }
   if (recorded.mode != again.mode) {
     say("mode", std::to_string(static_cast<int>(recorded.mode)), std::to_string(static_cast<int>(again.mode)));
   }
