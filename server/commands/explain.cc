@@ -65,11 +65,11 @@ class Playback final : public Device {
   std::size_t next_ = 0;
 };
 
-/// A sphere of 30 mm with its surface at the origin, in bricks of 2 mm.
+/// A sphere of 30 mm in bricks of 2 mm. The origin, from which most hands start, is 3 mm below its surface.
 const field::Field& measured_field() {
   static const field::BrickField kBricks = [] {
     field::BrickField bricks;
-    const Vec3 centre(0, 0, -0.03);
+    const Vec3 centre(0, 0, -0.027);
     const Vec3 half = Vec3::Constant(0.04);
     sample([&](const Vec3& x) { return (x - centre).norm() - 0.03; }, centre - half, centre + half, 2e-3, bricks);
     return bricks;

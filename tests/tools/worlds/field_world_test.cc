@@ -187,11 +187,14 @@ struct Outcome {
   bool bound = false;         ///< the gate has refused energy
 };
 
-Outcome run(std::uint64_t seed) {
+/// `more` is a factor of the force of an adversary, which a law that is passive does not expect.
+Outcome run(std::uint64_t seed, double more = 1) {
   const DrawnFields drawn = draw(seed);
   std::unique_ptr<Device> device;
   if (const auto* adversary = std::get_if<AdversaryDevice::Config>(&drawn.device)) {
-    device = std::make_unique<AdversaryDevice>(*adversary, seed);
+    AdversaryDevice::Config config = *adversary;
+    config.more.force = more;
+    device = std::make_unique<AdversaryDevice>(config, seed);
   } else {
     device = std::make_unique<SimulatedDevice>(std::get<SimulatedDevice::Config>(drawn.device));
   }
@@ -238,6 +241,12 @@ TEST(FieldWorlds, NoFieldGivesOutMoreThanItsTank) {
   EXPECT_GT(touched, worlds / 2);
   EXPECT_GT(bound, worlds / 4);
   EXPECT_GT(granted, 0);
+}
+
+TEST(FieldWorlds, ADeviceThatPushesOnePercentHarderIsFound) {
+  int found = 0;
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) found += run(seed, 1.01).least < -1e-9 ? 1 : 0;
+  EXPECT_GT(found, 0);
 }
 
 }  // namespace
