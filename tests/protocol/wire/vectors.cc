@@ -3,6 +3,7 @@
 
 #include <google/protobuf/util/json_util.h>
 
+#include <bit>
 #include <fstream>
 #include <iterator>
 #include <optional>
@@ -12,13 +13,18 @@
 #include <utility>
 #include <vector>
 
+#include "core/base/bytes.h"
+#include "core/base/expect.h"
+#include "protocol/field/manifest.h"
 #include "protocol/handshake.h"
 #include "protocol/reliable/replay_window.h"
+#include "protocol/secrets/blake2b.h"
 #include "protocol/secrets/client_key.h"
 #include "protocol/secrets/noise.h"
 #include "protocol/secrets/seal.h"
 #include "tendon.pb.h"
 #include "tests/protocol/examples.h"
+#include "tests/protocol/field/field_vectors.h"
 #include "tests/protocol/wire/bounds.h"
 
 namespace tendon::vectors {
@@ -556,10 +562,53 @@ std::string bounds_file() {
   return Object().json("bounds", list(out)).str() + "\n";
 }
 
+std::string numbers(std::span<const double> values) {
+  std::string out;
+  for (const double value : values) out += (out.empty() ? "" : ", ") + shortest(value);
+  return "[" + out + "]";
+}
+
+/// `kind` and `numbers` are those of a manifest.
+std::string shape(const field::Primitive& primitive) {
+  const std::vector<std::byte> manifest = encode_manifest({}, {}, std::span(&primitive, 1));
+  const std::span<const std::byte> entry = std::span(manifest).subspan(FieldManifest::kHead);
+  std::vector<double> values(FieldManifest::kNumbers);
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    values[i] = std::bit_cast<double>(get_little_endian<std::uint64_t>(&entry[3 + 8 * i]));
+  }
+  return R"({"kind": )" + std::to_string(std::to_integer<int>(entry[0])) + R"(, "hollow": )" +
+         (primitive.hollow ? "true" : "false") + R"(, "numbers": )" + numbers(values) + "}";
+}
+
+std::string shapes(const std::vector<field::Primitive>& primitives) {
+  std::vector<std::string> out;
+  out.reserve(primitives.size());
+  for (const field::Primitive& primitive : primitives) out.push_back(shape(primitive));
+  return list(out);
+}
+
+std::string fields_file() {
+  std::vector<std::string> out;
+  for (const field_vectors::Case& one : field_vectors::cases()) {
+    const field_vectors::Encoded encoded = field_vectors::encoded(one);
+    Object json;
+    json.text("name", one.name).json("sampled", shapes(one.sampled));
+    json.json("low", numbers(std::span(one.low.data(), 3)))
+        .json("high", numbers(std::span(one.high.data(), 3)))
+        .json("spacing", shortest(one.spacing));
+    json.json("region", shapes(one.region)).json("primitives", shapes(one.primitives));
+    json.bytes("manifest", encoded.manifest).bytes("field", crypto::blake2b_256(encoded.manifest));
+    if (!encoded.bricks.empty()) json.bytes("first_brick", std::as_bytes(std::span(encoded.bricks.front())));
+    out.push_back(json.str());
+  }
+  return Object().json("fields", list(out)).str() + "\n";
+}
+
 }  // namespace
 
 std::map<std::string, std::string> files() {
   return {{"bounds.json", bounds_file()},
+          {"fields.json", fields_file()},
           {"plain.json", plain_file()},
           {"sealed.json", sealed_file(Suite::kNoise)},
           {"sealed_aes.json", sealed_file(Suite::kAesGcm)},
