@@ -29,9 +29,10 @@ except ImportError as _missing:
 del _protobuf, _nacl
 
 from . import aio, cli, worker
-from .client import Client
+from .client import Client, connect
 from .config import Config, Phase, Stats
 from .deadband import ForceDeadband
+from .field import Field
 from .force_client import ForceClient
 from .guest import RefusedForGood
 from .keys import read_key
@@ -44,6 +45,7 @@ from .messages import (
     DeviceDescription,
     DeviceReport,
     DeviceState,
+    FieldState,
     ForceTable,
     Grip,
     Hand,
@@ -65,8 +67,11 @@ from .messages import (
     Vibration,
     Welcome,
 )
+from .shape import Box, Capsule, Plane, Sphere
 
 __all__ = [
+    "Box",
+    "Capsule",
     "ChannelDescription",
     "ChannelRule",
     "Client",
@@ -77,6 +82,8 @@ __all__ = [
     "DeviceDescription",
     "DeviceReport",
     "DeviceState",
+    "Field",
+    "FieldState",
     "ForceClient",
     "ForceDeadband",
     "ForceTable",
@@ -92,11 +99,13 @@ __all__ = [
     "OutputKind",
     "PeerReport",
     "Phase",
+    "Plane",
     "Reason",
     "RefusedForGood",
     "Role",
     "Safety",
     "SetStateDeadband",
+    "Sphere",
     "Stats",
     "Touch",
     "Turning",
@@ -104,6 +113,7 @@ __all__ = [
     "Welcome",
     "aio",
     "cli",
+    "connect",
     "read_key",
     "worker",
 ]

@@ -6,11 +6,14 @@ from __future__ import annotations
 import select
 import time
 from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
 from types import TracebackType
-from typing import Union
+from typing import Any, Union
 
+from .config import Config
 from .expect import expect
 from .guest import AnyClient
+from .keys import read_key
 from .messages import NEVER, DeviceState, Touch
 
 Physics = Callable[[DeviceState], Union[Touch, Sequence[float], None]]
@@ -91,3 +94,14 @@ class Client(AnyClient):
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
+
+
+def connect(server: str, key: str | Path | bytes | None = None, **settings: Any) -> Client:
+    """Creates a client with Config(fields=True). `key` can be a key or the path of a key file. For the other settings, see
+    Config.
+
+        with tendon.connect("lab:47100", channel="peg", key="peg.key") as hand:
+            hand.use(field)
+    """
+    secret = key if key is None or isinstance(key, bytes) else read_key(key)
+    return Client(server, Config(key=secret, fields=True, **settings))

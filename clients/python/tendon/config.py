@@ -69,6 +69,8 @@ class Config:
     outputs: bool = False
     """Requests access to the outputs of the device (`HandleDescription.outputs`: lamps, vibration). Required for
     `set_output`."""
+    fields: bool = False
+    """Requests that the server can render a field (`use`, `pose`, `truth`; tendon.connect sets this)."""
     ways: tuple[str, ...] = ()
     """The names of the methods that are used by this engine to compute forces. `Touch.way` is an index into this list,
     starting at 1. Observers and recordings receive the names. There can be at most 8 different names, and each of them

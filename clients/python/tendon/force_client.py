@@ -18,6 +18,7 @@ from .handshake import ClientHandshake
 from .messages import (
     FEATURE_CHANNELS,
     FEATURE_DIAGNOSTICS,
+    FEATURE_FIELDS,
     FEATURE_HANDLE,
     FEATURE_JOINTS,
     FEATURE_LOCAL_MODEL,
@@ -35,6 +36,7 @@ from .messages import (
     Disarm,
     Disengage,
     Engage,
+    FieldStatus,
     ForceCommand,
     GiveLease,
     Grant,
@@ -60,6 +62,7 @@ from .messages import (
 )
 from .noise import KEY_SIZE
 from .session import Closed, Session
+from .upload import FieldUser
 
 # The numbers are explained at Config.valid_for_s.
 _VALID_PERIODS = 3
@@ -99,6 +102,8 @@ class ForceClient:
         self.peer_reports: dict[int, PeerReport] = {}
         """The newest report on the engine of each channel. If the engine leaves, the report is not removed. Requires
         Config.diagnostics."""
+        self.fields = FieldUser()
+        """The field of this client. Requires Config.fields."""
         self.config = config
         self._random = random
         self._period = _ns(1 / config.rate_hz) if config.rate_hz > 0 else 0
@@ -143,6 +148,7 @@ class ForceClient:
             self._take_events(now)
             if self._asked_lease is None and now >= self._ask_lease and not self.take_lease():
                 self._ask_lease = now + _ASK_LEASE_AGAIN_NS
+            self.fields.tick(now, self.holds)
         elif self._handshake is not None:
             if now >= self._give_up:
                 self._end(now, Phase.UNANSWERED, Code.TIMED_OUT, "no answer")
@@ -175,16 +181,9 @@ class ForceClient:
         Read the clock again before the next call, so that the time stamp of the datagram does not include the
         computation.
         """
-        if self.config.role is not Role.CONTROLLER:
-            raise PermissionError("an observer cannot send forces: expected role=Role.CONTROLLER")
-        answer = read_touch(touch)
+        answer = self._usable(hand, touch)
         session = self._session
-        if session is None or self.welcome is None or not self.holds:
-            return
-        objection = self._objection(hand, answer)
-        if objection:
-            self._stats.forces_unusable += 1
-            self._stats.unusable = objection
+        if session is None or self.welcome is None or answer is None:
             return
         torque, grip_force = self._of_handle(hand, answer)
         alike = self._deadband is not None and not self._deadband.passes(
@@ -194,18 +193,11 @@ class ForceClient:
             self._stats.forces_alike += 1
             return
         model = answer.local_model(hand.position) if FEATURE_LOCAL_MODEL in self.welcome.features else None
-        valid_for_us = self._valid_for_us(hand.tick, self.welcome.loop_hz)
-        self._sequence += 1
-        self._answered_tick = hand.tick
+        command = self._command(hand, answer)
         session.send(
-            ForceCommand(
-                self._sequence,
-                hand.tick,
-                answer.force,
-                valid_for_us,
-                model,
-                self._place.device,
-                self._place.channel,
+            replace(
+                command,
+                model=model,
                 topology_changed=answer.topology_changed,
                 error=answer.error,
                 torque=torque,
@@ -213,7 +205,41 @@ class ForceClient:
                 way=self._way(answer),
             )
         )
+
+    def truth(self, hand: DeviceState, touch: Touch) -> bool:
+        """Sends the true force for a state, which the server uses to correct the field. Returns False if the state does not
+        contain a field, or if the force cannot be sent (see send())."""
+        answer = self._usable(hand, touch)
+        if self._session is None or answer is None or hand.field is None:
+            return False
+        self._session.send(replace(self._command(hand, answer), field=hand.field.generation))
+        return True
+
+    def _usable(self, hand: DeviceState, touch: Touch) -> Answer | None:
+        """Returns the answer, or None if it cannot be sent."""
+        if self.config.role is not Role.CONTROLLER:
+            raise PermissionError("an observer cannot send forces: expected role=Role.CONTROLLER")
+        answer = read_touch(touch)
+        if self._session is None or not self.holds:
+            return None
+        objection = self._objection(hand, answer)
+        if objection:
+            self._stats.forces_unusable += 1
+            self._stats.unusable = objection
+            return None
+        return answer
+
+    def _command(self, hand: DeviceState, answer: Answer) -> ForceCommand:
+        """Returns the next force command. It only contains the force."""
+        assert self.welcome is not None
+        valid_for_us = self._valid_for_us(hand.tick, self.welcome.loop_hz)
+        self._sequence += 1
+        self._answered_tick = hand.tick
         self._stats.forces += 1
+        place = self._place
+        return ForceCommand(
+            self._sequence, hand.tick, answer.force, valid_for_us, None, place.device, place.channel
+        )
 
     def _way(self, answer: Answer) -> int:
         if not 0 <= answer.way <= len(self.config.ways):
@@ -289,6 +315,7 @@ class ForceClient:
             return False
         self._asked_lease = None  # a later answer would be outdated
         self.holds = False
+        self.fields.lost_lease()
         return True
 
     def stop(self, now: int) -> None:
@@ -310,7 +337,10 @@ class ForceClient:
                 return bye
             self._ended = None
         if self._session is not None:
-            return self._session.next_datagram(now)
+            datagram = self._session.next_datagram(now)
+            if datagram is None and self.fields.has_brick(now):
+                datagram = self._session.next_datagram(now)
+            return datagram
         return None if self._handshake is None else self._handshake.next_datagram(now)
 
     def next_state(self, now: int) -> DeviceState | None:
@@ -336,7 +366,7 @@ class ForceClient:
             return self._ended.next_turn()
         if self._session is not None:
             ask = NEVER if self._asked_lease is not None else self._ask_lease
-            return min(self._session.next_turn(), ask)
+            return min(self._session.next_turn(), ask, self.fields.due())
         if self._handshake is not None:
             return min(self._give_up, self._handshake.next_turn())
         return self._retry if self.phase in _WAITING else NEVER
@@ -387,6 +417,8 @@ class ForceClient:
             features += (FEATURE_OUTPUTS,)
         if self.config.diagnostics:
             features += (FEATURE_DIAGNOSTICS,)
+        if self.config.fields:
+            features += (FEATURE_FIELDS,)
         if self.config.ways:
             features += (FEATURE_WAYS,)
         hello = Hello(self.config.role, self.config.name, features, claims=self._claims(), ways=self.config.ways)
@@ -435,6 +467,10 @@ class ForceClient:
         self._seen_tick = 0
         self.report = self.device_report = None
         self.peer_reports = {}
+        if FEATURE_FIELDS in outcome.welcome.features:
+            self.fields.opened(self._session, self._place)
+        elif self.config.fields:
+            self.fields.closed("the server does not support fields")
         # The new session has not sent any force yet.
         self._deadband = Deadband(self.config.deadband) if self.config.deadband else None
         self._sequence = 0
@@ -449,6 +485,7 @@ class ForceClient:
         self._stats.reason = reason
         self._handshake = None
         self._ended, self._session = self._session, None
+        self.fields.closed()
         self.holds = False
         self._unseen = self._newest = None
         self._pressed = 0
@@ -465,6 +502,8 @@ class ForceClient:
                 self._pressed = event.buttons | (0 if self._waits_for_lease() else self._pressed)
                 self._newest_arrived = now
                 self._back_off = _ns(self.config.retry_min_s)
+            elif isinstance(event, FieldStatus):
+                self.fields.take_status(now, event)
             elif isinstance(event, LinkReport):
                 self.report = event
             elif isinstance(event, DeviceReport):
@@ -484,6 +523,7 @@ class ForceClient:
             self.description = answer.device
         if answer.handle is not None:
             self.handle = answer.handle
+        self.fields.take_answer(now, answer)
         if answer.id == self._deadband_request:
             self._predicts = answer.code is Code.OK and self._period > 0 and self._silence_ns() > 0
         if answer.id != self._asked_lease:
@@ -506,6 +546,7 @@ class ForceClient:
         if (lost.device, lost.channel) != (self._place.device, self._place.channel):
             return
         self.holds = False
+        self.fields.lost_lease()
         self._stats.lease_lost_to = lost.to
         # A pending request may be older than this message, so send a new one.
         if self._asked_lease is not None and self.take_lease():

@@ -15,7 +15,9 @@ from typing import Any
 
 from . import limits
 from .config import Config, Phase, Stats
+from .expect import expect
 from .force_client import ForceClient
+from .field import Field
 from .messages import (
     Code,
     DeviceDescription,
@@ -25,10 +27,13 @@ from .messages import (
     LampColour,
     LinkReport,
     PeerReport,
+    Quat,
     Touch,
+    Vec3,
     Vibration,
     Welcome,
 )
+from .upload import Motion
 
 log = logging.getLogger("tendon")
 
@@ -111,6 +116,7 @@ class Guest:
         self._said = ""
         self._said_unusable = ""
         self._said_left_out = ""
+        self._said_field = ""
         self._told: LinkReport | None = None
         self._seen_phase: Phase | None = None
         self._seen_reason = ""
@@ -224,6 +230,11 @@ class Guest:
         if stats.left_out != self._said_left_out and stats.left_out:
             self._said_left_out = stats.left_out
             log.warning("not sent with a force: %s", stats.left_out)
+        refused = self.core.fields.refused
+        if refused != self._said_field:
+            self._said_field = refused
+            if refused:
+                log.warning("the field is not used: %s", refused)
         if stats.phase is self._seen_phase and stats.reason == self._seen_reason:
             return
         self._seen_phase, self._seen_reason = stats.phase, stats.reason
@@ -272,6 +283,46 @@ class AnyClient:
             if hand.sampled_ns - self._first_none_ns >= 1_000_000_000:
                 self._may_lack_return = False
                 log.warning("the engine has returned None for 1 s, so no force is sent; check for a missing `return`")
+
+    def use(self, field: Field | None) -> None:
+        """Asks the server to render a field in the channel. Bricks that are missing on the server are uploaded while states
+        are requested. If the client reconnects, this is repeated. If only the materials have changed, no bricks are
+        sent. If `field` is None, the server stops rendering the current field. Requires `Config.fields`, which is set by
+        tendon.connect. If the server refuses the field, `field_refused` contains the reason."""
+        expect(self._guest.core.config.fields, "fields", False, "Config(fields=True), as by tendon.connect")
+        self._guest.core.fields.use(None if field is None else field.describe())
+        self._guest.turn(time.monotonic_ns())
+
+    def pose(
+        self,
+        position: Sequence[float],
+        turn: Sequence[float],
+        twist: Sequence[float] = (0.0,) * 6,
+        ahead_s: float = 0,
+    ) -> bool:
+        """Sends the predicted pose of the object at `ahead_s` from now, in the base frame of the device. `position` is in
+        m, `turn` is a quaternion (w, x, y, z), and `twist` contains the velocity (m/s) and the angular velocity (rad/s).
+        If possible, the engine should predict the pose for the time of its arrival, which is half a round trip later,
+        because the server only extrapolates it for 50 ms. Returns False if there is no session, or if the server does
+        not support fields. Raises ValueError if a value is larger than 10 m, 10 m/s or 100 rad/s."""
+        now = time.monotonic_ns()
+        x, y, z, *angular = (float(value) for value in twist)
+        motion = Motion(_three(position), _four(turn), (x, y, z), _three(angular))
+        sent = self._guest.core.fields.move(now, motion, round(ahead_s * 1e9))
+        self._guest.flush(now)
+        return sent
+
+    def truth(self, hand: DeviceState, force: Touch | Sequence[float]) -> bool:
+        """Sends the true force in N for a state. It is not rendered, but the server uses it to correct the field. Returns
+        False if the state does not contain a field."""
+        sent = self._guest.core.truth(hand, force if isinstance(force, Touch) else Touch(force))
+        self._guest.flush(time.monotonic_ns())
+        return sent
+
+    @property
+    def field_refused(self) -> str:
+        """The reason why the server has refused the field. Empty if it was not refused."""
+        return self._guest.core.fields.refused
 
     def rearm(self) -> bool:
         """Asks the server to clear a latched fault of its device. Returns False if there is no session."""
@@ -360,6 +411,16 @@ class AnyClient:
         asked = request()
         self._guest.flush(time.monotonic_ns())
         return asked
+
+
+def _three(values: Sequence[float]) -> Vec3:
+    x, y, z = (float(value) for value in values)
+    return (x, y, z)
+
+
+def _four(values: Sequence[float]) -> Quat:
+    w, x, y, z = (float(value) for value in values)
+    return (w, x, y, z)
 
 
 Place = tuple[int, int, Any]

@@ -39,6 +39,9 @@ FEATURE_TELEOPERATION = "teleoperation"
 FEATURE_WAYS = "ways"
 """An engine names its methods, and each force contains the method that computed it."""
 
+FEATURE_FIELDS = "fields"
+"""The client can upload fields (OfferField), which the server renders at its own rate (UseField)."""
+
 FEATURE_DIAGNOSTICS = "diagnostics"
 """An observer receives the forces of the engines before limiting, and the state of loops and engines (DeviceReport,
 PeerReport)."""

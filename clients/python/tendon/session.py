@@ -19,6 +19,9 @@ from .messages import (
     DeviceDescription,
     DeviceReport,
     DeviceState,
+    FieldBrick,
+    FieldPose,
+    FieldStatus,
     ForceCommand,
     HandleDescription,
     Frame,
@@ -50,7 +53,20 @@ class Closed:
     reason: str
 
 
-Event = Union[DeviceState, ForceCommand, LinkReport, DeviceReport, PeerReport, PortState, Control, ControlAck, Closed]
+Event = Union[
+    DeviceState,
+    ForceCommand,
+    LinkReport,
+    DeviceReport,
+    PeerReport,
+    PortState,
+    FieldBrick,
+    FieldStatus,
+    FieldPose,
+    Control,
+    ControlAck,
+    Closed,
+]
 """A Control is a received request that must be answered. A ControlAck is the answer to a sent request."""
 
 
@@ -69,8 +85,9 @@ class Session:
     Call `receive` for each datagram and `tick` when `next_turn()` is due, then call `next_event` and
     `next_datagram` until they are empty. `now` must not decrease.
 
-    All queues are bounded: one state, one force, one report and one port state (for each device, channel and end), and
-    limits.REQUEST_WINDOW requests in each direction. If a newer value arrives before a value is taken, it replaces it.
+    All queues are bounded: one state, one force, one brick, one report, one port state (for each device, channel and
+    end), one pose and one status of a field, and limits.REQUEST_WINDOW requests in each direction. If a newer value
+    arrives before a value is taken, it replaces it.
     """
 
     def __init__(self, connection_id: int, opened: int, cipher: Cipher | None = None) -> None:
@@ -91,6 +108,9 @@ class Session:
         self._report_to_send: LinkReport | None = None
         self._diagnoses_to_send: dict[tuple[int, int], DeviceReport | PeerReport] = {}
         self._ports_to_send: dict[tuple[int, int, bool], PortState] = {}  # by device, channel and end
+        self._poses_to_send: dict[tuple[int, int], FieldPose] = {}  # by device and channel
+        self._statuses_to_send: dict[bytes, FieldStatus] = {}  # by field
+        self._brick_to_send: FieldBrick | None = None
         self._asked = OutgoingRequests()
         self._bye: Bye | None = None
         self._byes_left = 0
@@ -105,6 +125,7 @@ class Session:
         self._newest_report = 0
         self._newest_diagnosis: dict[tuple[int, int], int] = {}  # by _stream
         self._newest_port: dict[tuple[int, int, bool], tuple[int, int]] = {}  # epoch and sequence, by the same key
+        self._newest_pose: dict[tuple[int, int], int] = {}  # by device and channel
         self._newest_echoed = -1  # newest sent packet that the peer has echoed
         self._answering = IncomingRequests()
         self._round_trip = RoundTrip()
@@ -115,6 +136,9 @@ class Session:
         self._report_arrived: LinkReport | None = None
         self._diagnoses_arrived: dict[tuple[int, int], DeviceReport | PeerReport] = {}
         self._ports_arrived: dict[tuple[int, int, bool], PortState] = {}
+        self._poses_arrived: dict[tuple[int, int], FieldPose] = {}
+        self._statuses_arrived: dict[bytes, FieldStatus] = {}
+        self._brick_arrived: FieldBrick | None = None
         self._closed: Closed | None = None
 
     # ---- In ----
@@ -157,7 +181,12 @@ class Session:
             return
         self._accept(now, number, content)
 
-    def send(self, frame: DeviceState | ForceCommand | LinkReport | DeviceReport | PeerReport | PortState) -> None:
+    def send(
+        self,
+        frame: (
+            DeviceState | ForceCommand | LinkReport | DeviceReport | PeerReport | PortState | FieldBrick | FieldStatus | FieldPose
+        ),
+    ) -> None:
         """Queues a frame, replacing an unsent one of the same kind."""
         if isinstance(frame, ForceCommand):
             self._force_to_send = frame
@@ -167,6 +196,12 @@ class Session:
             self._diagnoses_to_send[_stream(frame)] = frame
         elif isinstance(frame, PortState):
             self._ports_to_send[_end(frame)] = frame
+        elif isinstance(frame, FieldPose):
+            self._poses_to_send[frame.device, frame.channel] = frame
+        elif isinstance(frame, FieldStatus):
+            self._statuses_to_send[frame.field] = frame
+        elif isinstance(frame, FieldBrick):
+            self._brick_to_send = frame
         else:
             self._state_to_send = frame
 
@@ -232,10 +267,23 @@ class Session:
             event = self._diagnoses_arrived.pop(min(self._diagnoses_arrived))
         if event is None:
             event, self._state_arrived = self._state_arrived, None
+        if event is None and self._poses_arrived:
+            event = self._poses_arrived.pop(min(self._poses_arrived))
+        if event is None and self._statuses_arrived:
+            event = self._statuses_arrived.pop(min(self._statuses_arrived))
+        if event is None:
+            event, self._brick_arrived = self._brick_arrived, None
         if event is None:
             event, self._closed = self._closed, None
             self.has_events = event is not None
         return event
+
+    def peer_time(self, now: int) -> int | None:
+        """Returns the time of the peer's clock at `now`. Returns None if no datagram has been received. If the delays of the
+        two directions are different, the error is half of the difference."""
+        if self._newest_number < 0:
+            return None
+        return self._newest_sent_ns + (now - self._newest_received_ns) + self._round_trip.smoothed // 2
 
     def next_turn(self) -> Instant:
         """Returns when `tick` and `next_datagram` are due. The time is not in the future if there is something to
@@ -266,10 +314,10 @@ class Session:
         if content.echo is not None:
             self._observe(now, content.sent_ns, content.echo)
         for frame in content.frames:
-            self._take(frame)
+            self._take(frame, newest)
             self.has_events = True
 
-    def _take(self, frame: Frame) -> None:
+    def _take(self, frame: Frame, newest: bool) -> None:
         if isinstance(frame, DeviceState):
             if frame.tick <= self._newest_tick.get(frame.device, -1):
                 self.stats.stale += 1
@@ -304,6 +352,20 @@ class Session:
                 return
             self._newest_port[end] = age
             self._ports_arrived[end] = frame
+        elif isinstance(frame, FieldPose):
+            channel = (frame.device, frame.channel)
+            if frame.sequence <= self._newest_pose.get(channel, 0):
+                self.stats.stale += 1
+                return
+            self._newest_pose[channel] = frame.sequence
+            self._poses_arrived[channel] = frame
+        elif isinstance(frame, FieldStatus):
+            if newest:
+                self._statuses_arrived[frame.field] = frame
+            else:
+                self.stats.stale += 1
+        elif isinstance(frame, FieldBrick):
+            self._brick_arrived = frame
         elif isinstance(frame, Control):
             self.stats.invalid += not self._answering.take(frame)
         elif isinstance(frame, ControlAck):
@@ -346,6 +408,9 @@ class Session:
             or self._report_to_send is not None
             or bool(self._diagnoses_to_send)
             or bool(self._ports_to_send)
+            or bool(self._poses_to_send)
+            or bool(self._statuses_to_send)
+            or self._brick_to_send is not None
             or self._last_sent is None
             or now - self._last_sent >= KEEP_ALIVE_NS
             or self._asked.next_due() <= now
@@ -377,6 +442,8 @@ class Session:
             del self._ports_to_send[min(self._ports_to_send)]
         if self._force_to_send is not None and add(self._force_to_send):
             self._force_to_send = None
+        while self._poses_to_send and add(self._poses_to_send[min(self._poses_to_send)]):
+            del self._poses_to_send[min(self._poses_to_send)]
         for ack in self._answering.due():
             if not add(ack):
                 break
@@ -390,6 +457,10 @@ class Session:
             self._report_to_send = None
         while self._diagnoses_to_send and add(self._diagnoses_to_send[min(self._diagnoses_to_send)]):
             del self._diagnoses_to_send[min(self._diagnoses_to_send)]
+        while self._statuses_to_send and add(self._statuses_to_send[min(self._statuses_to_send)]):
+            del self._statuses_to_send[min(self._statuses_to_send)]
+        if self._brick_to_send is not None and add(self._brick_to_send):
+            self._brick_to_send = None
         return bytes(body)
 
     def _seal(self, now: int, body: bytes) -> bytes:

@@ -9,8 +9,9 @@ from types import SimpleNamespace
 
 import pytest
 
-from tendon import Client, Code, Config, Phase, aio
+from tendon import Client, Code, Config, Field, Phase, Sphere, aio, connect
 from tendon.guest import Guest, RefusedForGood, log, parse_address
+from tendon.upload import Motion
 
 
 @pytest.mark.parametrize(
@@ -103,6 +104,44 @@ def test_what_a_client_asks_for_leaves_at_once(kind, order, values, monkeypatch)
     monkeypatch.setattr(client._guest, "flush", lambda now: done.append("flush"))
     assert getattr(client, order)(*values)
     assert done == [(order, values), "flush"]
+
+
+@pytest.mark.parametrize("kind", [Client, aio.Client])
+def test_poses_and_truths_leave_at_once_and_a_field_is_described(kind, monkeypatch):
+    client = kind("127.0.0.1:9", Config(fields=True))
+    client._guest.socket.close()
+    done = []
+    core = client._guest.core
+    monkeypatch.setattr(core.fields, "use", lambda told: done.append(told and told.name))
+    monkeypatch.setattr(core.fields, "move", lambda now, motion, ahead: done.append((motion, ahead)) or True)
+    monkeypatch.setattr(core, "truth", lambda hand, touch: done.append(touch.force) or True)
+    monkeypatch.setattr(client._guest, "flush", lambda now: done.append("flush"))
+    field = Field.from_primitives(Sphere())
+    client.use(field)
+    assert client.pose((1, 2, 3), (1, 0, 0, 0), (4, 5, 6, 7, 8, 9), ahead_s=0.3)
+    assert client.truth(None, (1, 2, 3))
+    client.use(None)
+    motion = Motion((1.0, 2.0, 3.0), (1.0, 0.0, 0.0, 0.0), (4.0, 5.0, 6.0), (7.0, 8.0, 9.0))
+    name = field.describe().name
+    assert done == [name, "flush", (motion, 300_000_000), "flush", (1, 2, 3), "flush", None, "flush"]
+    client._guest.core.fields.refused = "too stiff"
+    assert client.field_refused == "too stiff"
+
+
+def test_connect_reads_a_key_and_asks_for_fields(tmp_path):
+    digits = "bc795700d5499e7507c56d6b31e4ecb5f7869bc746395172bfa650b552994153"
+    (tmp_path / "peg.key").write_text(f"controller {digits}\n")
+    (tmp_path / "peg.key").chmod(0o600)
+    for key, expected in ((tmp_path / "peg.key", bytes.fromhex(digits)), (bytes(32), bytes(32)), (None, None)):
+        with connect("127.0.0.1:9", channel="peg", key=key) as client:
+            config = client._guest.core.config
+            assert (config.key, config.fields, config.channel) == (expected, True, "peg")
+
+
+def test_a_client_without_the_feature_says_how_to_get_it():
+    with Client("127.0.0.1:9") as client:
+        with pytest.raises(ValueError, match=r"fields = False: expected Config\(fields=True\), as by tendon.connect"):
+            client.use(Field.from_primitives(Sphere()))
 
 
 @pytest.mark.parametrize("kind", [Client, aio.Client])
