@@ -53,6 +53,8 @@ export interface ClientConfig {
   readonly joints?: boolean;
   /** Requests access to the outputs of the device (HandleDescription.outputs: lamps, vibration), for setOutput(). */
   readonly outputs?: boolean;
+  /** Requests that the server can render a field (use, pose, truth). */
+  readonly fields?: boolean;
   /**
    * The names of the methods that are used by this engine to compute forces. Touch.way is an index into this list,
    * starting at 1. Observers and recordings receive the names. There can be at most 8 different names, and each of them
@@ -105,7 +107,7 @@ export interface ClientStats {
 
 const kDefaults: Required<Omit<ClientConfig, "key" | "deadband" | "stateDeadband">> = {
   name: "guest", device: "", channel: "", takeLease: false, rateHz: 0, stateHz: 0, validForMs: 0, diagnostics: false,
-  joints: false, outputs: false, ways: [], patienceMs: 2000, retryMinMs: 100, retryMaxMs: 2000, random: randomBytes,
+  joints: false, outputs: false, fields: false, ways: [], patienceMs: 2000, retryMinMs: 100, retryMaxMs: 2000, random: randomBytes,
   suites: kUsableSuites,
 };
 

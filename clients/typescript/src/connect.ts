@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 import type { ClientConfig, ClientStats, Phase } from "./config.js";
+import { expect } from "./expect.js";
+import type { Field } from "./field.js";
 import { ForceClient, type Physics, type Watch } from "./force_client.js";
 import type {
-  DeviceDescription, DeviceReport, HandleDescription, LampColour, LinkReport, PeerReport, Vibration, Welcome,
+  DeviceDescription, DeviceReport, DeviceState, HandleDescription, LampColour, LinkReport, PeerReport, Vec3, Vibration, Welcome,
 } from "./messages.js";
 import { fromMilliseconds, kNever, toMilliseconds, type Nanoseconds } from "./time.js";
+import type { Motion } from "./upload.js";
 
 export interface Transport {
   /** Sends a datagram. If this is not possible, the datagram is dropped. */
@@ -57,6 +60,25 @@ export interface Guest {
   /** Requests or releases the lease of the channel. */
   takeLease(): boolean;
   giveLease(): boolean;
+  /**
+   * Asks the server to render a field in the channel, and uploads the missing bricks. If the client reconnects, this is
+   * repeated. If only the materials have changed, no bricks are sent. If the argument is undefined, the server stops
+   * rendering the current field. Requires `fields` in the config.
+   */
+  use(field: Field | undefined): void;
+  /** The reason why the server has refused the field. Empty if it was not refused. */
+  readonly fieldRefused: string;
+  /**
+   * Sends the predicted pose of the object at `aheadMs` from now. The server extrapolates it for at most 50 ms. Returns
+   * false if there is no session, or if the server does not support fields. Throws a RangeError if a value is larger than
+   * 10 m, 10 m/s or 100 rad/s.
+   */
+  pose(motion: Motion, aheadMs?: number): boolean;
+  /**
+   * Sends the true force for a state. It is not rendered, but the server uses it to correct the field. Returns false if
+   * the state does not contain a field.
+   */
+  truth(hand: DeviceState, force: Vec3): boolean;
   stop(): void;
   /** Resolves at the end. Rejects with the exception of a callback, or if the host is unknown. */
   readonly ended: Promise<void>;
@@ -90,6 +112,7 @@ class RealTimeGuest implements Guest {
   readonly #onPhase: ((guest: Guest) => void) | undefined;
   readonly #onReport: ((report: LinkReport) => void) | undefined;
   readonly #onUnusable: ((why: string) => void) | undefined;
+  readonly #fields: boolean;
   #unusable = "";
   #leftOut = "";
   #told: LinkReport | undefined;
@@ -114,6 +137,7 @@ class RealTimeGuest implements Guest {
     this.#onPhase = config.onPhase;
     this.#onReport = config.onReport;
     this.#onUnusable = config.onUnusable;
+    this.#fields = config.fields === true;
     this.#defer = makeDefer();
     this.#client = new ForceClient(config, callback, (datagram) => this.#transport.send(datagram), readClock());
     this.#transport = open((datagram) => this.#receive(datagram), (error) => this.#fail(error));
@@ -173,6 +197,20 @@ class RealTimeGuest implements Guest {
   }
   giveLease(): boolean {
     return this.#ask(() => this.#client.giveLease());
+  }
+  use(field: Field | undefined): void {
+    expect(this.#fields, "fields", false, "true in the config");
+    this.#client.fields.use(field?.describe());
+    this.#wake();
+  }
+  get fieldRefused(): string {
+    return this.#client.fields.refused;
+  }
+  pose(motion: Motion, aheadMs = 0): boolean {
+    return this.#ask(() => this.#client.fields.move(readClock(), motion, fromMilliseconds(aheadMs)));
+  }
+  truth(hand: DeviceState, force: Vec3): boolean {
+    return this.#ask(() => this.#client.truth(hand, force));
   }
   stop(): void {
     this.#client.stop(readClock());

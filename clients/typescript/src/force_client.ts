@@ -7,13 +7,14 @@ import { expect } from "./expect.js";
 import { ClientHandshake } from "./handshake.js";
 import { kMaxValidForMs } from "./limits.js";
 import {
-  Code, kFeatureChannels, kFeatureDiagnostics, kFeatureHandle, kFeatureJoints, kFeatureLocalModel, kFeatureOutputs, kFeatureWays,
-  kProtocolVersion, Role,
-  type DeviceDescription, type DeviceReport, type DeviceState, type Grant, type HandleDescription, type Hello, type LampColour,
+  Code, kFeatureChannels, kFeatureDiagnostics, kFeatureFields, kFeatureHandle, kFeatureJoints, kFeatureLocalModel, kFeatureOutputs,
+  kFeatureWays, kProtocolVersion, Role,
+  type DeviceDescription, type DeviceReport, type DeviceState, type ForceCommand, type Grant, type HandleDescription, type Hello, type LampColour,
   type LinkReport, type PeerReport, type Request, type Vec3, type Vibration, type Welcome,
 } from "./messages.js";
 import { Session, type LinkStats } from "./session.js";
 import { earliest, fromMilliseconds, kNever, latest, type Nanoseconds } from "./time.js";
+import { FieldUser } from "./upload.js";
 
 /** The physics engine. During a computation, newer states replace older ones. Null: no force is sent. */
 export type Physics = (hand: DeviceState) => Vec3 | Touch | null;
@@ -46,6 +47,8 @@ const kFirstPlace: Omit<Grant, "role"> = { device: 0, channel: 0 };
  *   wait is doubled with each attempt up to retryMaxMs. It is reset by the first state of a new session.
  */
 export class ForceClient {
+  /** The field of this client. Requires `fields` in the config. */
+  readonly fields = new FieldUser();
   readonly #config: Required<ClientConfig>;
   readonly #role: Role;
   readonly #physics: Physics | undefined;
@@ -217,6 +220,23 @@ export class ForceClient {
     if (this.#session?.request({ kind: "giveLease", device, channel }) === undefined) return false;
     this.#askedLease = undefined; // a later answer would be outdated
     this.#holds = false;
+    this.fields.lostLease();
+    return true;
+  }
+
+  /**
+   * Sends the true force for a state, which the server uses to correct the field. Returns false if the state does not
+   * contain a field, if the force is unusable, or if this client does not hold the channel.
+   */
+  truth(hand: DeviceState, force: Vec3): boolean {
+    if (!this.#session || !this.#holds || !hand.field) return false;
+    const objects = objection({ force });
+    if (objects) {
+      ++this.#stats.forcesUnusable;
+      this.#stats.unusable = objects;
+      return false;
+    }
+    this.#session.sendForce({ ...this.#command(hand), force, field: hand.field.generation });
     return true;
   }
 
@@ -269,7 +289,7 @@ export class ForceClient {
   }
 
   #greet(now: Nanoseconds): void {
-    const { name, device, channel, diagnostics, joints, outputs, ways } = this.#config;
+    const { name, device, channel, diagnostics, fields, joints, outputs, ways } = this.#config;
     const hello: Hello = {
       versionMin: kProtocolVersion,
       versionMax: kProtocolVersion,
@@ -279,6 +299,7 @@ export class ForceClient {
         kFeatureLocalModel, kFeatureChannels, kFeatureHandle, ...(joints ? [kFeatureJoints] : []),
         ...(outputs ? [kFeatureOutputs] : []),
         ...(diagnostics ? [kFeatureDiagnostics] : []),
+        ...(fields ? [kFeatureFields] : []),
         ...(ways.length > 0 ? [kFeatureWays] : []),
       ],
       ways,
@@ -319,6 +340,8 @@ export class ForceClient {
     if (this.#claims) this.#session.request({ kind: "describe", device });
     if (welcome.features.includes(kFeatureHandle)) this.#session.request({ kind: "describe", device, handle: true });
     if (this.#config.stateHz > 0) this.#session.request({ kind: "setStateRate", hz: this.#config.stateHz, device });
+    if (welcome.features.includes(kFeatureFields)) this.fields.opened(this.#session, this.#place);
+    else if (this.#config.fields) this.fields.closed("the server does not support fields");
     const { deadband, stateDeadband } = this.#config;
     this.#deadbandRequest = stateDeadband && this.#session.request({ kind: "setStateDeadband", ...stateDeadband });
     this.#predicts = false;
@@ -335,6 +358,7 @@ export class ForceClient {
     Object.assign(this.#stats, { phase, code, reason, link: this.#session?.stats ?? this.#stats.link });
     this.#handshake = undefined;
     this.#session = undefined;
+    this.fields.closed();
     this.#holds = false;
     this.#unseen = this.#newest = undefined;
     this.#pressed = 0;
@@ -349,6 +373,7 @@ export class ForceClient {
       if (this.#session && this.#askedLease === undefined && now >= this.#askLease && !this.takeLease()) {
         this.#askLease = now + kAskLeaseAgain;
       }
+      this.fields.tick(now, this.#holds);
     } else if (this.#handshake) {
       if (now >= this.#giveUp) this.#end(now, "unanswered", Code.TIMED_OUT, "no answer");
       else this.#handshake.tick(now);
@@ -374,6 +399,8 @@ export class ForceClient {
         this.#deviceReport = event.value;
       } else if (event.kind === "peerReport") {
         this.#peerReports = new Map(this.#peerReports).set(event.value.channel, event.value);
+      } else if (event.kind === "fieldStatus") {
+        this.fields.takeStatus(now, event.status);
       } else if (event.kind === "answered") {
         this.#takeAnswer(now, event);
       } else if (event.kind === "request") {
@@ -386,7 +413,9 @@ export class ForceClient {
     }
   }
 
-  #takeAnswer(now: Nanoseconds, { id, code, device, handle, waitMs = 0 }: ControlAck): void {
+  #takeAnswer(now: Nanoseconds, answer: ControlAck): void {
+    const { id, code, device, handle, waitMs = 0 } = answer;
+    this.fields.takeAnswer(now, answer);
     if (device) this.#description = device;
     if (handle) this.#handle = handle;
     if (id === this.#deadbandRequest) this.#predicts = code === Code.OK && this.#period > 0n && this.#silence() > 0n;
@@ -409,6 +438,7 @@ export class ForceClient {
     this.#session?.answer({ id, code: Code.OK, detail: "" });
     if (request.device !== this.#place.device || request.channel !== this.#place.channel) return;
     this.#holds = false;
+    this.fields.lostLease();
     this.#stats.leaseLostTo = request.to;
     // A pending request may be older than this message, so send a new one.
     if (this.#askedLease !== undefined && this.takeLease()) return;
@@ -416,7 +446,9 @@ export class ForceClient {
   }
 
   #flush(now: Nanoseconds): void {
-    for (let datagram; (datagram = (this.#session ?? this.#handshake)?.nextDatagram(now)); ) this.#send(datagram);
+    do {
+      for (let datagram; (datagram = (this.#session ?? this.#handshake)?.nextDatagram(now)); ) this.#send(datagram);
+    } while (this.fields.hasBrick(now));
   }
 
   /** Returns whether a force is waiting to be sent. */
@@ -477,19 +509,15 @@ export class ForceClient {
       ++this.#stats.forcesAlike;
       return;
     }
-    this.#session.sendForce({
-      validForUs: Math.ceil(1000 * this.#validForMs(hand.tick, this.#welcome.loopHz)),
-      sequence: ++this.#sequence,
-      basedOnTick: hand.tick,
-      ...answer,
-      device: this.#place.device,
-      channel: this.#place.channel,
-      topologyChanged,
-      error,
-      way: this.#way(touch),
-    });
-    this.#answeredTick = hand.tick;
+    this.#session.sendForce({ ...this.#command(hand), ...answer, topologyChanged, error, way: this.#way(touch) });
+  }
+
+  /** Returns the members of the next force command, except for the force. */
+  #command({ tick }: DeviceState): Omit<ForceCommand, "force"> {
+    const validForUs = Math.ceil(1000 * this.#validForMs(tick, this.#welcome!.loopHz));
+    this.#answeredTick = tick;
     ++this.#stats.forces;
+    return { validForUs, sequence: ++this.#sequence, basedOnTick: tick, ...this.#place };
   }
 
   #way({ way = 0 }: Touch): number | undefined {
@@ -522,7 +550,7 @@ export class ForceClient {
     if (this.#session) {
       const call = this.#physics && !this.#holds ? kNever : this.#nextDue();
       const ask = this.#askedLease === undefined ? this.#askLease : kNever;
-      return earliest(this.#session.nextTick(), earliest(call, ask));
+      return earliest(earliest(this.#session.nextTick(), this.fields.due()), earliest(call, ask));
     }
     if (this.#handshake) return earliest(this.#giveUp, this.#handshake.nextTick());
     return this.phase === "stopped" ? kNever : this.#retry;

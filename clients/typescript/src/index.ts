@@ -4,6 +4,7 @@ export { connect, type ConnectConfig, type Guest, type OpenTransport, type Trans
 export type { ClientConfig, ClientStats, Phase } from "./config.js";
 export { ForceClient, type Physics, type Watch } from "./force_client.js";
 export type { Touch } from "./answer.js";
+export { Field, type FieldDescription, type MaterialOptions } from "./field.js";
 export { Follower, type FollowerConfig, type Following, type Pose, type ToolContact } from "./follower.js";
 export type { ForceDeadband } from "./deadband.js";
 export { parseKeyFile, type ClientKey } from "./key_file.js";
@@ -14,5 +15,7 @@ export {
   type Turning, type Vec3, type Vibration, type Welcome,
 } from "./messages.js";
 export type { LinkStats } from "./session.js";
+export { distanceTo, rotated, type Primitive } from "./shape.js";
 export type { Nanoseconds } from "./time.js";
+export type { Motion } from "./upload.js";
 export { webSocket } from "./websocket.js";

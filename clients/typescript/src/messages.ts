@@ -27,6 +27,9 @@ export const kFeatureTeleoperation = "teleoperation";
 /** Feature: an engine names its methods, and each force contains the method that computed it. */
 export const kFeatureWays = "ways";
 
+/** Feature: the client can upload fields (OfferField), which the server renders at its own rate (UseField). */
+export const kFeatureFields = "fields";
+
 /** Feature: an observer receives the forces before limiting, and reports on the loop and the engines. */
 export const kFeatureDiagnostics = "diagnostics";
 

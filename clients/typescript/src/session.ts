@@ -5,7 +5,8 @@ import {
 import { CipherSuite, DatagramType, decodeHeader, kHeaderSize, concat } from "./datagram.js";
 import { kByes, kMaxDatagram, kMaxForged, kMaxPacketNumber } from "./limits.js";
 import {
-  Code, type DeviceReport, type DeviceState, type ForceCommand, type LinkReport, type PeerReport, type PortState, type Request,
+  Code, type DeviceReport, type DeviceState, type FieldBrick, type FieldPose, type FieldStatus, type ForceCommand, type LinkReport,
+  type PeerReport, type PortState, type Request,
 } from "./messages.js";
 import { ReplayWindow } from "./replay_window.js";
 import { IncomingRequests, OutgoingRequests } from "./requests.js";
@@ -75,6 +76,7 @@ export type SessionEvent =
   | { readonly kind: "report"; readonly report: LinkReport }
   | Diagnosis
   | { readonly kind: "port"; readonly port: PortState }
+  | { readonly kind: "fieldStatus"; readonly status: FieldStatus }
   | { readonly kind: "request"; readonly id: number; readonly request: Request }
   | ({ readonly kind: "answered" } & ControlAck)
   /**
@@ -125,6 +127,9 @@ export class Session {
   readonly #diagnosesToSend = new Map<string, Diagnosis>();
   /** The key is the device, the channel and the end, as for received port states. */
   readonly #portsToSend = new Map<string, PortState>();
+  /** By device and channel. */
+  readonly #posesToSend = new Map<string, FieldPose>();
+  #brickToSend: FieldBrick | undefined;
   readonly #asked = new OutgoingRequests();
   #bye: Frame | undefined;
   #byesLeft = 0;
@@ -149,6 +154,8 @@ export class Session {
   #reportArrived: LinkReport | undefined;
   readonly #diagnosesArrived = new Map<string, Diagnosis>();
   readonly #portsArrived = new Map<string, PortState>();
+  /** The newest of each field. */
+  readonly #statusesArrived = new Map<string, FieldStatus>();
   #closed: SessionEvent | undefined;
 
   /** `opened` is the time of the end of the handshake. The first datagram is due immediately. */
@@ -217,6 +224,19 @@ export class Session {
   sendPort(port: PortState): void {
     this.#portsToSend.set(endOf(port), port);
   }
+  sendPose(pose: FieldPose): void {
+    this.#posesToSend.set(`${pose.device}/${pose.channel}`, pose);
+  }
+  sendBrick(brick: FieldBrick): void {
+    this.#brickToSend = brick;
+  }
+  /**
+   * Returns the time of the peer's clock at `now`. Returns undefined if no datagram has been received. If the delays of
+   * the two directions are different, the error is half of the difference.
+   */
+  peerTime(now: Nanoseconds): Nanoseconds | undefined {
+    return this.#echo && this.#echo.sent + (now - this.#echo.received) + this.#roundTrip.smoothed / 2n;
+  }
   /** Queues a reliable request and returns its id, or undefined if 16 are pending. */
   request(request: Request): number | undefined {
     return this.#asked.add(request);
@@ -283,6 +303,8 @@ export class Session {
     const state = this.#stateArrived;
     this.#stateArrived = undefined;
     if (state) return { kind: "state", state };
+    const status = takeFirst(this.#statusesArrived);
+    if (status) return { kind: "fieldStatus", status };
     const closed = this.#closed;
     this.#closed = undefined;
     return closed;
@@ -302,7 +324,8 @@ export class Session {
     ++this.stats.received;
     this.stats.invalid += content.invalid;
     this.#lastHeard = now;
-    if (number > this.#seen.highest) {
+    const newest = number > this.#seen.highest;
+    if (newest) {
       this.#echo = { sent: content.sent, received: now, packetNumber: number };
     } else {
       ++this.stats.reordered;
@@ -310,7 +333,7 @@ export class Session {
     this.#seen.insert(number);
     this.stats.lost = Number(this.#seen.missing);
     if (content.echo) this.#observe(now, content.sent, content.echo);
-    for (const frame of content.frames) this.#take(frame);
+    for (const frame of content.frames) this.#take(frame, newest);
   }
 
   #observe(now: Nanoseconds, sent: Nanoseconds, told: Echo): void {
@@ -338,7 +361,7 @@ export class Session {
     this.#newestEchoed = told.packetNumber;
   }
 
-  #take(frame: Frame): void {
+  #take(frame: Frame, newest: boolean): void {
     switch (frame.kind) {
       case "state":
         if (frame.value.tick > (this.#newestTick.get(frame.value.device) ?? -1n)) {
@@ -388,6 +411,10 @@ export class Session {
         }
         return;
       }
+      case "fieldStatus":
+        if (newest) this.#statusesArrived.set(frame.value.field.join(), frame.value);
+        else ++this.stats.stale;
+        return;
       case "control":
         this.stats.invalid += this.#answering.take(frame.value) ? 0 : 1;
         return;
@@ -405,7 +432,7 @@ export class Session {
     const silentTooLong = this.#lastSent === undefined || now - this.#lastSent >= this.#config.keepAlive;
     return silentTooLong || this.#stateToSend !== undefined || this.#forceToSend !== undefined ||
       this.#reportToSend !== undefined || this.#diagnosesToSend.size > 0 || this.#portsToSend.size > 0 ||
-      this.#answering.nextDue() !== undefined || this.#asked.nextDue(now) !== undefined;
+      this.#posesToSend.size > 0 || this.#brickToSend !== undefined || this.#answering.nextDue() !== undefined || this.#asked.nextDue(now) !== undefined;
   }
 
   /**
@@ -431,6 +458,10 @@ export class Session {
         this.#portsToSend.delete(place);
       }
       if (this.#forceToSend && add({ kind: "force", value: this.#forceToSend })) this.#forceToSend = undefined;
+      for (const [place, pose] of this.#posesToSend) {
+        if (!add({ kind: "fieldPose", value: pose })) break;
+        this.#posesToSend.delete(place);
+      }
       for (let ack; (ack = this.#answering.nextDue()) && add({ kind: "controlAck", value: ack }); ) {
         this.#answering.sent(ack.id);
       }
@@ -443,6 +474,7 @@ export class Session {
         if (!add(diagnosis)) break;
         this.#diagnosesToSend.delete(stream);
       }
+      if (this.#brickToSend && add({ kind: "fieldBrick", value: this.#brickToSend })) this.#brickToSend = undefined;
     }
     const datagram = seal.close(now, connectionId, this.#nextPacket, body);
     ++this.#nextPacket;

@@ -12,7 +12,9 @@ import { Bridge } from "../../../clients/typescript/src/bridge.js";
 import { concat, decodeHello, encodeAnswer } from "../../../clients/typescript/src/datagram.js";
 import { encodeAnswerMessage, encodeFrame, encodeHead } from "../../../clients/typescript/src/codec.js";
 import { Role } from "../../../clients/typescript/src/messages.js";
-import { connect, readClientKey, udp, webSocket, type DeviceState, type Guest } from "../../../clients/typescript/src/node.js";
+import {
+  connect, distanceTo, Field, readClientKey, udp, webSocket, type DeviceState, type Guest, type Primitive,
+} from "../../../clients/typescript/src/node.js";
 import { PlainSeal } from "../../../clients/typescript/src/seal.js";
 import { findTendond, kDemoScene, scene, startNode, startTendond, until } from "./support/program.js";
 import { kRoot } from "./support/paths.js";
@@ -65,6 +67,38 @@ describe("a TypeScript wall", () => {
     assert.equal(await bridge.end("SIGINT"), 0);
     const { to_server, to_page, malformed } = JSON.parse(bridge.lines.at(-1)!);
     assert.ok(to_server > 0 && to_page > 0 && malformed === 0);
+  });
+});
+
+describe("a field", () => {
+  it("that was uploaded is felt, and truths are sent while it is rendered", async (test) => {
+    const channel = '\n[[channel]]\nname = "peg"\n[field]\nallow = ["peg"]\nmax_stiffness_n_per_m = 1500\n';
+    const folder = mkdtempSync(join(tmpdir(), "tendon-field-"));
+    test.after(() => rmSync(folder, { recursive: true }));
+    writeFileSync(join(folder, "peg.toml"), readFileSync(kDemoScene, "utf8") + channel);
+    const tendond = await startTendond(test, { scenes: [join(folder, "peg.toml")] });
+    if (!tendond) return;
+    const ball: Primitive = { kind: "sphere", centre: { x: 0.015, y: 0, z: 0 }, radius: 0.015 };
+    const corner = (x: number) => ({ x, y: x, z: x });
+    const field = Field.fromFunction((x) => distanceTo(ball, x), corner(-0.02), corner(0.036), 2);
+    field.material("steel", { stiffness: 1000, friction: 0.3 });
+    let [felt, truths, depth] = [0, 0, 0];
+    const hand: Guest = guest(test, connect(udp(tendond.address), { channel: "peg", fields: true, rateHz: 100 }, {
+      physics: (state) => {
+        hand.pose({ position: { x: 0, y: 0, z: 0 }, turn: { w: 1, x: 0, y: 0, z: 0 } });
+        if (hand.truth(state, { x: -1000 * Math.max(state.position.x, 0), y: 0, z: 0 })) ++truths;
+        felt = Math.min(felt, state.forceApplied.x);
+        depth = Math.max(depth, state.field?.depth ?? 0);
+        return null;
+      },
+    }));
+    hand.use(field);
+    await until("the ball is felt", () => felt < -0.5 && truths > 100);
+    assert.equal(hand.fieldRefused, "");
+    assert.ok(depth > 0.5e-3, `${depth}`);
+    field.material("steel", { stiffness: 1600 });
+    hand.use(field);
+    await until("a refusal", () => hand.fieldRefused.includes("stiffness = 1600: expected"));
   });
 });
 
