@@ -24,6 +24,7 @@
 #include "tests/tools/lab/experiments/candidate.h"
 #include "tests/tools/lab/experiments/compare.h"
 #include "tests/tools/lab/experiments/cost.h"
+#include "tests/tools/lab/experiments/field.h"
 #include "tests/tools/lab/experiments/netem.h"
 #include "tests/tools/lab/experiments/paper.h"
 #include "tests/tools/lab/experiments/teleop.h"
@@ -163,6 +164,13 @@ INSTANTIATE_TEST_SUITE_P(
                [](const auto& folder) { compare({.every = 331, .out = folder, .command = kCommand}, nowhere); }},
         Figure{"paper", [](const auto& folder) { paper({.out = folder, .command = kCommand}, nowhere); }},
         Figure{"teleop", [](const auto& folder) { teleop({.hands = 1, .out = folder, .command = kCommand}, nowhere); }},
+        Figure{"field",
+               [](const auto& folder) {
+                 FieldOptions options{.hands = 1, .round_trips_ms = {0, 600}, .out = folder, .command = kCommand};
+                 field_experiment(options, nowhere);
+                 options.far = true;
+                 field_experiment(options, nowhere);
+               }},
         Figure{"accuracy",
                [](const auto& folder) {
                  AccuracyOptions options;

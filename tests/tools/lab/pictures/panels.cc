@@ -12,15 +12,17 @@
 namespace tendon::lab {
 namespace {
 
-constexpr int kWidth = 1600;
+constexpr int kPanelColumn = 800;  ///< pixels per column of panels
 constexpr int kRow = 470;          ///< pixels per row of panels
 constexpr int kAbovePanels = 110;  ///< pixels above the first row
 constexpr std::size_t kMostPoints = 1200;
-constexpr double kPanel = 0.435;       ///< width of a panel, share of the picture
+constexpr double kBeforeHeading = 64;  ///< pixels before the heading
+constexpr double kBeforePanel = 72;    ///< pixels of a column before the panel
+constexpr double kPanel = 696;         ///< width of a panel, pixels
 constexpr double kLetter = 9.25;       ///< width that gnuplot reserves for a letter of the legend, pixels
 constexpr int kSample = 7;             ///< width of the line next to a name, letters
 constexpr int kKeyRow = 18;            ///< pixels for each row of the legend after the second
-constexpr std::size_t kLetters = 170;  ///< per line below the panels
+constexpr std::size_t kLetters = 85;   ///< per column and line below the panels
 constexpr int kLine = 24;              ///< pixels
 
 const char* words(Curve::Style style) {
@@ -54,7 +56,7 @@ int room_for_keys(const std::vector<Panel>& panels) {
       ++names;
       longest = std::max(longest, std::ranges::count_if(curve.name, [](char c) { return (c & 0xC0) != 0x80; }));
     }
-    const auto columns = static_cast<int>(kPanel * kWidth / (kLetter * static_cast<double>(longest + kSample)));
+    const auto columns = static_cast<int>(kPanel / (kLetter * static_cast<double>(longest + kSample)));
     rows = std::max(rows, (names - 1) / std::max(columns, 1) + 1);
   }
   return kKeyRow * (rows - 2);
@@ -104,15 +106,15 @@ std::vector<std::size_t> labels_at(const Panel& panel, const Curve& curve, bool 
   return found;
 }
 
-/// Breaks paragraphs at spaces, and words that are longer than a line after kLetters.
-std::vector<std::string> lines_of(const std::vector<std::string>& paragraphs) {
+/// Breaks paragraphs at spaces, and words that are longer than a line after `letters`.
+std::vector<std::string> lines_of(const std::vector<std::string>& paragraphs, std::size_t letters) {
   std::vector<std::string> lines;
   for (std::string rest : paragraphs) {
-    while (rest.size() > kLetters) {
-      const std::size_t space = rest.rfind(' ', kLetters);
+    while (rest.size() > letters) {
+      const std::size_t space = rest.rfind(' ', letters);
       const bool found = space != std::string::npos && space > 0;
-      lines.push_back(rest.substr(0, found ? space : kLetters));
-      rest = rest.substr(found ? space + 1 : kLetters);
+      lines.push_back(rest.substr(0, found ? space : letters));
+      rest = rest.substr(found ? space + 1 : letters);
     }
     lines.push_back(rest);
   }
@@ -137,15 +139,17 @@ std::vector<std::pair<double, double>> thinned(const std::vector<std::pair<doubl
 }
 
 std::string panels_script(const std::filesystem::path& path, const std::string& heading, const std::string& figures,
-                          const std::vector<Panel>& panels, const std::vector<std::string>& below) {
+                          const std::vector<Panel>& panels, const std::vector<std::string>& below, int columns) {
   check_picture_name(path);
-  const std::size_t rows = (panels.size() + 1) / 2;
+  const auto in_row = static_cast<std::size_t>(columns);
+  const std::size_t rows = (panels.size() + in_row - 1) / in_row;
+  const int width = kPanelColumn * columns;
   const int keys = room_for_keys(panels);
   const int end_of_panels = kAbovePanels + (kRow + keys) * static_cast<int>(rows);
-  const std::vector<std::string> lines = lines_of(below);
+  const std::vector<std::string> lines = lines_of(below, kLetters * in_row);
   const int height = end_of_panels + kLine * static_cast<int>(lines.size());
   std::ostringstream out;
-  out << begin_picture(path, kWidth, height) << "set border 3 lc rgb '" << kPale << "'\n"
+  out << begin_picture(path, width, height) << "set border 3 lc rgb '" << kPale << "'\n"
       << "set tics nomirror out scale 0.6 textcolor rgb '" << kPale << "'\n"
       << "set grid ytics lc rgb '#e4e4e4' lt 1 lw 1\n";
   for (std::size_t p = 0; p < panels.size(); ++p) {
@@ -169,18 +173,19 @@ std::string panels_script(const std::filesystem::path& path, const std::string& 
   }
   const auto up = [height](double pixels_from_top) { return 1 - pixels_from_top / height; };
   out << "set multiplot\n";
-  out << "set label " << literal(heading) << " at screen 0.04," << up(34) << " noenhanced font ':Bold,20' tc rgb '"
-      << kInk << "'\n";
-  out << "set label " << literal(figures) << " at screen 0.04," << up(70) << " noenhanced tc rgb '" << kPale << "'\n";
+  out << "set label " << literal(heading) << " at screen " << kBeforeHeading / width << "," << up(34)
+      << " noenhanced font ':Bold,20' tc rgb '" << kInk << "'\n";
+  out << "set label " << literal(figures) << " at screen " << kBeforeHeading / width << "," << up(70)
+      << " noenhanced tc rgb '" << kPale << "'\n";
   for (std::size_t i = 0; i < lines.size(); ++i) {
-    out << "set label " << literal(lines[i]) << " at screen 0.04," << up(end_of_panels + kLine * static_cast<double>(i))
-        << " noenhanced tc rgb '" << kPale << "'\n";
+    out << "set label " << literal(lines[i]) << " at screen " << kBeforeHeading / width << ","
+        << up(end_of_panels + kLine * static_cast<double>(i)) << " noenhanced tc rgb '" << kPale << "'\n";
   }
   for (std::size_t p = 0; p < panels.size(); ++p) {
     const Panel& panel = panels[p];
-    const double left = p % 2 == 0 ? 0.045 : 0.545;
-    const double right = left + kPanel;
-    const std::size_t row = p / 2;
+    const double left = (kPanelColumn * static_cast<double>(p % in_row) + kBeforePanel) / width;
+    const double right = left + kPanel / width;
+    const std::size_t row = p / in_row;
     const double top = kAbovePanels + static_cast<double>(row) * (kRow + keys) + keys + 74;
     out << "set lmargin at screen " << left << "\nset rmargin at screen " << right << "\nset tmargin at screen "
         << up(top) << "\nset bmargin at screen " << up(top + kRow - 144) << "\n";
@@ -216,14 +221,15 @@ std::string panels_script(const std::filesystem::path& path, const std::string& 
 
 std::vector<std::filesystem::path> draw_panels(const std::filesystem::path& stem, const std::string& heading,
                                                const std::string& figures, const std::vector<Panel>& panels,
-                                               const std::string& command, const std::vector<std::string>& below) {
+                                               const std::string& command, const std::vector<std::string>& below,
+                                               int columns) {
   std::vector<std::string> paragraphs = below;
   paragraphs.insert(paragraphs.begin(), command);
   std::vector<std::filesystem::path> files;
   for (const char* const extension : {".svg", ".png"}) {
     std::filesystem::path file = stem;
     file += extension;
-    run_gnuplot(panels_script(file, heading, figures, panels, paragraphs), file);
+    run_gnuplot(panels_script(file, heading, figures, panels, paragraphs, columns), file);
     add_metadata(file, "Description", command + "; " + figures);
     files.push_back(file);
   }

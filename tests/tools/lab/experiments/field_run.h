@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/base/motion.h"
+#include "core/field/energy_gate.h"
+#include "tests/tools/lab/experiments/field_scenes.h"
+
+namespace tendon::lab {
+
+/// What a remote engine sends at 60 Hz.
+enum class FieldMethod : std::uint8_t {
+  kHeld,     ///< a force; limiter `aol`
+  kPlane,    ///< a force with its plane, tangential stiffness and a table over depth; limiter `feel`
+  kField,    ///< nothing, after the field of 1 mm; limiter `feel`
+  kLearned,  ///< true forces, from which the field learns; limiter `feel`
+};
+std::string_view to_string(FieldMethod method);
+
+struct FieldCase {
+  const FieldScene* scene = nullptr;
+  FieldMethod method = FieldMethod::kField;
+  std::string network = "delay=0ms";  ///< of the injector, both ways
+  double loss = 0.05;                 ///< of the answers, in addition
+  std::uint64_t seed = 1;             ///< of the hand and the network
+  int milliseconds = 6000;
+  double count = 0;                  ///< m, of the encoders; 0: exact
+  field::EnergyGate::Config push{};  ///< the tank
+  bool ahead = true;                 ///< poses are sent for the time of their arrival, and not as they are
+};
+
+struct FieldRun {
+  double error = 0;           ///< rms error of the force relative to the rms of the true force, from 0.5 s on
+  double late_error = 0;      ///< the same, from 3 s on
+  double jump = 0;            ///< N in 1 ms, the largest from 0.5 s on
+  double true_jump = 0;       ///< N in 1 ms
+  double least_energy = 0;    ///< J, minimum of the true account with the energy of the tank
+  double bound = 0;           ///< share of the steps in which the gate refuses energy
+  double tank = 0;            ///< J, given by the tank
+  std::vector<Vec3> force{};  ///< N, at each ms
+};
+
+/// A device of 150 g (b 0.26 N·s/m, f_c 0.02 N) in a hand, and an engine at 60 Hz with the exact shape. `truth`:
+/// true_forces of this scene and hand. Throws std::invalid_argument if the network is unknown.
+FieldRun run_field(const FieldCase& of, const std::vector<Vec3>& truth);
+
+}  // namespace tendon::lab
