@@ -183,7 +183,7 @@ Renderer::Rendered Renderer::render(const Motion& hand, double account, std::uin
     blends_to_ = proxy_.material;
     result.proxy = x;
     result.swapping = true;
-    residual_.note({.tick = tick, .hand = x});
+    residual_.note({.tick = tick, .at = hand.at, .hand = x});
     return result;
   }
   const double before = law_.energy((place_ - x).norm(), dent_);
@@ -198,6 +198,7 @@ Renderer::Rendered Renderer::render(const Motion& hand, double account, std::uin
 
   const bool pressed = result.depth > 0;
   residual_.note({.tick = tick,
+                  .at = hand.at,
                   .hand = x,
                   .depth = result.depth,
                   .direction = pressed ? Vec3((place_ - x) / result.depth) : Vec3(Vec3::Zero()),

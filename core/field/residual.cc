@@ -34,13 +34,13 @@ bool Residual::learn(std::uint64_t tick, const Vec3& truth, LocalTime now, doubl
   }
   rest_ = truth - known * given.direction;
   place_ = given.hand;
-  learned_at_ = now;
+  rest_at_ = given.at;
   ease_ = given_ - faded(place_, now);
   return true;
 }
 
 Vec3 Residual::faded(const Vec3& x, LocalTime now) const noexcept {
-  const double age = std::max(seconds(now - learned_at_), 0.0);
+  const double age = std::max(seconds(now - rest_at_), 0.0);
   const double way = (x - place_).squaredNorm();
   return rest_ * portable::exp(-age / kAge - way / (2 * kReach * kReach));
 }

@@ -20,7 +20,8 @@ namespace tendon::field {
 ///     r = F_k − (f + c(d)) n           N, the rest, with the new table
 /// The table does not depend on time, so it is the same for every delay. The rest is held:
 ///     F = min(1, d/0.3 mm) (r e^(−age/0.1 s − ‖x − x_k‖²/2(3 mm)²) + r₀)
-/// with r₀ chosen such that F does not jump at a truth; it fades with 12 ms. The table belongs to the material, so the
+/// with the age since step k, so that a rest of long ago is not felt, and r₀ chosen such that F does not jump at a truth;
+/// it fades with 12 ms. The table belongs to the material, so the
 /// energy gate and `most_stiffness` cover it. The held rest is only bounded by the limiter.
 /// Realtime-safe: yes.
 class Residual {
@@ -36,6 +37,7 @@ class Residual {
   /// The force of the field in one step.
   struct Given {
     std::uint64_t tick = 0;
+    LocalTime at{};
     Vec3 hand = Vec3::Zero();
     double depth = 0;               ///< d, m; 0 without contact
     Vec3 direction = Vec3::Zero();  ///< n, or zero without contact
@@ -64,9 +66,9 @@ class Residual {
   std::optional<std::uint64_t> learned_;  ///< tick of the last truth
   Vec3 rest_ = Vec3::Zero();              ///< r
   Vec3 place_ = Vec3::Zero();             ///< x_k
-  LocalTime learned_at_{};
-  Vec3 ease_ = Vec3::Zero();   ///< r₀
-  Vec3 given_ = Vec3::Zero();  ///< N, before it is scaled with the depth
+  LocalTime rest_at_{};                   ///< time of step k
+  Vec3 ease_ = Vec3::Zero();              ///< r₀
+  Vec3 given_ = Vec3::Zero();             ///< N, before it is scaled with the depth
 };
 
 }  // namespace tendon::field

@@ -112,11 +112,20 @@ TEST(FieldResidual, TheHeldRestFadesAndIsZeroOutOfContact) {
   EXPECT_EQ(held(0, Vec3::Zero(), 0), 0);
 }
 
+TEST(FieldResidual, TheRestOfATruthThatIsLateHasFaded) {
+  Residual residual;
+  residual.note({.tick = 1, .at = at_ms(10), .depth = 0.002, .direction = Vec3::UnitZ()});
+  ASSERT_TRUE(residual.learn(1, {1, 0, 0}, at_ms(310), 1500, {}));
+  Vec3 held;
+  for (int ms = 310; ms <= 410; ++ms) held = residual.held({.at = at_ms(ms)}, 0.002, 1e-3);
+  EXPECT_NEAR(held.x(), std::exp(-4), 1e-3);
+}
+
 TEST(FieldResidual, ATruthDoesNotMakeTheHeldForceJump) {
   Residual residual;
   Vec3 before = Vec3::Zero();
   for (std::uint64_t k = 1; k < 300; ++k) {
-    residual.note({.tick = k, .depth = 0.002, .direction = Vec3::UnitZ()});
+    residual.note({.tick = k, .at = at_ms(static_cast<int>(k)), .depth = 0.002, .direction = Vec3::UnitZ()});
     if (k % 30 == 0) {
       ASSERT_TRUE(residual.learn(k, {k % 60 == 0 ? 1.0 : -1.0, 0, 0}, at_ms(static_cast<int>(k)), 1500, {}));
     }
