@@ -10,6 +10,7 @@
 #include <ostream>
 #include <stdexcept>
 #include <string_view>
+#include <utility>
 
 #include "server/machine/regular_file.h"
 #include "tests/support/callgrind.h"
@@ -42,8 +43,10 @@ std::string built_with() {
 
 CostTable count_law_costs(const std::filesystem::path& program) {
   CostTable table{.built_with = built_with(), .rows = {}};
-  for (const testing::Counted& law : testing::count_instructions(program.string(), "", "step_law")) {
-    table.rows.push_back({law.line, law.instructions / static_cast<double>(LawSteps::kPeriod)});
+  for (const auto& [option, function] : {std::pair{"", "step_law"}, std::pair{"--field", "step_field"}}) {
+    for (const testing::Counted& row : testing::count_instructions(program.string(), option, function)) {
+      table.rows.push_back({row.line, row.instructions / static_cast<double>(LawSteps::kPeriod)});
+    }
   }
   return table;
 }

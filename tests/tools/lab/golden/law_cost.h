@@ -8,7 +8,7 @@
 
 namespace tendon::lab {
 
-/// Instructions per step of every law, counted by callgrind, as a committed table. They depend only on the compiler,
+/// Instructions per step of every law and of a field (field::Renderer), counted by callgrind, as a committed table. They depend only on the compiler,
 /// its flags and Eigen, which the table names.
 struct CostTable {
   struct Row {
@@ -24,8 +24,8 @@ inline constexpr double kCostTolerance = 0.02;
 /// Returns compiler, flags and Eigen version of this build: the first line of a table.
 std::string built_with();
 
-/// AOL+ with its default parts, on the motion of law_steps.h: instructions of two periods of the motion minus those of
-/// one, divided by the steps per period. `program` is law-cost. Throws std::runtime_error if it cannot be run under
+/// AOL+ with its default parts, on the motion of law_steps.h, and a proxy on bricks: instructions of two periods minus
+/// those of one, divided by the steps per period. `program` is law-cost. Throws std::runtime_error if it cannot be run under
 /// valgrind.
 CostTable count_law_costs(const std::filesystem::path& program);
 

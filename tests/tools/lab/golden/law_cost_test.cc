@@ -26,13 +26,14 @@ TEST_F(LawCost, AStepOfEveryLawCostsWhatTheCommittedTableSays) {
       << found << "If the change is meant: tendon-lab golden --cost --write, and commit the table with it.";
 }
 
-TEST(LawCostTable, HasEveryLawAndPresetInOrder) {
+TEST(LawCostTable, HasEveryLawAndPresetInOrderAndTheField) {
   const CostTable table = read_costs(kTable);
-  ASSERT_EQ(table.rows.size(), laws().size() + presets().size());
+  ASSERT_EQ(table.rows.size(), laws().size() + presets().size() + 1);
   for (std::size_t i = 0; i < laws().size(); ++i) EXPECT_EQ(table.rows[i].law, laws()[i].name);
   for (std::size_t i = 0; i < presets().size(); ++i) {
     EXPECT_EQ(table.rows[laws().size() + i].law, presets()[i].name);
   }
+  EXPECT_EQ(table.rows.back().law, "field");
 }
 
 TEST(LawCostTable, IsReadBackAsItWasWritten) {
