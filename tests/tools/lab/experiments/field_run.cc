@@ -2,185 +2,78 @@
 #include "tests/tools/lab/experiments/field_run.h"
 
 #include <algorithm>
-#include <cmath>
-#include <deque>
-#include <limits>
-#include <map>
-#include <memory>
 #include <optional>
+#include <stdexcept>
+#include <string>
 
-#include "core/base/rotation.h"
-#include "core/control/preset.h"
-#include "core/field/renderer.h"
-#include "core/haptic_controller.h"
-#include "tests/support/dice.h"
-#include "tests/tools/injector/injector.h"
+#include "clients/cpp/force_client.h"
+#include "devices/device.h"
 #include "tests/tools/injector/profile/named_profiles.h"
+#include "tests/tools/lab/experiments/field_engine.h"
+#include "tests/tools/worlds/world.h"
 
 namespace tendon::lab {
 namespace {
 
-using std::chrono::milliseconds;
+using simulation::World;
 
-constexpr double kEngine = 1 / 60.0;    // s, period
-constexpr double kFrom = 0.5;           // s: the errors before are those of the first contact
-constexpr double kLate = 3;             // s
-constexpr double kMaxForce = 8.5;       // N
-constexpr double kMaxStiffness = 2000;  // N/m
-constexpr double kSpacing = 1e-3;       // m, of the bricks
+constexpr double kSpacing = 1e-3;  // m, of the bricks
 
-LocalTime at_seconds(double t) { return LocalTime(from_seconds(t)); }
-
-const field::BrickField& bricks_of(const FieldScene& scene) {
-  static std::map<const FieldScene*, std::unique_ptr<field::BrickField>> all;
-  auto& bricks = all[&scene];
-  if (!bricks) {
-    bricks = std::make_unique<field::BrickField>();
-    field::sample([&](const Vec3& x) { return scene.exact.at(x).distance; }, scene.low, scene.high, kSpacing, *bricks);
-  }
-  return *bricks;
-}
-
-bool has_field(const FieldCase& of) { return of.method >= FieldMethod::kField; }
-
-/// What the engine sends. All values are those of the state `tick`.
-struct Answer {
-  std::uint64_t tick = 0;  ///< 1 is the first step
-  double sampled = 0;      ///< s
-  Vec3 at = Vec3::Zero();
-  Vec3 force = Vec3::Zero();
-  Contact contact{};
-  field::TimedPose pose{};
-};
-
-struct State {
-  std::uint64_t tick = 0;
-  double sampled = 0;  ///< s
-  Vec3 hand = Vec3::Zero();
-};
-
-class Engine {
- public:
-  explicit Engine(const FieldCase& of) : of_(of), contact_(*of.scene) {}
-
-  Answer answer(double now, const State& state) {
-    constexpr int kRounds = 60;
-    // The force that a field is compared with is the true one at the time of the state.
-    const double then = of_.method == FieldMethod::kLearned ? state.sampled : now;
-    Answer answer{.tick = state.tick,
-                  .sampled = state.sampled,
-                  .at = state.hand,
-                  .force = contact_.force(of_.scene->pose_at(then), state.hand, kEngine, kRounds)};
-    answer.contact = {.normal = contact_.normal(), .gap = contact_.gap()};
-    ForceTable table{.first = contact_.gap(), .step = 1e-3, .size = ForceTable::kMaxEntries};
-    for (std::size_t i = 0; i < table.size; ++i)
-      table.force[i] = contact_.force_at(static_cast<double>(i) * table.step);
-    answer.contact.table = table;
-    answer.pose = pose_for(of_.ahead ? now + (now - state.sampled) : now);
-    return answer;
-  }
-
- private:
-  field::TimedPose pose_for(double t) const {
-    constexpr double kHalf = 1e-3;
-    field::TimedPose pose{.at = at_seconds(t), .pose = of_.scene->pose_at(t)};
-    if (!of_.ahead) return pose;
-    const field::Pose before = of_.scene->pose_at(t - kHalf);
-    const field::Pose after = of_.scene->pose_at(t + kHalf);
-    pose.velocity = (after.position - before.position) / (2 * kHalf);
-    pose.angular_velocity = turn_between(before.turn, after.turn) / (2 * kHalf);
-    return pose;
-  }
-
-  const FieldCase& of_;
-  TrueContact contact_;
-};
-
-/// One direction of the network.
-template <class T>
-class Way {
- public:
-  Way(const std::string& network, std::uint64_t seed, injector::Direction direction)
-      : injector_(injector::resolve_profile(network, direction), seed, 0, direction, LocalTime{}) {}
-
-  void send(double now, const T& what) {
-    const injector::Decision fate = injector_.decide({.arrival = at_seconds(now), .size = 200});
-    if (fate.verdict != injector::Verdict::kDrop) sent_.emplace(fate.release, what);
-  }
-
-  std::optional<T> arrived(double now) {
-    if (sent_.empty() || sent_.begin()->first > at_seconds(now)) return std::nullopt;
-    const T what = sent_.begin()->second;
-    sent_.erase(sent_.begin());
-    return what;
-  }
-
- private:
-  injector::Injector injector_;
-  std::multimap<LocalTime, T> sent_{};
-};
-
-/// The haptic thread.
-class Device {
- public:
-  explicit Device(const FieldCase& of)
-      : of_(of),
-        field_{.bricks = &bricks_of(*of.scene), .materials = {of.scene->described}},
-        controller_(config_of(of)) {
-    if (!has_field(of)) return;
-    controller_.use({.field = &field_, .generation = kGeneration, .source = kSource}, LocalTime{});
-    if (of.scene->pose) controller_.observe(field::TimedPose{.pose = of.scene->pose(0)});
-  }
-
-  void observe(const Answer& answer, double now) {
-    if (has_field(of_) && of_.scene->pose) controller_.observe(answer.pose);
-    if (of_.method == FieldMethod::kField) return;
-    RemoteForce force{.sequence = ++sequence_,
-                      .answers_tick = answer.tick,
-                      .answers = at_seconds(answer.sampled),
-                      .received = at_seconds(now),
-                      .force = answer.force,
-                      .valid_for = milliseconds(200),
-                      .source = kSource,
-                      .field = has_field(of_) ? kGeneration : 0};
-    if (of_.method == FieldMethod::kPlane) {
-      const auto& table = *answer.contact.table;
-      const double stiffness = std::max(table.force[1] - table.force[0], 0.0) / table.step;
-      force.model = {.at = answer.at, .stiffness = stiffness * Mat3::Identity(), .contact = answer.contact};
-    }
-    controller_.observe(force);
-  }
-
-  Step step(const Motion& hand, const Vec3& applied) { return controller_.step(hand, applied); }
-
- private:
-  static constexpr std::uint32_t kGeneration = 1;
-  static constexpr std::uint32_t kSource = 1;
-
-  static HapticController::Config config_of(const FieldCase& of) {
-    HapticController::Config config;
-    config.limiter = {.law = of.method == FieldMethod::kHeld ? Law::kAol : Law::kAolPlus,
-                      .friction = field::Body{}.friction,
-                      .longest_hold = milliseconds(1)};
-    config.max_force = kMaxForce;
-    config.max_slew = std::numeric_limits<double>::infinity();
-    if (of.method == FieldMethod::kHeld) return config;
-    config.limiter.parts =
-        preset_parts(Preset::kFeel, {config.limiter.friction, config.limiter.longest_hold, of.count}).parts;
-    config.limiter.shared_account = of.push.push_j > 0 || of.push.push_w > 0;
-    if (has_field(of)) config.hold.field = field::Renderer::Config{.max_stiffness = kMaxStiffness, .push = of.push};
-    return config;
-  }
-
-  const FieldCase& of_;
-  field::Field field_;
-  HapticController controller_;
-  std::uint64_t sequence_ = 0;
-};
-
+/// The reading of an encoder; count 0: exact
 Vec3 counted(const Vec3& x, double count) {
   if (!(count > 0)) return x;
   return (x / count).array().round().matrix() * count;
+}
+
+/// A handle in a hand. It rests until 1 s before `begin`, away from an object whose first pose may not be there yet.
+class BodyDevice final : public Device {
+ public:
+  explicit BodyDevice(const FieldCase& of) : of_(of), hand_(field_hand(of.seed)) {
+    hand_.body.x = aim(-1);
+    info_.name = "body";
+    info_.max_force = 100;
+    info_.position_resolution = of.count;
+  }
+
+  void begin(LocalTime at) noexcept { begin_ = at; }
+  /// s from the start of the motion, negative before it
+  double time(LocalTime at) const noexcept { return begin_ ? seconds(at - *begin_) : -1; }
+  const Vec3& hand() const noexcept { return hand_.body.x; }
+
+  const DeviceInfo& info() const noexcept override { return info_; }
+  std::optional<PositionSample> read(LocalTime now) noexcept override {
+    for (; last_ && now - *last_ >= std::chrono::milliseconds(1); *last_ += std::chrono::milliseconds(1)) {
+      const double t = time(*last_);
+      hand_.body.go(force_, aim(t), t < 0 ? Vec3((aim(t + 1e-3) - aim(t)) / 1e-3) : of_.scene->speed_at(t, hand_));
+    }
+    if (!last_) last_ = now;
+    return PositionSample{.at = now, .position = counted(hand_.body.x, of_.count)};
+  }
+  Vec3 apply(const Vec3& force) noexcept override { return force_ = force; }
+
+ private:
+  Vec3 aim(double t) const {
+    const double away = of_.scene->pose ? 0.03 : 0;  // m
+    return of_.scene->target(std::max(t, 0.0), hand_) + std::clamp(-t, 0.0, 1.0) * Vec3(0, 0, away);
+  }
+
+  const FieldCase& of_;
+  FieldHand hand_;
+  DeviceInfo info_{};
+  std::optional<LocalTime> begin_{};
+  std::optional<LocalTime> last_{};
+  Vec3 force_ = Vec3::Zero();
+};
+
+Field upload_of(const FieldScene& scene) {
+  Field field = Field::from([&](const Vec3& x) { return scene.exact.at(x).distance; }, scene.low, scene.high,
+                            {.spacing = kSpacing});
+  const field::Material& material = scene.described;
+  field.materials = {{.stiffness = material.stiffness,
+                      .branch_stiffness = material.branch,
+                      .relaxation = material.tau,
+                      .friction = material.friction}};
+  return field;
 }
 
 }  // namespace
@@ -200,61 +93,78 @@ std::string_view to_string(FieldMethod method) {
 }
 
 FieldRun run_field(const FieldCase& of, const std::vector<Vec3>& truth) {
-  Way<State> up(of.network, of.seed, injector::Direction::kUp);
-  Way<Answer> down(of.network, of.seed, injector::Direction::kDown);
-  Dice dice(of.seed);
-  FieldHand hand = field_hand(of.seed);
-  field::Body& body = hand.body;
-  body.x = of.scene->target(0, hand);
-  Engine engine(of);
-  Device device(of);
-  State seen{.hand = body.x};  // the engine was there before
-  double next = kEngine * dice.uniform();
-  Vec3 applied = Vec3::Zero();
-  Vec3 last = body.x;
-  double energy = 0;
-  double wrong[2] = {0, 0};
-  double all[2] = {0, 0};
-  FieldRun run;
-  for (int k = 0; k < of.milliseconds; ++k) {
-    const double t = k * 1e-3;
-    const auto i = static_cast<std::size_t>(k);
-    const Vec3 dx = body.x - last;
-    last = body.x;
-    energy += -applied.dot(dx) + body.friction.coulomb * dx.norm() + body.friction.viscous * dx.squaredNorm() / 1e-3;
-    run.least_energy = std::min(run.least_energy, energy);
-    const Vec3 measured = counted(body.x, of.count);
-    up.send(t, {.tick = i + 1, .sampled = t, .hand = measured});
-    for (; next <= t; next += kEngine) {
-      while (const auto state = up.arrived(next)) {
-        if (state->tick > seen.tick) seen = *state;
+  BodyDevice device(of);
+  World::Config config;
+  config.seed = of.seed;
+  config.loop.control = field_control(of);
+  config.mail.flight = 1;
+  const std::string loss = of.loss > 0 ? " loss=" + std::to_string(100 * of.loss) + "%" : "";
+  config.weather = {.up = injector::resolve_profile(of.network + loss, injector::Direction::kUp),
+                    .down = injector::resolve_profile(of.network, injector::Direction::kDown)};
+  World world(config, device);
+
+  FieldEngine engine(of);
+  std::optional<std::size_t> handle;
+  std::uint64_t answers = 0;
+  const auto physics = [&](const DeviceState& state) -> Touch {
+    ++answers;
+    const double now = device.time(world.now());
+    const double sampled = device.time(LocalTime(state.sampled.time_since_epoch()));
+    FieldAnswer answer = engine.answer(now, {.tick = state.tick, .sampled = sampled, .hand = state.position});
+    if (has_field(of)) {
+      if (of.scene->pose) {
+        const field::TimedPose& pose = answer.pose;
+        world.client(*handle).pose(world.now() + (of.ahead ? from_seconds(now - sampled) : Duration{}),
+                                   {.position = pose.pose.position,
+                                    .orientation = pose.pose.turn,
+                                    .velocity = pose.velocity,
+                                    .angular_velocity = pose.angular_velocity});
       }
-      const Answer answer = engine.answer(next, seen);
-      if (!dice.chance(of.loss)) down.send(next, answer);
+      if (of.method == FieldMethod::kLearned && sampled >= 0) return Touch::truth(answer.force);
+      Touch none;
+      none.unknown = true;
+      return none;
     }
-    while (const auto answer = down.arrived(t)) device.observe(*answer, t);
-    const Step step = device.step({.at = at_seconds(t), .position = measured, .velocity = body.v}, applied);
-    if (step.field) {
-      energy += step.field->credit;
-      run.tank += step.field->credit;
-      if (step.field->refused > 1e-9) run.bound += 1.0 / of.milliseconds;
+    Touch touch(answer.force);
+    if (of.method == FieldMethod::kPlane) {
+      touch.stiffness = answer.model.stiffness;
+      touch.contact = answer.model.contact;
     }
-    if (t > kFrom) {
-      for (const bool late : {false, true}) {
-        if (late && t < kLate) continue;
-        wrong[late ? 1 : 0] += (step.force - truth.at(i)).squaredNorm();
-        all[late ? 1 : 0] += truth[i].squaredNorm();
-      }
-      run.jump = std::max(run.jump, (step.force - applied).norm());
-      run.true_jump = std::max(run.true_jump, (truth[i] - truth[i - 1]).norm());
-    }
-    applied = step.force;
-    run.force.push_back(applied);
-    body.go(applied, of.scene->target(t, hand), of.scene->speed_at(t, hand));
+    return touch;
+  };
+  ForceClient::Config client;
+  client.name = "engine";
+  client.rate_hz = kFieldEngineHz;
+  client.state_hz = 1000;
+  client.valid_for = std::chrono::milliseconds(200);
+  client.fields = has_field(of);
+  handle = world.add_controller(client, physics);
+  if (has_field(of)) world.client(*handle).use(upload_of(*of.scene));
+
+  FieldScore score(of, truth);
+  bool served = false;
+  std::size_t steps = 0;
+  world.watch_steps([&](const StepRecord& step) {
+    served = served || (has_field(of) ? step.field.has_value() : step.force_sequence > 0);
+    if (device.time(step.hand.at) < 0) return score.book(device.hand(), step.applied, step.field);
+    if (steps == truth.size()) return;
+    score.add(device.hand(), step.applied, step.field);
+    ++steps;
+  });
+  constexpr int kMostSeconds = 60;
+  for (int s = 0; s < kMostSeconds; ++s) {
+    if (served) break;
+    world.run_for(std::chrono::seconds(1));
   }
-  run.error = std::sqrt(wrong[0] / all[0]);
-  run.late_error = std::sqrt(wrong[1] / all[1]);
-  return run;
+  if (!served) {
+    throw std::runtime_error("the server does not render the " + of.scene->name + " of " +
+                             std::string(to_string(of.method)) + ": " + world.client(*handle).field().refused);
+  }
+  constexpr int kApproach = 1500;  // ms; for a new force and a new field, and for the hand
+  device.begin(world.now() + std::chrono::milliseconds(kApproach));
+  world.run_for(std::chrono::milliseconds(kApproach + of.milliseconds + 1));
+  if (steps < truth.size()) throw std::runtime_error("the server has missed steps");
+  return score.result();
 }
 
 }  // namespace tendon::lab

@@ -44,8 +44,10 @@ struct FieldRun {
   std::vector<Vec3> force{};  ///< N, at each ms
 };
 
-/// A device of 150 g (b 0.26 N·s/m, f_c 0.02 N) in a hand, and an engine at 60 Hz with the exact shape. `truth`:
-/// true_forces of this scene and hand. Throws std::invalid_argument if the network is unknown.
+/// The whole server in virtual time with a device of 150 g (b 0.26 N·s/m, f_c 0.02 N) in a hand, and a ForceClient at
+/// 60 Hz, which knows the exact shape and gets the states at 1 kHz. The field is uploaded over the network. The hand
+/// starts when the server renders it. `truth` is from true_forces for this scene and hand. Throws std::invalid_argument
+/// if the network is not known, and std::runtime_error if there is no force within a minute.
 FieldRun run_field(const FieldCase& of, const std::vector<Vec3>& truth);
 
 }  // namespace tendon::lab

@@ -78,21 +78,15 @@ FieldScene slot() {
   return scene;
 }
 
-/// The engine describes the relaxation, but the hardening only with `tabled`, as a table.
-FieldScene liver(bool tabled) {
-  FieldScene scene{.name = tabled ? "liver-table" : "liver",
+/// The engine describes the relaxation, but not the hardening.
+FieldScene liver() {
+  FieldScene scene{.name = "liver",
                    .low = {-0.03, -0.03, -0.012},
                    .high = {0.03, 0.03, 0.008},
                    .truth = {.stiffness = 150, .hardening = 3e4, .branch = 200, .tau = 0.2, .friction = 0.2}};
   scene.exact.primitives = {{.shape = field::Sphere{.centre = {0, 0, -0.08}, .radius = 0.08}}};
   scene.described = described(scene.truth);
   scene.described.stiffness = 250;
-  field::DepthTable& table = scene.described.table;
-  table.used = tabled;
-  for (std::size_t i = 1; tabled && i < table.force.size(); ++i) {
-    const double depth = static_cast<double>(i) * table.step;
-    table.force[i] = scene.truth.force(depth, depth) - scene.described.stiffness * depth;
-  }
   scene.target = [](double t, const FieldHand& hand) {
     return Vec3(0.006 * wave(0.3 * hand.pace, t), 0, 0.006 - 0.012 * hand.amplitude * (1 - cosine(0.6 * hand.pace, t)));
   };
@@ -182,8 +176,7 @@ Vec3 FieldScene::speed_at(double t, const FieldHand& hand) const {
 const std::vector<FieldScene>& field_scenes() {
   static const std::vector<FieldScene> scenes = [] {
     std::vector<FieldScene> all;
-    for (FieldScene scene :
-         {wall(), sphere(), bowl(), slot(), liver(false), liver(true), cube(false), cube(true), moving()}) {
+    for (FieldScene scene : {wall(), sphere(), bowl(), slot(), liver(), cube(false), cube(true), moving()}) {
       if (scene.truth.hardening == 0) scene.described = described(scene.truth);
       all.push_back(std::move(scene));
     }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <functional>
 #include <string>
@@ -48,11 +49,11 @@ struct FieldScene {
   std::function<Vec3(double t, const FieldHand& hand)> target{};
   std::function<field::Pose(double t)> pose{};  ///< empty: at rest
 
-  field::Pose pose_at(double t) const { return pose ? pose(t) : field::Pose{}; }
+  field::Pose pose_at(double t) const { return pose ? pose(std::max(t, 0.0)) : field::Pose{}; }
   Vec3 speed_at(double t, const FieldHand& hand) const;  ///< of the target
 };
 
-/// wall, sphere, bowl, slot, liver, liver-table, edge, corner, moving
+/// wall, sphere, bowl, slot, liver, edge, corner, moving
 const std::vector<FieldScene>& field_scenes();
 
 /// The true contact of a hand with a scene. A point p without mass is pulled by the hand x, and pushed by the surface i
