@@ -31,6 +31,7 @@ Touch to_touch(const ForceCommand& command) {
   touch.topology_changed = command.topology_changed;
   touch.error = command.error;
   touch.way = command.way;
+  touch.is_truth = command.field > 0;
   if (command.model) {
     touch.stiffness = command.model->stiffness;
     touch.valid_radius = command.model->valid_radius;

@@ -198,8 +198,11 @@ TEST(Protobuf, WhatNoWriterOfOursDoesIsPutInOrder) {
     EXPECT_TRUE(readers.agree(bytes)) << what;
   }
   EXPECT_TRUE(is_in_order(frame(usual))) << "the others fail for their own reason";
-  for (const RawProtobuf& odd : {RawProtobuf().varint(11, 7), RawProtobuf().varint(11, 258),
-                                 RawProtobuf().varint(11, 2).message(16, RawProtobuf())}) {
+  for (const RawProtobuf& odd :
+       {RawProtobuf().varint(11, 7), RawProtobuf().varint(11, 258),
+        RawProtobuf().varint(11, 2).message(16, RawProtobuf()), RawProtobuf().varint(11, 2).varint(26, 0),
+        RawProtobuf().varint(11, 2).varint(26, 0).fixed64(27, 0x3FF0000000000000),
+        RawProtobuf().varint(11, 2).varint(26, 1ULL << 32U).message(28, RawProtobuf())}) {
     EXPECT_TRUE(readers.agree(frame(odd)));
   }
   EXPECT_TRUE(readers.agree(datagram_with(raw_force([](RawProtobuf& force) {
