@@ -75,7 +75,8 @@ struct FieldBox {
 struct FieldTape {
   SpscRing<FieldInput> inputs{1024};  ///< from the haptic thread, before the step
   std::atomic<std::uint64_t> inputs_lost{0};
-  /// From the network thread, before the field can be used. The ring can contain up to eight fields that were recorded before.
+  /// From the network thread, before the field can be used. The ring can contain up to eight fields that were recorded
+  /// before.
   SpscRing<std::shared_ptr<const FieldData>> data{8};
   std::atomic<std::uint64_t> data_lost{0};
 };

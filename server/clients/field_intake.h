@@ -23,7 +23,8 @@ namespace tendon {
 
 /// Receives the fields and poses of all clients of a network loop, and passes them to the haptic threads. The bricks of
 /// all clients are in one store, in which each key can only find its own. A client can only use a field in a channel
-/// that it holds and that allows fields (FieldLimits). When a client leaves, its offers are removed, but its bricks stay in the store.
+/// that it holds and that allows fields (FieldLimits). The offers of a client that leaves are removed, but its bricks
+/// remain in the store.
 /// The constructor allocates the store, and the slots of each channel that allows fields.
 /// Thread-safe: no. Realtime-safe: no.
 class FieldIntake {

@@ -52,9 +52,13 @@ void FieldSlots::move(const ArrivedPose& pose) {
 }
 
 void FieldSlots::turn(std::uint32_t holder) {
-  if (waiting_ == nullptr || box_.taken.load(std::memory_order_acquire) != number_) return;
+  if (box_.taken.load(std::memory_order_acquire) != number_) return;
+  if (waiting_ != nullptr && waiting_->use.source != holder) waiting_ = nullptr;
+  if (waiting_ == nullptr && posted_ != nullptr && posted_->use.field != nullptr && posted_->use.source != holder) {
+    stop(posted_->use.source);
+  }
+  if (waiting_ == nullptr) return;
   const Slot& next = *std::exchange(waiting_, nullptr);
-  if (next.use.source != holder) return;
   used_ = std::exchange(posted_, &next);
   box_.use.put({.use = next.use, .number = ++number_});
   if (pose_ && pose_->source == holder) box_.pose.put(*pose_);

@@ -15,9 +15,9 @@
 namespace tendon {
 
 /// Passes the fields of one channel to the haptic thread, which only receives pointers. A field does not change while
-/// the haptic thread can use it. One of the kCount slots contains the field in use, one contains the posted field, which
-/// the haptic thread takes in its next step, and the last one is free for the next field. If several fields are requested
-/// within a step, the newest one wins.
+/// the haptic thread can use it. One of the kCount slots contains the field in use, one contains the posted field that
+/// the haptic thread takes in its next step, and the last one is free for the next field. If several fields are
+/// requested within a step, the newest one wins.
 /// Only the constructor allocates the memory of bricks. Thread-safe: no. Realtime-safe: no.
 class FieldSlots {
  public:
@@ -37,7 +37,8 @@ class FieldSlots {
   /// Passes on a pose. It is repeated with the next field of the source, which may arrive later.
   void move(const ArrivedPose& pose);
 
-  /// Must be called after a step of the haptic thread. A waiting field of a source other than `holder` is dropped.
+  /// Must be called after a step of the haptic thread. Fields of a source other than `holder` are not posted. If one is
+  /// in use, it is stopped, because the haptic thread may not have been told that its source has left (Leases::give).
   void turn(std::uint32_t holder);
 
   bool has(const FieldName& bricks) const noexcept;  ///< true if use() does not call `fill`

@@ -14,7 +14,8 @@ void Leases::hold(LocalTime now, std::uint32_t device, std::uint32_t channel, co
 void Leases::give(std::uint32_t device, std::uint32_t channel, std::uint32_t client) {
   ServedChannel& held = devices_[device].channels[channel];
   if (held.holder != client) return;
-  // The queue can only be full if the haptic thread is blocked. The force then expires because of its age.
+  // The queue can only be full if the haptic thread is blocked. The force then expires because of its age, and
+  // FieldSlots stops a field.
   devices_[device].mail->orders.try_push({.kind = HapticOrder::Kind::kRelease, .channel = channel, .source = client});
   held.holder = 0;
   if (devices_[device].outputs.turn_off_those_of(client)) {

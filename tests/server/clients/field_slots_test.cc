@@ -104,5 +104,20 @@ TEST_F(Slots, AFieldOfAFormerHolderIsDropped) {
   EXPECT_EQ(used_->source, kEngine + 1);
 }
 
+TEST_F(Slots, AFieldWhoseSourceHasLeftIsStopped) {
+  use(1, 1);
+  slots_.turn(kEngine);
+  slots_.turn(0);
+  take();
+  EXPECT_NE(used_->field, nullptr);
+  for (int i = 0; i < 3; ++i) {
+    slots_.turn(0);
+    take();
+    EXPECT_EQ(used_->field, nullptr);
+    EXPECT_EQ(used_->source, kEngine);
+  }
+  EXPECT_EQ(box_->taken, 2U) << "once";
+}
+
 }  // namespace
 }  // namespace tendon::field_slots_test

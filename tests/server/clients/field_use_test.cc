@@ -257,6 +257,23 @@ TEST_F(FieldUse, WhoTakesTheLeaseStopsTheField) {
   EXPECT_GE(least_energy_, -1e-9);
 }
 
+TEST_F(FieldUse, AFieldStopsAlsoIfTheReleaseOfItsEngineIsLost) {
+  start({scene_of(kStir)});
+  const Engine one = engine("127.0.0.1:4000");
+  ASSERT_TRUE(upload(one, ball()));
+  EXPECT_EQ(answer_to(one->use(newest(one), 1), one).code, Code::kOk);
+  run(milliseconds(100), {&one});
+  ASSERT_TRUE(last_.field);
+  const std::uint32_t id = one->ask(GiveLease{});
+  run(milliseconds(10), {&one}, [&] {  // the release does not fit into the queue
+    while (one->answer(id) == nullptr && mail().orders.try_push({.kind = HapticOrder::Kind::kDisengage})) {
+    }
+  });
+  EXPECT_EQ(one->answer(id)->code, Code::kOk);
+  run(milliseconds(20), {&one});
+  EXPECT_FALSE(last_.field);
+}
+
 TEST_F(FieldUse, ASwapInEveryStepIsPassive) {
   start({scene_of(kStir + "max_stiffness_n_per_m = 3000\n")});
   const Engine one = engine("127.0.0.1:4000");
