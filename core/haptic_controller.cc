@@ -185,7 +185,7 @@ void HapticController::add_coupling(const Motion& hand, const HandleSample* hand
   if (silent && couplings_->live()) wanted.mode = Mode::kActive;
 }
 
-/// Not inlined, because most scenes have no fields.
+/// This function is not inlined because most scenes do not have fields.
 [[gnu::noinline]] void HapticController::render_fields(const Motion& hand, Step& step,
                                                        ForceChannels::Wanted& wanted) noexcept {
   ++tick_;
@@ -193,7 +193,7 @@ void HapticController::add_coupling(const Motion& hand, const HandleSample* hand
 }
 
 /// Credits the energy from the tank of a field and from the peers, and withdraws the energy given to them, before the
-/// account bounds the force. The energy that is stored in a field is not given.
+/// account bounds the force. The peers cannot receive energy that is stored in a field.
 template <class Port, class Force>
 void HapticController::settle(Port& port, const Force& wanted, const Step& step) noexcept {
   double stored = 0;

@@ -147,8 +147,8 @@ void LogLoop::record_fields(std::size_t number, std::uint64_t until) {
   for (const FieldInput* input = tape.inputs.front(); input != nullptr && input->tick <= until;
        input = tape.inputs.front()) {
     // The data were pushed before the haptic thread could use the field.
-    for (const auto* data = tape.data.front(); data != nullptr; data = tape.data.front()) {
-      if (recorder_) recorder_->record(**data, number);
+    for (const FieldData* data = tape.data.front(); data != nullptr; data = tape.data.front()) {
+      if (recorder_) recorder_->record(*data, number);
       tape.data.pop();
     }
     if (recorder_) recorder_->record(*input, number);

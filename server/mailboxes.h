@@ -71,13 +71,12 @@ struct FieldBox {
   std::atomic<std::uint32_t> taken{0};  ///< number of the newest field that the haptic thread has taken
 };
 
-/// What is recorded about the fields of a device.
+/// The queues for recording the fields of a device.
 struct FieldTape {
   SpscRing<FieldInput> inputs{1024};  ///< from the haptic thread, before the step
   std::atomic<std::uint64_t> inputs_lost{0};
-  /// From the network thread, before the field can be used. The ring can contain up to eight fields that were recorded
-  /// before.
-  SpscRing<std::shared_ptr<const FieldData>> data{8};
+  /// From the network thread, before the field can be used. The ring keeps up to eight fields in memory.
+  SpscRing<FieldData> data{8};
   std::atomic<std::uint64_t> data_lost{0};
 };
 

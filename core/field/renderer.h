@@ -65,11 +65,11 @@ class Renderer {
   /// change. If the pointer is null, the field is removed, and its pose, tables and true forces are forgotten.
   void use(const Field* field, LocalTime now) noexcept;
 
-  /// The field appears under the hand again, because its force was not applied.
+  /// Sets p to x in the next step. Must be called if the force was not applied.
   void restart() noexcept { started_ = false; }
 
-  /// Returns ΣU(d, z) (J) at `x`, with the law and the places of p of the last step: H₀ of the next step. 0 without a
-  /// field.
+  /// Returns H₀ in J if the hand is at `x` in the next step. This is ΣU(d, z) with the law and the position of p of the
+  /// last step, or 0 if there is no field.
   double stored(const Vec3& x) const noexcept;
 
   /// See FieldPose::observe.

@@ -16,8 +16,8 @@ struct FieldUse {
   std::uint32_t source = 0;      ///< as in RemoteForce
 };
 
-/// The fields in a haptic step. `generation` to `proxy` are of the first channel that touches its field, or of the
-/// first one with a field. The force and the energies are sums over the channels.
+/// The state of the fields in a haptic step. If several channels use fields, the force and the energies are sums. The
+/// other values are those of the first channel with contact, or of the first channel if there is no contact.
 struct FieldStep {
   std::uint32_t generation = 0;
   std::uint8_t channel = 0;

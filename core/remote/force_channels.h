@@ -56,8 +56,8 @@ class ForceChannels {
 
   bool has_fields() const noexcept { return has_fields_; }  ///< the part `field` is listed
 
-  /// Adds the forces of the fields to `wanted`, with their weights, in the order of the channels. Must be called after
-  /// `wanted`. `account` is E in J. Each field can use E + Σ credit − Σ wⱼ Hⱼ, where Hⱼ is the stored energy of the other
+  /// Renders the fields of all channels and adds their weighted forces to `wanted`. Must be called after `wanted`.
+  /// `account` is E in J. Each field can use E + Σ credit − Σ wⱼ Hⱼ, where Hⱼ is the stored energy of the other
   /// fields and the credit is that of the fields before. Returns nothing if no field is in use.
   std::optional<FieldStep> render(const Motion& hand, double account, std::uint64_t tick, Wanted& wanted) noexcept;
 

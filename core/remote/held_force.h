@@ -82,8 +82,8 @@ class HeldForce {
   /// positive, safe_stop is shorter than hold, a part is not valid, or there are several parts.
   explicit HeldForce(const Config& config);
 
-  /// Returns false and does nothing if the force is not sound. A true force (RemoteForce::field) is refused unless it
-  /// is for the field in use, from its source, and newer than the last one.
+  /// Returns false and does nothing if the force is not sound. A true force (RemoteForce::field) is only accepted
+  /// if the current field has the same generation and source, and if it is newer than the last one.
   bool observe(const RemoteForce& force) noexcept;
 
   /// Returns false and does nothing if the part `field` is not listed, or if the generation of a field is 0.
@@ -99,14 +99,14 @@ class HeldForce {
   /// The next fresh force is ramped in. The force of a field starts at zero.
   void disengage() noexcept;
 
-  /// Returns the demand for `hand.position`, `hand.at` and `orientation`, without the force of a field. Must be called
+  /// Returns the demand for `hand.position`, `hand.at` and `orientation`. It does not include the field. Must be called
   /// once per haptic step, because an estimator learns from it. If there is no orientation, the model of rotation is
   /// not used.
   Wanted wanted(const Motion& hand, const Quat* orientation = nullptr) noexcept;
 
   std::uint32_t field() const noexcept { return generation_; }  ///< generation of the current field, or 0
 
-  /// H₀ of the field at `x` (J), or 0 if there is none.
+  /// Returns H₀ of the field in J if the hand is at `x`, or 0 if there is no field.
   double stored(const Vec3& x) const noexcept { return generation_ != 0 ? renderer_->stored(x) : 0; }
 
   /// Must be called after `wanted` in each step with a field in use. See Renderer::render.

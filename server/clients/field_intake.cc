@@ -2,6 +2,7 @@
 #include "server/clients/field_intake.h"
 
 #include <algorithm>
+#include <atomic>
 #include <limits>
 #include <memory>
 #include <stdexcept>
@@ -210,26 +211,27 @@ void FieldIntake::record(LocalTime now, const Guest& guest, Channel& channel, co
                          const UseField& wanted, const field::Field& field, std::uint32_t source) {
   const auto& tape = devices_[wanted.device].mail->field_tape;
   if (!tape) return;
-  const auto data =
-      std::make_shared<FieldData>(FieldData{.at = now,
-                                            .channel = wanted.channel,
-                                            .source = source,
-                                            .generation = wanted.generation,
-                                            .manifest = {manifest.bytes().begin(), manifest.bytes().end()},
-                                            .weights = {},
-                                            .materials = field.materials,
-                                            .fixtures = field.fixtures});
+  FieldData* const data = tape->data.back();
+  if (data == nullptr) {
+    tape->data_lost.fetch_add(1, std::memory_order_relaxed);
+    return;
+  }
+  *data = {.at = now,
+           .channel = wanted.channel,
+           .source = source,
+           .generation = wanted.generation,
+           .manifest = {manifest.bytes().begin(), manifest.bytes().end()},
+           .weights = {},
+           .materials = field.materials,
+           .fixtures = field.fixtures};
   for (std::size_t i = 0; i < manifest.bricks() && channel.recorded != wanted.field; ++i) {
     const BrickBytes* const brick = guest.receiver.brick(manifest.hash(i));
-    if (brick == nullptr) break;  // a field that has been used and recorded before
+    if (brick == nullptr) break;  // the field is still in a slot and was already recorded
     data->weights.insert(data->weights.end(), brick->begin(), brick->end());
   }
   if (data->weights.size() != manifest.bricks() * limits::kBrickBytes) data->weights.clear();
-  if (tape->data.try_push(data)) {
-    channel.recorded = wanted.field;
-  } else {
-    tape->data_lost.fetch_add(1, std::memory_order_relaxed);
-  }
+  tape->data.push();
+  channel.recorded = wanted.field;
 }
 
 Outcome FieldIntake::drop(LocalTime /*now*/, const ServedClient& client, const DropField& wanted) {

@@ -74,7 +74,7 @@ class FieldIntake {
     std::uint32_t source = 0;  ///< the client to which the rest belongs
     std::uint32_t generation = 0;
     FieldName name{};
-    std::optional<FieldName> recorded{};  ///< the field whose bricks were recorded last
+    std::optional<FieldName> recorded{};  ///< name of the last field that was recorded with its bricks
   };
 
   Guest& guest_of(const ServedClient& client);

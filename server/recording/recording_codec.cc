@@ -4,19 +4,37 @@
 #include <google/protobuf/descriptor.pb.h>
 
 #include <algorithm>
+#include <cstddef>
 #include <cstring>
 #include <span>
 #include <stdexcept>
+#include <vector>
 
 #include "protocol/link.h"
 #include "protocol/wire/header.h"
 #include "recording.pb.h"
-#include "server/recording/vector_codec.h"
 
 namespace tendon::recording {
 namespace {
 
-using recording::put;
+namespace pb = tendon::recording::v1;
+
+void put(pb::Vec3* out, const Vec3& v) {
+  out->set_x(v.x());
+  out->set_y(v.y());
+  out->set_z(v.z());
+}
+
+Vec3 vec3(const pb::Vec3& v) { return {v.x(), v.y(), v.z()}; }
+
+void put(pb::Quat* out, const Quat& q) {
+  out->set_w(q.w);
+  out->set_x(q.x);
+  out->set_y(q.y);
+  out->set_z(q.z);
+}
+
+Quat quat(const pb::Quat& q) { return {q.w(), q.x(), q.y(), q.z()}; }
 
 void put(pb::Turn* out, const TurnStep& turn) {
   put(out->mutable_orientation(), turn.hand.orientation);
@@ -197,6 +215,14 @@ void put(pb::Reason* out, Reasons reasons) {
   out->set_acceleration(reasons.has(Reason::kAcceleration));
 }
 
+template <class Message>
+Message parse(std::string_view bytes) {
+  Message message;
+  if (!message.ParseFromArray(bytes.data(), static_cast<int>(bytes.size())))
+    throw std::invalid_argument("the data are not a " + message.GetTypeName());
+  return message;
+}
+
 Joints joints_in(const pb::Step& in) {
   const auto count = static_cast<std::size_t>(in.joint_rad_size());
   if (count > Joints::kMost || in.joint_velocity_radps_size() != in.joint_rad_size())
@@ -206,6 +232,15 @@ Joints joints_in(const pb::Step& in) {
   std::copy(in.joint_rad().begin(), in.joint_rad().end(), joints.angle.begin());
   std::copy(in.joint_velocity_radps().begin(), in.joint_velocity_radps().end(), joints.velocity.begin());
   return joints;
+}
+
+std::string text_of(const std::vector<std::byte>& bytes) {
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
+
+std::vector<std::byte> bytes_of(const std::string& text) {
+  const auto bytes = std::as_bytes(std::span(text));
+  return {bytes.begin(), bytes.end()};
 }
 
 }  // namespace
@@ -289,6 +324,53 @@ std::string encode(const PortRecord& port) {
   if (port.peer) {
     put(out.mutable_peer(), *port.peer);
     out.set_peer_arrived_ns((port.peer_arrived - port.at).count());
+  }
+  return out.SerializeAsString();
+}
+
+std::string encode(const FieldInput& input) {
+  pb::FieldInput out;
+  out.set_tick(input.tick);
+  out.set_kind(static_cast<pb::FieldInputKind>(input.kind));
+  out.set_channel(input.channel);
+  out.set_source(input.source);
+  out.set_generation(input.generation);
+  if (input.kind == FieldInput::Kind::kTruth) {
+    out.set_answers_tick(input.answers_tick);
+    out.set_received_ns((input.received - input.at).count());
+    put(out.mutable_force_n(), input.truth);
+  }
+  if (input.kind == FieldInput::Kind::kPose) {
+    out.set_pose_ns((input.pose.at - input.at).count());
+    put(out.mutable_position_m(), input.pose.pose.position);
+    put(out.mutable_orientation(), input.pose.pose.turn);
+    put(out.mutable_velocity_mps(), input.pose.velocity);
+    put(out.mutable_angular_velocity_radps(), input.pose.angular_velocity);
+  }
+  return out.SerializeAsString();
+}
+
+std::string encode(const FieldData& data) {
+  pb::FieldData out;
+  out.set_channel(data.channel);
+  out.set_source(data.source);
+  out.set_generation(data.generation);
+  out.set_manifest(text_of(data.manifest));
+  out.set_weights(text_of(data.weights));
+  for (const field::Material& material : data.materials) {
+    pb::FieldMaterial& one = *out.add_materials();
+    one.set_stiffness_npm(material.stiffness);
+    one.set_branch_stiffness_npm(material.branch);
+    one.set_relaxation_s(material.tau);
+    one.set_friction(material.friction);
+  }
+  for (const field::Fixture& fixture : data.fixtures) {
+    pb::FieldFixture& one = *out.add_fixtures();
+    one.set_kind(static_cast<std::uint32_t>(fixture.kind));
+    put(one.mutable_at_m(), fixture.at);
+    put(one.mutable_direction(), fixture.direction);
+    one.set_stiffness_npm(fixture.stiffness);
+    one.set_most_force_n(fixture.most_force);
   }
   return out.SerializeAsString();
 }
@@ -394,6 +476,53 @@ PortRecord decode_port(std::string_view message, LocalTime at) {
   out.sent = port_state(in.sent());
   if (in.has_peer()) out.peer = port_state(in.peer());
   out.peer_arrived = at + Duration(in.peer_arrived_ns());
+  return out;
+}
+
+FieldInput decode_field_input(std::string_view message, LocalTime at) {
+  const auto in = parse<pb::FieldInput>(message);
+  if (in.kind() == pb::FIELD_INPUT_KIND_UNSPECIFIED || !pb::FieldInputKind_IsValid(in.kind()))
+    throw std::invalid_argument("an input of a field has the unknown kind " + std::to_string(in.kind()));
+  FieldInput out{.tick = in.tick(),
+                 .at = at,
+                 .kind = static_cast<FieldInput::Kind>(in.kind()),
+                 .channel = in.channel(),
+                 .source = in.source(),
+                 .generation = in.generation(),
+                 .answers_tick = in.answers_tick(),
+                 .received = at + Duration(in.received_ns()),
+                 .truth = vec3(in.force_n())};
+  if (out.kind != FieldInput::Kind::kPose) return out;
+  out.pose = {.at = at + Duration(in.pose_ns()),
+              .pose = {.position = vec3(in.position_m()), .turn = quat(in.orientation())},
+              .velocity = vec3(in.velocity_mps()),
+              .angular_velocity = vec3(in.angular_velocity_radps())};
+  return out;
+}
+
+FieldData decode_field_data(std::string_view message, LocalTime at) {
+  const auto in = parse<pb::FieldData>(message);
+  FieldData out{.at = at,
+                .channel = in.channel(),
+                .source = in.source(),
+                .generation = in.generation(),
+                .manifest = bytes_of(in.manifest()),
+                .weights = bytes_of(in.weights())};
+  for (const pb::FieldMaterial& one : in.materials()) {
+    out.materials.push_back({.stiffness = one.stiffness_npm(),
+                             .branch = one.branch_stiffness_npm(),
+                             .tau = one.relaxation_s(),
+                             .friction = one.friction()});
+  }
+  for (const pb::FieldFixture& one : in.fixtures()) {
+    if (one.kind() > static_cast<std::uint32_t>(field::Fixture::Kind::kPlane))
+      throw std::invalid_argument("a fixture has the unknown kind " + std::to_string(one.kind()));
+    out.fixtures.push_back({.kind = static_cast<field::Fixture::Kind>(one.kind()),
+                            .at = vec3(one.at_m()),
+                            .direction = vec3(one.direction()),
+                            .stiffness = one.stiffness_npm(),
+                            .most_force = one.most_force_n()});
+  }
   return out;
 }
 

@@ -9,9 +9,8 @@
 
 namespace tendon {
 
-/// Stores the last steps of a device before a fault. Without `handles`, the handles of steps are not stored, which
-/// saves half of the memory of a StepRecord, and without `fields`, their fields are not stored. Thread-safe,
-/// Realtime-safe: see FlightRecorder.
+/// Stores the last steps of a device before a fault. The handles and the fields of the steps are optional, because a
+/// handle needs half of the memory of a StepRecord. Thread-safe, Realtime-safe: see FlightRecorder.
 class StepFlight {
  public:
   /// `capacity` must be a power of two.

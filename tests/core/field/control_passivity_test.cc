@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// HapticController with fields, tanks, poses, truths, other forces and late steps, against any motion of the hand: the
-// account must not be negative, and the hand must not be given more than the tanks contain.
+// Tests HapticController with random fields, tanks, poses, true forces and motions of the hand. The account must not be
+// negative, and the energy given to the hand must not exceed that of the tanks.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -65,7 +65,7 @@ TimedPose random_pose(Dice& dice, LocalTime now) {
 struct Outcome {
   double least_energy = 0;  ///< J, minimum of E
   double least_owned = 0;   ///< J, minimum of the ledger without credits, plus push_j + push_w t of all channels
-  double worst_stored = 0;  ///< J, maximum of H − E − credit; only within Theorem 1
+  double worst_stored = 0;  ///< J, maximum of H − E − credit
   double credited = 0;      ///< J
   double worst_excess = 0;  ///< N above the bound
   bool all_finite = true;

@@ -104,7 +104,7 @@ TEST(FieldControl, AFieldUnderTheHandStartsWithNoForce) {
     for (int k = 0; k < 500; ++k) {
       EXPECT_TRUE(rig.push({9, 9, 9})) << "a force that was on its way is ignored";
       last = rig.at(x);
-      EXPECT_LE(rig.jump, kMostJump + 0.02);  // the force before fades out in 100 ms
+      EXPECT_LE(rig.jump, kMostJump + 0.02);  // the previous force fades out in 100 ms
     }
     EXPECT_NEAR(last.force.z(), 4, 1e-9);
     EXPECT_EQ(last.force.x(), 0);
@@ -293,7 +293,7 @@ TEST(FieldControl, ATableLearnsTheSameAtAnyDelay) {
     for (std::uint64_t k = 0; k < 4000; ++k) {
       const Step step = rig.at(hand(k));
       const auto then = static_cast<std::int64_t>(k) - delay;
-      if (then > 300 && then < 2400 && then % 16 == 0) {  // the true object is twice as stiff
+      if (then > 300 && then < 2400 && then % 16 == 0) {  // the stiffness of the true object is 1000 N/m
         const double depth = std::max(0.0, -hand(static_cast<std::uint64_t>(then)).z());
         EXPECT_TRUE(rig.tell(start + static_cast<std::uint64_t>(then) + 1, {0, 0, 1000 * depth}, 1));
       }
@@ -413,6 +413,44 @@ TEST(FieldControl, TheForceIsSaturatedThenSlewedThenLimited) {
   EXPECT_NEAR(step.wanted.z(), 3, 1e-6);
   EXPECT_NEAR(step.force.z(), 1.5, 1e-9);
   EXPECT_TRUE(step.reasons.has(Reason::kMaxForce));
+}
+
+TEST(FieldControl, AnEnergyTankDoesNotGiveWhatAFieldStores) {
+  const Field field = flat(1000);
+  HapticController::Config config = config_of({});
+  Coupling::Config& coupling = config.coupling.emplace();
+  coupling.role = PortRole::kFollower;
+  coupling.spring = {.stiffness = 100, .own_damping = 1, .period = milliseconds(1)};
+  coupling.tank.emplace();
+  coupling.holds_place = true;
+  Rig rig(config);
+  rig.earn(0.1);
+  rig.at({0, 0, 0.001});
+  rig.use(&field, 1);
+  const Vec3 x(0, 0, -0.002);
+  for (int k = 0; k < 300; ++k) rig.at(x);
+  double given = 0;
+  double least = 1;  // of E − H
+  for (std::uint64_t n = 1; n <= 1000; ++n) {
+    PortState peer;
+    peer.epoch = 5;
+    peer.sequence = n;
+    peer.answers_epoch = 1;
+    peer.answers = n - 1;
+    peer.time = milliseconds(n);
+    peer.engagement = n < 100 ? 0 : 1;
+    peer.phase = n < 100 ? PortPhase::kCoupled : PortPhase::kEngaged;
+    peer.need = 1;
+    (*rig.controller.couplings())[0].receive(peer, rig.now());
+    const Step step = rig.at(x);
+    given += rig.controller.couplings()->settled(0).withdraw;
+    least = std::min(least, step.energy - step.field->stored);
+    (*rig.controller.couplings())[0].conclude(rig.applied, {});
+    static_cast<void>((*rig.controller.couplings())[0].message());
+  }
+  EXPECT_GT(given, 0.01);
+  EXPECT_GE(least, -1e-9);
+  EXPECT_NEAR(rig.applied.z(), 2, 1e-6);
 }
 
 TEST(FieldControl, CreditOfATankNeedsASharedAccount) {

@@ -59,7 +59,7 @@ class FieldRecording : public FieldServer {
     ASSERT_TRUE(upload(one, ball(0.027)));
     ASSERT_EQ(answer_to(one->use(newest(one), 3), one).code, Code::kOk);
     run(milliseconds(1000), {&one}, act);
-    run(milliseconds(2600), {});  // the engine is silent, so its session ends
+    run(milliseconds(2600), {});  // the session of the engine times out
     assembly_->log().close(now_, 0);
   }
 

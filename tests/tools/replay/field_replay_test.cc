@@ -27,7 +27,8 @@ HapticController::Config two_channels() {
   return config;
 }
 
-/// 3 s, with a swap, a plane that moves, truths, a failed reading, a pause of the operator and a drop.
+/// Simulates 3 s with two fields, poses, true forces, a failed reading, a disarmed device, and an engine that
+/// disconnects.
 std::vector<StepRecord> lived(const HapticController::Config& config) {
   field::Field ball{.primitives = {{.shape = field::Sphere{.radius = 0.03}}}};
   ball.materials = {{.stiffness = 800, .branch = 300, .tau = 0.1, .friction = 0.3}};

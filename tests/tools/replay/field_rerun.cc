@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <iterator>
 #include <stdexcept>
 #include <string>
 
@@ -29,18 +30,15 @@ field::BrickField::Weights weights_at(const std::byte* bytes) {
 
 constexpr std::size_t kMostShapes = 16;
 
-std::shared_ptr<const field::BrickField> built_from(const FieldManifest& manifest,
-                                                    const std::vector<std::byte>& weights) {
-  const auto bricks = std::make_shared<field::BrickField>();
-  bricks->reset(manifest.lattice());
+void fill(field::BrickField& bricks, const FieldManifest& manifest, const std::vector<std::byte>& weights) {
+  bricks.reset(manifest.lattice());
   for (std::size_t i = 0; i < manifest.bricks(); ++i) {
     const PlacedBrick placed = manifest.brick(i);
     field::BrickField::Place place;
     std::ranges::transform(placed.place, place.begin(), [](auto along) { return static_cast<std::uint16_t>(along); });
-    bricks->put(place, weights_at(weights.data() + i * limits::kBrickBytes), placed.material);
+    bricks.put(place, weights_at(weights.data() + i * limits::kBrickBytes), placed.material);
   }
-  bricks->finish();
-  return bricks;
+  bricks.finish();
 }
 
 }  // namespace
@@ -49,7 +47,7 @@ FieldRerun::FieldRerun(const HapticController::Config& control)
     : max_stiffness_(control.hold.field ? control.hold.field->max_stiffness : 0),
       channels_({.hold = control.hold, .rules = control.channels}) {}
 
-std::shared_ptr<const field::BrickField> FieldRerun::bricks_of(const FieldData& data) {
+const field::BrickField* FieldRerun::bricks_of(const FieldData& data) {
   const FieldManifest manifest(data.manifest);
   if (std::string refused = manifest.has_head() ? manifest.refused() : "the manifest is too short"; !refused.empty()) {
     throw std::runtime_error(name_of(data) + ": " + refused);
@@ -57,25 +55,31 @@ std::shared_ptr<const field::BrickField> FieldRerun::bricks_of(const FieldData& 
   if (manifest.bricks() == 0) return nullptr;
   if (data.weights.empty()) {
     const auto known = std::ranges::find(shapes_, data.manifest, &Shape::manifest);
-    if (known != shapes_.end()) return known->bricks;
+    if (known != shapes_.end()) return &known->bricks;
   }
   if (data.weights.size() != manifest.bricks() * limits::kBrickBytes) {
     throw std::runtime_error(name_of(data) + ": " + std::to_string(data.weights.size()) +
                              " bytes of weights: expected " + std::to_string(manifest.bricks() * limits::kBrickBytes));
   }
-  shapes_.push_back({.manifest = data.manifest, .bricks = built_from(manifest, data.weights)});
-  if (shapes_.size() > kMostShapes) shapes_.pop_front();
-  return shapes_.back().bricks;
+  forget_shapes();
+  Shape& shape = shapes_.emplace_back();
+  shape.manifest = data.manifest;
+  fill(shape.bricks, manifest, data.weights);
+  return &shape.bricks;
+}
+
+/// Removes the oldest shapes that are not used.
+void FieldRerun::forget_shapes() {
+  for (auto shape = shapes_.begin(); shape != shapes_.end() && shapes_.size() >= kMostShapes;) {
+    const bool used = std::ranges::any_of(built_, [&](const Built& one) { return one.field.bricks == &shape->bricks; });
+    shape = used ? std::next(shape) : shapes_.erase(shape);
+  }
 }
 
 void FieldRerun::take(const FieldData& data) {
-  Built built{.channel = data.channel,
-              .source = data.source,
-              .generation = data.generation,
-              .bricks = bricks_of(data),
-              .field = {}};
+  Built built{.channel = data.channel, .source = data.source, .generation = data.generation, .field = {}};
   const FieldManifest manifest(data.manifest);
-  built.field.bricks = built.bricks.get();
+  built.field.bricks = bricks_of(data);
   for (std::size_t i = 0; i < manifest.primitives(); ++i) built.field.primitives.push_back(manifest.primitive(i));
   built.field.materials = data.materials;
   built.field.fixtures = data.fixtures;

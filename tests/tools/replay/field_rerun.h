@@ -4,7 +4,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <list>
-#include <memory>
 #include <optional>
 #include <vector>
 
@@ -23,12 +22,12 @@ namespace tendon::replay {
 /// Thread-safe: no. Realtime-safe: no.
 class FieldRerun {
  public:
-  /// Throws as HapticController does. Without the part `field`, nothing is rendered.
+  /// Throws as HapticController does. If the part `field` is not listed, `step` returns nothing.
   explicit FieldRerun(const HapticController::Config& control);
 
   /// Throws std::runtime_error if the data are not valid.
   void take(const FieldData& data);
-  /// Before the step with its tick. Throws std::runtime_error if the field of a kUse has no data.
+  /// Must be called before the step with the same tick. Throws std::runtime_error if the field of a kUse has no data.
   void take(const FieldInput& input);
 
   /// Returns StepRecord::field.
@@ -39,20 +38,20 @@ class FieldRerun {
     std::uint32_t channel = 0;
     std::uint32_t source = 0;
     std::uint32_t generation = 0;
-    std::shared_ptr<const field::BrickField> bricks;
     field::Field field;
   };
   struct Shape {
     std::vector<std::byte> manifest;
-    std::shared_ptr<const field::BrickField> bricks;
+    field::BrickField bricks;
   };
 
   void use(const FieldInput& input);
-  std::shared_ptr<const field::BrickField> bricks_of(const FieldData& data);
+  const field::BrickField* bricks_of(const FieldData& data);
+  void forget_shapes();
 
   double max_stiffness_;
   ForceChannels channels_;
-  std::list<Shape> shapes_;  ///< the newest ones
+  std::list<Shape> shapes_;  ///< those of `built_`, and some older ones
   std::list<Built> built_;   ///< if a field is used, all older fields of the channel are removed
 };
 
