@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <memory>
 
 #include "devices/safety/safe_device.h"
@@ -276,6 +277,36 @@ Vec3 applied_after_release(bool again) {
 TEST(HapticLoop, AForceThatComesWithTheReleaseOfItsSourceIsNotFresh) {
   EXPECT_EQ(applied_after_release(false), Vec3(0, 0, 0)) << "held for a moment, faded, stopped";
   EXPECT_EQ(applied_after_release(true), Vec3(0, 0, 0)) << "and not valid for another 500 ms";
+}
+
+// The pose was sent by an engine that no longer holds the channel.
+TEST(HapticLoop, APoseOfAnotherEngineDoesNotMoveAField) {
+  field::Field ball;
+  ball.primitives.push_back({.shape = field::Sphere{.centre = Vec3(0.03, 0, 0), .radius = 0.02}});
+  for (const std::uint32_t source : {1U, 2U}) {
+    Handle device;
+    HapticLoop::Config config;
+    config.control.limiter = {.law = Law::kAol, .friction = {0.3, 0.8}, .longest_hold = milliseconds(1)};
+    config.control.limiter.shared_account = true;
+    config.control.max_force = 8;
+    config.control.hold.field = field::Renderer::Config{.push = {.push_j = 0.1, .push_w = 1}};
+    const auto mail = std::make_unique<Mailboxes>(Mailboxes::Capacities{.steps = 16, .flight = 2, .fields = true});
+    HapticLoop loop(config, device, *mail);
+    LocalTime now(std::chrono::seconds(1));
+    FieldBox& box = mail->fields->front();
+    box.use.put({.use = {.field = &ball, .generation = 3, .source = 2}, .number = 1});
+    box.pose.put({.pose = {.at = now, .pose = {.position = Vec3(-0.02, 0, 0)}}, .source = source});
+    double depth = 0;
+    for (int i = 0; i < 500; ++i) {
+      now = loop.step(now);
+      const StepRecord& step = *mail->steps.front();
+      ASSERT_TRUE(step.field);
+      depth = std::max(depth, step.field->depth);
+      mail->steps.pop();
+    }
+    EXPECT_EQ(box.taken, 1U);
+    EXPECT_EQ(depth > 1e-3, source == 2) << depth;
+  }
 }
 
 }  // namespace

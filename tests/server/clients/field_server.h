@@ -109,12 +109,14 @@ class FieldServer : public Servers {
   double loss_ = 0;
   double duplicates_ = 0;
   std::function<void(const StepRecord&)> watch_;  ///< of the first device
+  std::function<void()> after_haptics_;           ///< between the haptic and the network loops
   StepRecord last_;
   double least_energy_ = 0;
 
  private:
   void step() {
     for (auto& group : assembly_->haptic_groups()) group.turn(now_);
+    if (after_haptics_) after_haptics_();
     for (std::size_t i = 0; i < assembly_->networks(); ++i) assembly_->turn_network(i, now_);
     if (records_) assembly_->log().turn(now_, 0);
     for (std::size_t i = 0; i < assembly_->devices().size() && !records_; ++i) {

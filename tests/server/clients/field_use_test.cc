@@ -264,12 +264,12 @@ TEST_F(FieldUse, AFieldStopsAlsoIfTheReleaseOfItsEngineIsLost) {
   EXPECT_EQ(answer_to(one->use(newest(one), 1), one).code, Code::kOk);
   run(milliseconds(100), {&one});
   ASSERT_TRUE(last_.field);
-  const std::uint32_t id = one->ask(GiveLease{});
-  run(milliseconds(10), {&one}, [&] {  // the release does not fit into the queue
-    while (one->answer(id) == nullptr && mail().orders.try_push({.kind = HapticOrder::Kind::kDisengage})) {
+  after_haptics_ = [&] {  // the release does not fit into the queue
+    while (mail().orders.try_push({.kind = HapticOrder::Kind::kDisengage})) {
     }
-  });
-  EXPECT_EQ(one->answer(id)->code, Code::kOk);
+  };
+  EXPECT_EQ(answer_to(one->ask(GiveLease{}), one).code, Code::kOk);
+  after_haptics_ = {};
   run(milliseconds(20), {&one});
   EXPECT_FALSE(last_.field);
 }
