@@ -116,7 +116,7 @@ std::string text_of(const char* format, auto... values) {
   return text.data();
 }
 
-/// A line for each variant of each scene, with a column for each network.
+/// Prints a line for each variant of each scene. There is a column for each network.
 void print(const std::vector<FieldRow>& rows, std::size_t networks, std::ostream& out) {
   out << "rms error, % of the true force, and (largest jump, N/ms)\nscene    method            ";
   for (std::size_t i = 0; i < networks; ++i) out << text_of("%15.15s", rows[i].network.c_str());
@@ -160,7 +160,8 @@ void draw(const std::vector<FieldRow>& rows, const FieldOptions& options, std::o
     panels.back().curves.push_back(curve);
   }
   const std::string figures = "mean of n = " + std::to_string(options.hands) + " hands from seed " +
-                              std::to_string(options.seed) + "; engine at 60 Hz, 5 % of its answers lost";
+                              std::to_string(options.seed) +
+                              "; the engine runs at 60 Hz, and the network drops 5 % of its datagrams";
   for (const auto& file : draw_panels(*options.out / "field", "A remote object as forces, as a plane, and as a field",
                                       figures, panels, options.command)) {
     out << "picture: " << file.string() << '\n';
@@ -259,7 +260,7 @@ void draw_far_field(const FieldOptions& options, std::ostream& out) {
                            .milliseconds = options.milliseconds};
         const FieldRun run = run_field(of, truth);
         const double error = 100 * run.error;
-        panel.curves.push_back(curve(text_of("%d ms: error %.*f %%", ms, error < 10 ? 1 : 0, error),
+        panel.curves.push_back(curve(text_of("%d ms: %.*f %%", ms, error < 10 ? 1 : 0, error),
                                      ms == 600 ? kVermilion : kSky, Curve::Style::kLine, run.force));
       }
       panels.push_back(std::move(panel));
@@ -267,10 +268,9 @@ void draw_far_field(const FieldOptions& options, std::ostream& out) {
     for (std::size_t i = panels.size() - kColumns.size(); i < panels.size(); ++i) panels[i].y_range = range;
   }
   std::filesystem::create_directories(*options.out);
-  const std::string figures =
-      "One hand (seed " + std::to_string(options.seed) +
-      "), an engine at 60 Hz, and a network that loses 5 % of its answers. Error: rms, relative "
-      "to the force without a network.";
+  const std::string figures = "One hand (seed " + std::to_string(options.seed) +
+                              "). The engine runs at 60 Hz, and the network drops 5 % of its datagrams. The "
+                              "numbers are the rms error in percent of the rms of the true force.";
   for (const auto& file :
        draw_panels(*options.out / "far", "Round trips of 200 and 600 ms to the object that is touched", figures, panels,
                    options.command, {}, static_cast<int>(kColumns.size()))) {

@@ -16,8 +16,8 @@ struct FieldOptions {
   int hands = 5;                                        ///< per row, 1 … 1000
   std::uint64_t seed = 1;                               ///< of the first hand
   std::vector<std::string> scenes{};                    ///< names; empty: all
-  std::vector<int> round_trips_ms = {0, 50, 200, 600};  ///< constant, with a loss of 5 % of the answers
-  std::vector<std::string> networks{};                  ///< names of the injector, in place of the round trips
+  std::vector<int> round_trips_ms = {0, 50, 200, 600};  ///< constant, and 5 % of the datagrams of the engine are lost
+  std::vector<std::string> networks{};                  ///< named networks that are used instead of the round trips
   double count_um = 0;                                  ///< of the encoders; 0: exact
   int milliseconds = 6000;                              ///< of each run, above 500
   bool far = false;                                     ///< only the picture of far_field
@@ -26,7 +26,7 @@ struct FieldOptions {
   bool json = false;
 };
 
-/// The mean of the hands, or their largest jump and least energy.
+/// The mean over all hands, or the maximum of the jumps and the minimum of the energies.
 struct FieldRow {
   const FieldScene* scene = nullptr;
   FieldMethod method = FieldMethod::kHeld;
@@ -39,10 +39,10 @@ struct FieldRow {
 /// Throws std::invalid_argument if a scene, a network or a number is not known.
 std::vector<FieldRow> field_rows(const FieldOptions& options);
 
-/// Error of held forces, planes and fields over the round trip.
+/// Prints a table of the errors of all methods, and writes the files to `out`.
 void field_experiment(const FieldOptions& options, std::ostream& out);
 
-/// Draws the forces of one hand on the sphere and in the slot at round trips of 200 and 600 ms: far.svg, far.png.
+/// Draws far.svg and far.png, which show the forces on one hand at round trips of 200 and 600 ms.
 void draw_far_field(const FieldOptions& options, std::ostream& out);
 
 }  // namespace tendon::lab

@@ -13,7 +13,7 @@ namespace {
 
 using std::chrono::milliseconds;
 
-constexpr double kFrom = 0.5;           // s: errors before are of the first contact
+constexpr double kFrom = 0.5;           // s, because the error is large at the first contact
 constexpr double kLate = 3;             // s
 constexpr double kMaxForce = 8.5;       // N
 constexpr double kMaxStiffness = 2000;  // N/m
@@ -37,7 +37,7 @@ HapticController::Config field_control(const FieldCase& of) {
 
 FieldAnswer FieldEngine::answer(double now, const FieldState& state) {
   constexpr int kRounds = 60;
-  // A field is compared with the true force at the time of the state.
+  // The truth must be the force at the time of the state, because the field is compared with it in this step.
   const double then = of_.method == FieldMethod::kLearned ? state.sampled : now;
   FieldAnswer answer{.force = contact_.force(of_.scene->pose_at(then), state.hand, 1 / kFieldEngineHz, kRounds)};
   ForceTable table{.first = contact_.gap(), .step = 1e-3, .size = ForceTable::kMaxEntries};

@@ -20,14 +20,14 @@ inline bool has_field(const FieldCase& of) { return of.method >= FieldMethod::kF
 
 HapticController::Config field_control(const FieldCase& of);
 
-/// The position of the hand that the engine knows. Times are in s from the start of the motion.
+/// A state that the engine has received. Time 0 is the start of the motion.
 struct FieldState {
   std::uint64_t tick = 0;  ///< 1 is the first step
   double sampled = 0;      ///< s
   Vec3 hand = Vec3::Zero();
 };
 
-/// The answer of the engine to a state, in all its forms.
+/// The data that the engine computes for a state.
 struct FieldAnswer {
   Vec3 force = Vec3::Zero();  ///< N
   LocalModel model{};
@@ -47,15 +47,14 @@ class FieldEngine {
   TrueContact contact_;
 };
 
-/// Compares the forces with the true ones.
+/// Compares the forces with the true forces, and computes the energy account.
 class FieldScore {
  public:
   FieldScore(const FieldCase& of, const std::vector<Vec3>& truth) : of_(of), truth_(truth) {}
 
-  /// Books the energy. Must be called once for each ms, with the true position of the hand and the force that is held
-  /// from now on.
+  /// Must be called once per ms, with the true position of the hand and the force that is applied until the next call.
   void book(const Vec3& hand, const Vec3& force, const std::optional<FieldStep>& field);
-  /// Instead of `book`, from the start of the motion on.
+  /// Must be called instead of `book` after the start of the motion.
   void add(const Vec3& hand, const Vec3& force, const std::optional<FieldStep>& field);
   FieldRun result() const;
 

@@ -25,7 +25,8 @@ Vec3 counted(const Vec3& x, double count) {
   return (x / count).array().round().matrix() * count;
 }
 
-/// A handle in a hand. It rests until 1 s before `begin`, away from an object whose first pose may not be there yet.
+/// A simulated handle and a hand. If the object moves, the hand is not near it until 1 s before `begin`, because the
+/// first pose may not have arrived.
 class BodyDevice final : public Device {
  public:
   explicit BodyDevice(const FieldCase& of) : of_(of), hand_(field_hand(of.seed)) {

@@ -12,12 +12,12 @@
 
 namespace tendon::lab {
 
-/// What a remote engine sends at 60 Hz.
+/// The data that the engine sends. The names are those of FIELDS.md.
 enum class FieldMethod : std::uint8_t {
-  kHeld,     ///< a force; limiter `aol`
-  kPlane,    ///< a force with its plane, tangential stiffness and a table over depth; limiter `feel`
-  kField,    ///< nothing, after the field of 1 mm; limiter `feel`
-  kLearned,  ///< true forces, from which the field learns; limiter `feel`
+  kHeld,     ///< the force. The limiter is `aol`
+  kPlane,    ///< the force, the plane of the contact, the stiffness and a table. The limiter is `feel`
+  kField,    ///< a field with a spacing of 1 mm. The limiter is `feel`
+  kLearned,  ///< the same, and true forces. The limiter is `feel`
 };
 std::string_view to_string(FieldMethod method);
 
@@ -26,21 +26,21 @@ struct FieldCase {
   FieldMethod method = FieldMethod::kField;
   std::string network = "delay=0ms";  ///< of the injector, both ways
   double loss = 0.05;                 ///< of the answers, in addition
-  std::uint64_t seed = 1;             ///< of the hand and the network
+  std::uint64_t seed = 1;             ///< used for the hand and the network
   int milliseconds = 6000;
   double count = 0;                  ///< m, of the encoders; 0: exact
   field::EnergyGate::Config push{};  ///< the tank
-  bool ahead = true;                 ///< poses are sent for the time of their arrival, and not as they are
+  bool ahead = true;                 ///< if true, each pose is the one at the time when it arrives
 };
 
 struct FieldRun {
-  double error = 0;           ///< rms error of the force relative to the rms of the true force, from 0.5 s on
-  double late_error = 0;      ///< the same, from 3 s on
-  double jump = 0;            ///< N in 1 ms, the largest from 0.5 s on
+  double error = 0;           ///< rms error divided by the rms of the true force, starting at 0.5 s
+  double late_error = 0;      ///< the same, starting at 3 s
+  double jump = 0;            ///< N, the maximum change in 1 ms, starting at 0.5 s
   double true_jump = 0;       ///< N in 1 ms
-  double least_energy = 0;    ///< J, minimum of the true account with the energy of the tank
-  double bound = 0;           ///< share of the steps in which the gate refuses energy
-  double tank = 0;            ///< J, given by the tank
+  double least_energy = 0;    ///< J, the minimum of the true account, including the energy of the tank
+  double bound = 0;           ///< fraction of the steps in which the gate refuses energy
+  double tank = 0;            ///< J, the energy that is taken from the tank
   std::vector<Vec3> force{};  ///< N, at each ms
 };
 

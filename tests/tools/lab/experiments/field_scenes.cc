@@ -15,7 +15,7 @@ namespace {
 double wave(double hertz, double t) { return std::sin(2 * std::numbers::pi * hertz * t); }
 double cosine(double hertz, double t) { return std::cos(2 * std::numbers::pi * hertz * t); }
 
-/// From 0 at `begin` to 1 at `end`, without a jump of the speed.
+/// Returns 0 until `begin` and 1 after `end`. The speed does not jump.
 double eased(double begin, double end, double t) {
   const double share = std::clamp((t - begin) / (end - begin), 0.0, 1.0);
   return share * share * (3 - 2 * share);
@@ -93,8 +93,8 @@ FieldScene liver() {
   return scene;
 }
 
-/// Around a cube of 40 mm, across its edges and corners, 8 mm below its faces (outside), or from inside of a cube into
-/// its edges and corners.
+/// A cube of 40 mm. The hand moves around it and across its edges. If `inside` is true, the hand is in a cubic hole and
+/// moves along the edges and into the corners.
 FieldScene cube(bool inside) {
   FieldScene scene{.name = inside ? "corner" : "edge",
                    .low = Vec3::Constant(-0.03),
@@ -118,7 +118,7 @@ FieldScene cube(bool inside) {
   return scene;
 }
 
-/// A box that moves 40 mm down at 0.2 m/s and back every 2.4 s, and turns. The hand presses on it from above.
+/// A box that moves down by 40 mm and back every 2.4 s, at 0.2 m/s. It also rotates. The hand presses on it from above.
 FieldScene moving() {
   FieldScene scene{
       .name = "moving", .low = {-0.034, -0.034, -0.014}, .high = {0.034, 0.034, 0.014}, .truth = {.friction = 0.2}};

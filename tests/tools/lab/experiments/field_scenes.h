@@ -15,7 +15,7 @@
 
 namespace tendon::lab {
 
-/// The true answer of a surface at the depth d, with a dent z that relaxes with `tau`:
+/// The true force of a surface at the depth d. The dent z relaxes with the time constant `tau`:
 ///     F = k₁ d + k₂ d² + k_m (d − z)          N, at least 0
 struct TrueMaterial {
   double stiffness = 1000;  ///< k₁, N/m
@@ -28,7 +28,7 @@ struct TrueMaterial {
   double rest(double dent) const;  ///< m, where the force is 0
 };
 
-/// A hand: how strong it is, how far and how fast it moves.
+/// The parameters of a hand and its motion.
 struct FieldHand {
   double amplitude = 1;
   double pace = 1;
@@ -38,7 +38,7 @@ struct FieldHand {
 /// Spring 300 N/m, damper 3 N·s/m and mass 50 g, each ± 30 %; amplitude and pace ± 15 %.
 FieldHand field_hand(std::uint64_t seed);
 
-/// An object that is touched, and the motion of the hand.
+/// An object, its material, and the motion of the hand.
 struct FieldScene {
   std::string name;
   field::Field exact{};  ///< of primitives
@@ -56,13 +56,14 @@ struct FieldScene {
 /// wall, sphere, bowl, slot, liver, edge, corner, moving
 const std::vector<FieldScene>& field_scenes();
 
-/// The true contact of a hand with a scene. A point p without mass is pulled by the hand x, and pushed by the surface i
-/// of the scene with q_i, in units of its displacement: p = x + Σ q_i. For each surface, with the normal n, and p₀ the p
-/// of the previous call:
+/// Computes the true force on a hand. A point p without mass is pulled by the hand x, and pushed by the surface i
+/// of the scene with q_i, in units of its displacement: p = x + Σ q_i. For each surface, with the normal n, and p₀ the
+/// p of the previous call:
 ///     q·n ≥ 0, φ(p) ≥ 0, and one of them is 0                      no penetration
 ///     ‖q_t‖ ≤ μ q·n, and q_t is against p − p₀ or keeps it at 0     Coulomb friction
-/// solved by projection, one surface after the other. In an edge of two surfaces, both rub. The force is U′(‖p − x‖) along
-/// p − x. Source: Alart and Curnier, Computer Methods in Applied Mechanics and Engineering 92(3), 1991.
+/// solved by projection, one surface after the other. If the point is in an edge, it is in contact with two surfaces,
+/// and there is friction at both. The force is U′(‖p − x‖) along p − x. Source: Alart and Curnier, Computer Methods in
+/// Applied Mechanics and Engineering 92(3), 1991.
 class TrueContact {
  public:
   explicit TrueContact(const FieldScene& scene) : scene_(scene) {}
@@ -85,7 +86,7 @@ class TrueContact {
   Vec3 normal_ = Vec3::UnitZ();
 };
 
-/// The forces (N, at each ms) on the hand without delay, sampling and limiter: 20 kHz.
+/// Returns the force (N) on the hand for each ms. It is computed at 20 kHz, without a network and without a limiter.
 std::vector<Vec3> true_forces(const FieldScene& scene, FieldHand hand, int milliseconds);
 
 }  // namespace tendon::lab
