@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 import random
 import struct
+from itertools import product
 from types import SimpleNamespace
 
 import pytest
@@ -76,7 +77,7 @@ def test_turned_triangles_are_counted():
 def test_copies_and_points_of_triangles_do_not_matter():
     points, faces = cube()
     a, b, c = faces[3]
-    again = Field.from_triangles(points + [points[0]], [*faces, (b, c, a), (a, a, b), (0, 8, 1)], 2)
+    again = Field.from_triangles(points + [points[0]], [*faces, (b, c, a), (a, a, b), (0, 8, 1), (a, a, a)], 2)
     assert again.describe() == Field.from_triangles(points, faces, 2).describe()
 
 
@@ -106,6 +107,20 @@ def test_a_mesh_inside_out_is_the_same_solid():
     points, faces = cube()
     turned = [(a, c, b) for a, b, c in faces]
     assert Field.from_triangles(points, turned, 2).describe() == Field.from_triangles(points, faces, 2).describe()
+
+
+def test_each_node_near_the_surface_is_in_a_brick():
+    """The surface begins and ends beside a brick of 16 mm."""
+    points, faces = cube(0.014, (0.016, 0.016, 0.016))
+    field, box = Field.from_triangles(points, faces, 2), Box((0.016, 0.016, 0.016), (0.014, 0.014, 0.014))
+    weights = Received(field).weights
+    origin = [round(at / 0.002) for at in field.lattice.origin]
+    near = 0
+    for node in product(range(-3, 20), repeat=3):
+        if abs(box.distance(tuple(0.002 * at for at in node))) < 2.499 * 0.002:
+            near += 1
+            assert tuple(at - first for at, first in zip(node, origin)) in weights, node
+    assert near > 3000
 
 
 def test_a_changed_mesh_keeps_the_bricks_that_are_far_from_the_change():
@@ -241,7 +256,7 @@ def test_a_material_is_that_of_the_bricks_whose_centres_are_in_its_region():
     field = Field.from_function(Plane().distance, (0, 0, -0.008), (0.032, 0.008, 0.008), 1)
     field.material("steel", stiffness=1500, friction=0.3)
     field.material("pad", stiffness=300, relax_s=0.2, region=Box((0.02, 0, 0), (0.01, 0.01, 0.01)))
-    field.material("dot", stiffness=700, relax_s=1, branch=50, region=Sphere((0.0195, 0.0035, 0.0035), 0.001))
+    field.material("dot", stiffness=700, relax_s=1, branch=50, region=Sphere((0.0195, 0.0035, 0.0035), 0.0005))
     told = field.describe()
     assert [(one.stiffness, one.branch_stiffness, one.relaxation, one.friction) for one in told.materials] == [
         (1500, 0, 0, 0.3),

@@ -13,7 +13,8 @@ from world import MS, SECOND, Weather, World
 
 from tendon import Code, DeviceState, Field, FieldState, Mode, Phase, Sphere, Touch
 from tendon.field import Brick, Lattice
-from tendon.messages import FieldStatus
+from tendon.messages import FieldPose, FieldStatus
+from tendon.session import Session
 from tendon.upload import BrickPace, FieldSender, Motion
 
 FAR = Weather(95 * MS, 10 * MS, loss=0.05, duplicate=0.05)
@@ -224,7 +225,31 @@ def test_a_busy_server_is_asked_again():
     stage.client.fields.use(random_field(3, 5).describe())
     assert stage.run_until(lambda: stage.rendered)
     assert [use.generation for use in stage.uses] == [1, 2, 3]
-    assert all(b - a >= 200 * MS for a, b in zip(stage.used_at, stage.used_at[1:])), "a round trip and 50 ms"
+    assert all(b - a >= 250 * MS for a, b in zip(stage.used_at, stage.used_at[1:])), "a round trip and 50 ms"
+
+
+def test_bricks_that_are_missing_at_the_use_are_sent_again():
+    field, store = random_field(3, 6), {}
+    stage = FieldStage(store, CALM)
+    stage.refusals = [(Code.INVALID, "brick 0a1b2c3d… is missing")]
+    stage.client.fields.use(field.describe())
+    assert stage.run_until(lambda: stage.uses)
+    del store[field.bricks[1].hash]
+    assert stage.run_until(lambda: stage.client.fields.refused)
+    assert stage.run_until(lambda: stage.rendered == 2, 3 * SECOND)
+    assert (stage.bricks, stage.client.fields.refused) == (4, "")
+
+
+def test_a_refusal_of_the_previous_field_does_not_stop_the_next_one():
+    stage = FieldStage({}, CALM)
+    assert stage.run_until(lambda: stage.seen)
+    stage.refused_parts = (Code.INVALID, "too many bricks")
+    stage.client.fields.use(random_field(3, 7).describe())
+    stage.run(150 * MS)
+    stage.refused_parts = None
+    stage.client.fields.use(random_field(3, 8).describe())
+    assert stage.run_until(lambda: stage.rendered or stage.client.fields.refused, 3 * SECOND)
+    assert stage.client.fields.refused == ""
 
 
 def test_a_field_is_used_again_after_the_lease_was_lost():
@@ -248,6 +273,22 @@ def test_an_old_server_is_told_to_the_user():
 
 
 # ---- Poses and truths ----
+
+
+def test_an_older_pose_or_status_is_counted_and_dropped():
+    client, server = Session(1, 0), Session(1, 0)
+    datagrams = []
+    for sequence in (1, 2):
+        zero = (0.0, 0.0, 0.0)
+        client.send(FieldPose(0, 0, sequence, 0, (0.1 * sequence, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), zero, zero))
+        client.send(FieldStatus(bytes(32), bytes([sequence])))
+        datagrams.append(client.next_datagram(sequence))
+    for datagram in reversed(datagrams):
+        server.receive(3, datagram)
+    arrived = [event for event in iter(server.next_event, None)]
+    assert [event.position[0] for event in arrived if isinstance(event, FieldPose)] == [0.2]
+    assert [event.missing for event in arrived if isinstance(event, FieldStatus)] == [b"\2"]
+    assert server.stats.stale == 2
 
 
 def test_poses_are_for_the_clock_of_the_server_and_at_most_250_per_second():

@@ -2,7 +2,6 @@
 #include "tests/protocol/field/field_vectors.h"
 
 #include <span>
-#include <stdexcept>
 #include <variant>
 
 #include "core/field/field.h"
@@ -24,26 +23,6 @@ Vec3 centre_of(const Primitive& primitive) {
   if (const auto* box = std::get_if<Box>(&primitive.shape)) return box->centre;
   const auto& capsule = std::get<Capsule>(primitive.shape);
   return (capsule.from + capsule.to) / 2;
-}
-
-/// Returns the places that field::sample() fills, in its order.
-std::vector<BrickField::Place> places_of(const Case& one, BrickField::Lattice& lattice) {
-  BrickField field;
-  const auto distance = [&](const Vec3& x) { return field::distance(one.sampled.front(), x).distance; };
-  field::sample(distance, one.low, one.high, one.spacing, field);
-  lattice = field.lattice();
-  std::vector<BrickField::Place> places;
-  for (std::uint16_t k = 0; k < lattice.bricks[2]; ++k) {
-    for (std::uint16_t j = 0; j < lattice.bricks[1]; ++j) {
-      for (std::uint16_t i = 0; i < lattice.bricks[0]; ++i) {
-        const Vec3 middle = lattice.origin + lattice.spacing * (8 * Vec3(i, j, k) + Vec3::Constant(3.5));
-        const field::SurfacePoint point = field.at(middle);
-        if (point.gradient != Vec3::Zero()) places.push_back({i, j, k});
-      }
-    }
-  }
-  if (places.size() != field.bricks()) throw std::logic_error(one.name + ": a brick has no gradient at its centre");
-  return places;
 }
 
 }  // namespace
@@ -101,13 +80,14 @@ Encoded encoded(const Case& one) {
   std::vector<PlacedBrick> bricks;
   if (!one.sampled.empty()) {
     const auto distance = [&](const Vec3& x) { return field::distance(one.sampled.front(), x).distance; };
-    for (const BrickField::Place& place : places_of(one, lattice)) {
-      const auto& weights = out.bricks.emplace_back(field::weights_of(distance, lattice, place));
-      const Vec3 centre =
-          lattice.origin + lattice.spacing * (8 * Vec3(place[0], place[1], place[2]) + Vec3::Constant(3.5));
+    const field::SampledField field = field::sampled(distance, one.low, one.high, one.spacing);
+    lattice = field.lattice;
+    for (const auto& [place, weights] : field.bricks) {
+      const Vec3 middle(8 * Vec3(place[0], place[1], place[2]) + Vec3::Constant(3.5));
       bricks.push_back({.place = {place[0], place[1], place[2]},
-                        .material = material_at(centre),
+                        .material = material_at(lattice.origin + lattice.spacing * middle),
                         .hash = crypto::blake2b_128(std::as_bytes(std::span(weights)))});
+      out.bricks.push_back(weights);
     }
   }
   std::vector<Primitive> primitives = one.primitives;
