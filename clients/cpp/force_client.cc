@@ -148,7 +148,7 @@ bool ForceClient::use(Field field) {
 
 bool ForceClient::pose(LocalTime at, const ObjectPose& pose) {
   const auto clock = server_clock();
-  if (!clock || upload_.progress().generation == 0) return false;
+  if (!clock || !welcome_ || !agreed_to(kFeatureFields) || !holds()) return false;
   connection_.session()->send(FieldPose{.device = lease_.place().device,
                                         .channel = lease_.place().channel,
                                         .sequence = ++poses_,

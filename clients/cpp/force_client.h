@@ -192,7 +192,8 @@ class ForceClient {
   bool use(Field field);
   void stop_using() noexcept { upload_.drop(); }  ///< a field
   /// Moves the object of the field. `at` is the time of the pose, which should be half a round trip after now, on the
-  /// local clock. Returns false if no field is in use, or before the first round trip.
+  /// local clock. If poses are sent before the field is in use, the object does not first appear at the origin. Returns
+  /// false without the server's kFeatureFields, unless `holds()`, or before the first round trip.
   bool pose(LocalTime at, const ObjectPose& pose);
   const FieldUpload::Progress& field() const noexcept { return upload_.progress(); }
 

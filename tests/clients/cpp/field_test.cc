@@ -111,6 +111,15 @@ TEST_F(FieldClient, APoseIsOnTheClockOfTheServerAndCounted) {
   EXPECT_EQ(poses[1].sequence, 2U);
 }
 
+TEST_F(FieldClient, APoseIsSentBeforeItsFieldIsInUse) {
+  world_.run(seconds(1));
+  EXPECT_EQ(client().field().generation, 0U);
+  EXPECT_TRUE(client().pose(world_.now, {.position = {0.1, 0, 0}}));
+  world_.run(milliseconds(20));
+  ASSERT_EQ(world_.z->poses.size(), 1U);
+  EXPECT_EQ(world_.z->poses[0].position, Vec3(0.1, 0, 0));
+}
+
 TEST_F(FieldClient, AnotherFieldReplacesTheFirstWhichIsDroppedAfterwards) {
   client().use(ball());
   world_.run(seconds(1));
