@@ -240,7 +240,7 @@ Outcome FieldIntake::drop(LocalTime /*now*/, const ServedClient& client, const D
   }
   for (auto& channels : channels_) {
     for (const auto& channel : channels) {
-      if (channel && channel->source == client.id() && channel->name == wanted.field) channel->slots.stop(client.id());
+      if (channel && channel->source == client.id() && channel->name == wanted.field) channel->slots.stop();
     }
   }
   return {};

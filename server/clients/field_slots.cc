@@ -40,10 +40,12 @@ void FieldSlots::use(field::Field field, const std::optional<FieldName>& bricks,
   slot.use = {.field = &slot.field, .generation = generation, .source = source};
 }
 
-void FieldSlots::stop(std::uint32_t source) {
+void FieldSlots::stop() {
+  waiting_ = nullptr;
+  if (posted_ == nullptr || posted_->use.field == nullptr) return;
   Slot& slot = prepare();
   slot.shape = nullptr;
-  slot.use = {.field = nullptr, .generation = 0, .source = source};
+  slot.use = {.field = nullptr, .generation = 0, .source = posted_->use.source};
 }
 
 void FieldSlots::move(const ArrivedPose& pose) {
@@ -55,7 +57,7 @@ void FieldSlots::turn(std::uint32_t holder) {
   if (box_.taken.load(std::memory_order_acquire) != number_) return;
   if (waiting_ != nullptr && waiting_->use.source != holder) waiting_ = nullptr;
   if (waiting_ == nullptr && posted_ != nullptr && posted_->use.field != nullptr && posted_->use.source != holder) {
-    stop(posted_->use.source);
+    stop();
   }
   if (waiting_ == nullptr) return;
   const Slot& next = *std::exchange(waiting_, nullptr);

@@ -32,7 +32,7 @@ class FieldSlots {
   /// name `bricks`, unless they are in a slot already. If `bricks` is empty, the field has none.
   void use(field::Field field, const std::optional<FieldName>& bricks, const Fill& fill, std::uint32_t generation,
            std::uint32_t source);
-  void stop(std::uint32_t source);  ///< the channel no longer uses a field
+  void stop();  ///< the channel no longer uses a field
 
   /// Passes on a pose. It is repeated with the next field of the source, which may arrive later.
   void move(const ArrivedPose& pose);

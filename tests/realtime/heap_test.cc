@@ -164,7 +164,7 @@ TEST(HapticLoop, WithFieldsMakesNoHeapCall) {
       slots.move({.pose = {.at = now, .pose = {.position = Vec3(1e-6 * static_cast<double>(n % 999), 0, 0)}},
                   .source = source});
     if (step_of(1999)) mail->orders.try_push({.kind = HapticOrder::Kind::kRelease, .source = source});
-    if (step_of(1499)) slots.stop(source);
+    if (step_of(1499)) slots.stop();
     slots.turn(source);
     if (step_of(10)) {
       RemoteForce truth;
