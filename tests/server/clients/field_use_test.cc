@@ -200,6 +200,34 @@ TEST_F(FieldUse, TwoEnginesShareBricksNotQuotas) {
   EXPECT_GE(least_energy_, -1e-9);
 }
 
+TEST_F(FieldUse, LargeFieldsAreNotBuiltTooOften) {
+  start({scene_of(kStir + kTwoChannels)});
+  FieldEngine::Config both = claiming("liver");
+  both.hello.claims.push_back({.device = "left", .channel = "peg", .role = Role::kController});
+  const Engine one = engine("127.0.0.1:4000", both);
+  for (std::uint8_t first = 1; first <= 3; ++first) ASSERT_TRUE(upload(one, big(first)));
+  std::vector<std::uint32_t> asked;
+  for (const std::uint32_t channel : {0U, 1U}) {
+    for (std::uint32_t i = 0; i < 3; ++i) {
+      asked.push_back(one->use(one->uploads[i].field(), i + 1, {{.stiffness = 100}}, channel));
+    }
+  }
+  run(milliseconds(10), {&one});
+  int busy = 0;
+  for (const std::uint32_t id : asked) {
+    const auto* const answer = one->answer(id);
+    ASSERT_NE(answer, nullptr);
+    if (answer->code == Code::kOk) continue;
+    ++busy;
+    EXPECT_EQ(answer->code, Code::kBusy);
+    EXPECT_NE(answer->detail.find("expected at most 10000 new bricks per second"), std::string::npos);
+  }
+  EXPECT_GT(busy, 0);
+  EXPECT_LT(busy, 4) << "there is a slot for each of three";
+  run(milliseconds(300), {&one});
+  EXPECT_EQ(answer_to(one->use(one->uploads[2].field(), 4, {{.stiffness = 100}}, 1), one).code, Code::kOk);
+}
+
 TEST_F(FieldUse, ADroppedFieldStopsAndItsForceFades) {
   start({scene_of(kStir)});
   const Engine one = engine("127.0.0.1:4000");
