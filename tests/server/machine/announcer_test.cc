@@ -135,6 +135,7 @@ TEST_F(Announcing, ABusThatComesLateIsFound) {
 
 TEST_F(Announcing, OneAddressIsToldByItsProtocolAndAllAddressesByBoth) {
   for (const auto& [listen, protocol] : {std::pair("[2001:db8::7]:5", 1), std::pair("[::]:5", -1)}) {  // no device
+    ASSERT_TRUE(soon([&] { return avahi.announced().empty(); })) << "of the server before";
     Running running({{"falcon", kFalcon}}, listen);
     ASSERT_TRUE(soon([&] { return avahi.announced().size() == 1; }));
     EXPECT_EQ(avahi.announced().front().protocol, protocol);
