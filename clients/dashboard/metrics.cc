@@ -109,6 +109,15 @@ void add_devices(Exposition& out, const Board& board) {
   newest([&](const Label& label, const DeviceState& state) { out.add({label}, state.energy); });
   out.begin("tendon_device_force_age_seconds", MetricType::Gauge, "Time since the rendered force arrived.");
   newest([&](const Label& label, const DeviceState& state) { out.add({label}, seconds(state.force_age)); });
+  out.begin("tendon_device_field_generation", MetricType::Gauge, "Generation of the rendered field.");
+  newest([&](const Label& label, const DeviceState& state) {
+    if (state.field) out.add({label}, std::uint64_t{state.field->generation});
+  });
+  out.begin("tendon_device_field_depth_meters", MetricType::Gauge,
+            "Distance from the proxy on the rendered field to the hand.");
+  newest([&](const Label& label, const DeviceState& state) {
+    if (state.field) out.add({label}, state.field->depth);
+  });
   out.begin("tendon_device_mode", MetricType::Gauge, "1 for the current mode of the force, 0 for the others.");
   newest([&](const Label& label, const DeviceState& state) {
     for (const Mode mode : kModes) out.add({label, {"mode", name(mode)}}, state.mode == mode ? 1.0 : 0.0);

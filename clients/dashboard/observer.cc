@@ -49,7 +49,7 @@ void Observer::greet(LocalTime now) {
   hello.role = Role::kObserver;
   hello.name = config_.name;
   hello.features = {std::string(kFeatureChannels), std::string(kFeatureDiagnostics), std::string(kFeatureHandle),
-                    std::string(kFeatureTeleoperation)};
+                    std::string(kFeatureTeleoperation), std::string(kFeatureFields)};
   claims_ = counted_ && names_.size() > 1;
   if (claims_) {
     for (const auto& [number, name] : names_) hello.claims.push_back({name, "", Role::kObserver});

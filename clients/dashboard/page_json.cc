@@ -186,6 +186,16 @@ void add_handle(Json& json, std::span<const DeviceState> states) {
   }
 }
 
+/// Adds the rendered field, if any state has one.
+void add_field(Json& json, std::span<const DeviceState> states) {
+  if (std::ranges::none_of(states, [](const DeviceState& s) { return s.field.has_value(); })) return;
+  json["field"] = column(states, [](const DeviceState& s) { return s.field ? Json(s.field->generation) : Json(); });
+  json["field_depth_m"] =
+      column(states, [](const DeviceState& s) { return plotted(s.field ? s.field->depth : kUntold); });
+  json["field_proxy_m"] =
+      columns(states, [](const DeviceState& s) { return s.field ? s.field->proxy : Vec3::Constant(kUntold).eval(); });
+}
+
 Json in_json(const PortFrame& port) {
   const auto plain = [](const Vec3& v) -> Json { return {plotted(v.x()), plotted(v.y()), plotted(v.z())}; };
   const bool has_tank = port.need > 0;
@@ -258,6 +268,7 @@ std::string states_json(std::uint32_t device, std::span<const DeviceState> state
       {"force_age_ms", column(states, [](const DeviceState& s) { return plotted(milliseconds(s.force_age)); })}};
   add_stiffness(json, states);
   add_handle(json, states);
+  add_field(json, states);
   return text_of(json);
 }
 

@@ -22,6 +22,9 @@ export const kDevices = [
   { name: "old", model: "point", handle: null, workspace_m: null },
 ];
 
+/** The fifth device, which renders a field. */
+export const kTouching = { name: "touching", model: "falcon", handle: handle({}), workspace_m: kBox };
+
 export const serverMessage = (devices = kDevices) => ({
   type: "server", address: "127.0.0.1:47100", contact: "open", words: "connected to 127.0.0.1:47100, tendond", version: "tendond", recordings: true, arms: false, press: null,
   devices: devices.map((device, number) => ({ number, loop_hz: 1000, max_force_n: 8, channels: [], arming_objection: "This page is read-only.", ...device })),
@@ -39,6 +42,14 @@ function stateOf(number, t) {
       orientation: turn(0, 1, 0, 0.6 + 0.3 * sway(1.1)), torque_nm: [0, 0.1 * sway(1.1), 0.16], grip_rad: 0.45 + 0.3 * sway(2.2), grip_n: 2.5, buttons: sway(0.8) > 0 ? 1 : 0 };
   }
   if (number === 2) return { ...plain, position_m: [0.03 * sway(2), 0.035 * sway(1.2), 0.03 * sway(2.6)], applied_n: [3 * sway(2), 0, 1], wanted_n: [4 * sway(2), 0, 1], stiffness_n_per_m: [0, 0, 0, 0, 0, 0, 0, 0, 500], buttons: 4 };
+  if (number === 4) {
+    // It presses on a sphere of 800 N/m, whose field is replaced after 5 s.
+    const [depth, height] = [Math.max(0.004 * sway(2.5), 0), 0.03];
+    const [a, b] = [0.5 * sway(0.8), Math.sqrt(1 - (0.5 * sway(0.8)) ** 2)];
+    const at = (radius) => [a * radius, b * radius - 0.02, 0];
+    const force = [a, b, 0].map((v) => 800 * depth * v);
+    return { ...plain, position_m: at(height - depth + Math.max(-0.006 * sway(2.5), 0)), applied_n: force, wanted_n: force, field: t < 5 ? 3 : 4, field_depth_m: depth, field_proxy_m: at(height + Math.max(-0.006 * sway(2.5), 0)) };
+  }
   return { ...plain, position_m: [0.03 * sway(1.4), 0.03 * sway(2.9), 0.02], applied_n: [0, 0, 0], wanted_n: [0, 0, 0] };
 }
 
@@ -56,6 +67,7 @@ export function statesMessage(number, from, to, every = 1) {
   if (states[0]?.stiffness_n_per_m) message.stiffness_n_per_m = columns("stiffness_n_per_m", 9);
   if (states[0]?.orientation) Object.assign(message, { orientation: columns("orientation", 4), torque_nm: columns("torque_nm", 3) });
   if (states[0]?.grip_rad !== null && states[0]) Object.assign(message, { grip_rad: states.map((s) => s.grip_rad), grip_n: states.map((s) => s.grip_n) });
+  if (states[0]?.field) Object.assign(message, { field: states.map((s) => s.field), field_depth_m: states.map((s) => s.field_depth_m), field_proxy_m: columns("field_proxy_m", 3) });
   if (states.some((s) => s.buttons)) message.buttons = states.map((s) => s.buttons);
   return message;
 }

@@ -47,6 +47,7 @@ inline Board full_board() {
   state.force_applied = Vec3(0, 0, 2);
   state.permitted_force = 2.5;
   state.energy = 0.125;
+  state.field = FieldState{.generation = 3, .depth = 0.0015, .proxy = Vec3(0, -0.4985, 0)};
   state.mode = Mode::kHolding;
   state.reasons = Reasons(Reason::kEnergy).bits();
   board.observe(state);

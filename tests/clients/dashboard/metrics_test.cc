@@ -28,6 +28,8 @@ TEST(DashMetrics, ExportWhatIsOnTheBoard) {
           R"(tendon_device_force_applied_newtons{device="left"} 2)",
           R"(tendon_device_force_permitted_newtons{device="left"} 2.5)",
           R"(tendon_device_energy_joules{device="left"} 0.125)",
+          R"(tendon_device_field_generation{device="left"} 3)",
+          R"(tendon_device_field_depth_meters{device="left"} 0.0015)",
           R"(tendon_device_mode{device="left",mode="holding"} 1)",
           R"(tendon_device_mode{device="left",mode="active"} 0)",
           R"(tendon_device_states_total{device="left"} 1)",

@@ -80,6 +80,17 @@ TEST(PageJson, TellsTheHandleInColumnsWhereAStateHoldsIt) {
   }
 }
 
+TEST(PageJson, TellsTheFieldInColumnsWhereAStateHoldsOne) {
+  DeviceState touching;
+  touching.field = FieldState{.generation = 3, .depth = 0.0015, .proxy = Vec3(0.25, -0.5, 0.125)};
+  json text = json::parse(states_json(0, std::vector{DeviceState{}, touching}));
+  EXPECT_EQ(text["field"], (json{nullptr, 3}));
+  EXPECT_EQ(text["field_depth_m"], (json{nullptr, 0.0015}));
+  EXPECT_EQ(text["field_proxy_m"], (json{{nullptr, 0.25}, {nullptr, -0.5}, {nullptr, 0.125}}));
+  text = json::parse(states_json(0, std::vector{DeviceState{}}));
+  for (const char* name : {"field", "field_depth_m", "field_proxy_m"}) EXPECT_FALSE(text.contains(name)) << name;
+}
+
 TEST(PageJson, TellsWhatTheHandleIs) {
   Board board;
   board.described(DeviceDescription{.device = 0, .name = "left"});

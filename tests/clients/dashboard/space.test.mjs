@@ -5,7 +5,7 @@ import { mkdirSync, readFileSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
 import { it } from "node:test";
 import { says, visit } from "./browser.mjs";
-import { fakeFeed, kDevices, kTurnedFrame } from "./fake_feed.mjs";
+import { fakeFeed, kDevices, kTouching, kTurnedFrame } from "./fake_feed.mjs";
 import { kRoot, packageOf, Program, scratch, startDash, startServer, until } from "./support.mjs";
 
 /** Imports modules of the page that do not need a browser, transpiled to JavaScript. */
@@ -72,7 +72,7 @@ it("draws what a state holds and nothing else", async (test) => {
   assert.equal(poseAt(track, 4999).orientation, undefined);
   assert.equal(poseAt(track, 5000), undefined, "there is no such step");
   track.clear();
-  assert.equal(track.handle("qw"), undefined);
+  assert.equal(track.column("qw").length, 0);
 });
 
 it("finds the surface that an engine's stiffness and force speak of", async (test) => {
@@ -177,6 +177,21 @@ it("shows four devices in 3-D, and goes back to the plots", async (test) => {
   await page.reload();
   await page.locator(kCanvas).waitFor();
   assert.equal(await page.locator("#space").getAttribute("aria-pressed"), "true", "the choice is kept");
+});
+
+it("shows the field that a device renders: the proxy, the depth, and another field", async (test) => {
+  const { url } = await startDash(test, "127.0.0.1:9");
+  const page = await visit(test, url, { viewport: { width: 1280, height: 960 }, before: (made) => fakeFeed(made, { devices: [...kDevices, kTouching] }) });
+  await page.locator("#device option").nth(4).waitFor({ state: "attached" });
+  assert.equal(await page.locator(".field-panel").isVisible(), false, "the stylus renders no field");
+  assert.equal(await page.locator("[data-chart=depth]").isVisible(), false);
+  await page.selectOption("#device", "4");
+  await page.locator("[data-chart=depth]").waitFor();
+  await until("the hand is deep", async () => /^the hand is \d+(\.\d+)? mm below the proxy$/.test(await page.locator(".field-panel svg").getAttribute("aria-label")));
+  await says(page, ".field-panel td", "4"); // the generation
+  await page.click("#space");
+  await until("the proxy is drawn", async () => /touching: a point.*, a proxy/.test((await words(page)) ?? ""), () => words(page));
+  assert.match(await page.locator(".handle", { hasText: "touching" }).locator(".values").textContent(), /proxy/);
 });
 
 it("is turned by a mouse and keys, and on a phone leaves scrolling alone", async (test) => {

@@ -304,10 +304,10 @@ function push(track: Track, message: StatesMessage, i: number, t: number): void 
   });
 }
 
-/** Returns undefined if the batch contains no data of the handle. */
+/** Returns undefined if the batch contains no data of the handle or a field. */
 function handleOf(message: StatesMessage, i: number): HandleSample | undefined {
-  const { orientation, torque_nm: torque, hand_force_n: hand, grip_rad: grip, grip_n: gripForce, buttons, stiffness_n_per_m: stiffness } = message;
-  if (!orientation && !torque && !hand && !grip && !gripForce && !buttons && !stiffness) return undefined;
+  const { orientation, torque_nm: torque, hand_force_n: hand, grip_rad: grip, grip_n: gripForce, buttons, stiffness_n_per_m: stiffness, field, field_depth_m: depth, field_proxy_m: proxy } = message;
+  if (!orientation && !torque && !hand && !grip && !gripForce && !buttons && !stiffness && !field) return undefined;
   const into = noHandle();
   const number = (value: number | null | undefined): number => value ?? NaN;
   if (orientation) [into.qw, into.qx, into.qy, into.qz] = orientation.map((column) => number(column[i])) as [number, number, number, number];
@@ -316,6 +316,9 @@ function handleOf(message: StatesMessage, i: number): HandleSample | undefined {
   if (grip) into.grip = number(grip[i]);
   if (gripForce) into.gripForce = number(gripForce[i]);
   if (buttons) into.buttons = buttons[i]!;
+  if (field) into.field = number(field[i]);
+  if (depth) into.depth = number(depth[i]);
+  if (proxy) [into.px, into.py, into.pz] = proxy.map((column) => number(column[i])) as [number, number, number];
   const contact = stiffness && contactOf(stiffness.map((column) => number(column[i])), message.wanted_n.map((column) => number(column[i])) as [number, number, number]);
   if (contact) {
     [into.nx, into.ny, into.nz] = contact.normal;

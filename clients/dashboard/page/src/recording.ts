@@ -215,6 +215,12 @@ const kGrip: Readonly<Record<string, PartReader>> = {
   force_applied_n: (reader, into) => (into.gripForce = reader.double()),
 };
 
+const kField: Readonly<Record<string, PartReader>> = {
+  generation: (reader, into) => (into.field = reader.uint32()),
+  depth_m: (reader, into) => (into.depth = reader.double()),
+  proxy_m: (reader, into) => readNumbers(reader, ["px", "py", "pz"], into),
+};
+
 function stepDecoder(types: FileDescriptorSet & Message, step: string): (data: Uint8Array) => Sample {
   const fields = fieldsOf(types, step);
   const beside = (name: string): string => step.replace(/[^.]*$/, name);
@@ -254,6 +260,13 @@ function stepDecoder(types: FileDescriptorSet & Message, step: string): (data: U
       // Zeros are not encoded, so a closed gripper has no opening field.
       handle(s).grip = handle(s).gripForce = 0;
       grip(reader, handle(s));
+    });
+  }
+  if (fields.has("field")) {
+    const field = partDecoder(fieldsOf(types, beside("Field")), kField);
+    read("field", (reader, s) => {
+      handle(s).depth = 0; // not encoded without contact
+      field(reader, handle(s));
     });
   }
   read("hand_force_n", (reader, s) => readNumbers(reader, ["hx", "hy", "hz"], handle(s)));

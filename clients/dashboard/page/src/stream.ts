@@ -63,7 +63,7 @@ export interface StatesMessage {
   readonly reasons: readonly number[];
   readonly mode: readonly number[];
   readonly force_age_ms: readonly number[];
-  // Absent if no state has them: the stiffness of the engines, row-major, and the handle.
+  // Absent if no state has them: the stiffness of the engines, row-major, the handle, and the rendered field.
   readonly stiffness_n_per_m?: readonly Numbers[];
   readonly orientation?: readonly [Numbers, Numbers, Numbers, Numbers];
   readonly torque_nm?: Triple;
@@ -71,6 +71,10 @@ export interface StatesMessage {
   readonly grip_rad?: Numbers;
   readonly grip_n?: Numbers;
   readonly buttons?: readonly number[];
+  /** The generation. */
+  readonly field?: Numbers;
+  readonly field_depth_m?: Numbers;
+  readonly field_proxy_m?: Triple;
 }
 export interface Delays {
   readonly median: number;

@@ -21,10 +21,11 @@ export interface Sample {
   /** What the handle has beyond a point; undefined where it has nothing. */ handle?: HandleSample;
 }
 
-const kHandleColumns = ["qw", "qx", "qy", "qz", "tx", "ty", "tz", "hx", "hy", "hz", "grip", "gripForce", "buttons", "nx", "ny", "nz", "gap"] as const;
+const kHandleColumns = ["qw", "qx", "qy", "qz", "tx", "ty", "tz", "hx", "hy", "hz", "grip", "gripForce", "buttons", "nx", "ny", "nz", "gap", "field", "depth", "px", "py", "pz"] as const;
 /**
  * q…: orientation of the handle in the base frame; t…: N·m, applied; h…: N, force of the hand; grip: rad; gripForce:
- * N; buttons: bits; n… and gap: the contact surface of the engine (see contactOf).
+ * N; buttons: bits; n… and gap: the contact surface of the engine (see contactOf); field: the generation of the
+ * rendered field; depth: m, from the proxy p… to the hand.
  */
 export type HandleColumn = (typeof kHandleColumns)[number];
 export type HandleSample = Record<HandleColumn, number>;
@@ -35,7 +36,8 @@ const kNoHandle = Object.freeze(Object.fromEntries(kHandleColumns.map((name) => 
 
 const kColumns = ["x", "y", "z", "wx", "wy", "wz", "ax", "ay", "az", "permitted", "energy", "age", "late", "wanted", "applied"] as const;
 /** A column of numbers. `wanted` and `applied` are norms. */
-export type Column = (typeof kColumns)[number];
+export type Column = (typeof kColumns)[number] | HandleColumn;
+const kNothing = new Float32Array();
 
 /** Input of a plot: columns, with rows sorted by time. */
 export interface Plotted<C extends string> {
@@ -53,15 +55,17 @@ export class Track implements Plotted<Column> {
   t = new Float64Array(4096);
   reasons = new Uint32Array(4096);
   mode = new Uint8Array(4096);
-  readonly #columns: Record<Column, Float32Array>;
-  /** This is only created if a step has such values. */
+  readonly #columns: Record<(typeof kColumns)[number], Float32Array>;
+  /** These are only created if a step has such values. */
   #handle: Record<HandleColumn, Float32Array> | undefined;
+  /** True if a step had a field. */
+  hasField = false;
   /** Indices of the first kept step and of the end. */
   begin = 0;
   end = 0;
 
   constructor(readonly limit = Infinity) {
-    this.#columns = Object.fromEntries(kColumns.map((name) => [name, new Float32Array(4096)])) as Record<Column, Float32Array>;
+    this.#columns = Object.fromEntries(kColumns.map((name) => [name, new Float32Array(4096)])) as Record<(typeof kColumns)[number], Float32Array>;
   }
 
   get length(): number {
@@ -73,12 +77,9 @@ export class Track implements Plotted<Column> {
   get last(): number {
     return this.length > 0 ? this.t[this.end - 1]! : 0;
   }
+  /** Returns an empty array for a quantity of the handle or field that no step has. */
   column(name: Column): Float32Array {
-    return this.#columns[name];
-  }
-
-  handle(name: HandleColumn): Float32Array | undefined {
-    return this.#handle?.[name];
+    return (this.#columns as Partial<Record<Column, Float32Array>>)[name] ?? this.#handle?.[name as HandleColumn] ?? kNothing;
   }
 
   push(s: Sample): void {
@@ -104,12 +105,14 @@ export class Track implements Plotted<Column> {
     this.reasons[i] = s.reasons;
     this.mode[i] = s.mode;
     if (s.handle || this.#handle) this.#pushHandle(i, s.handle ?? kNoHandle);
+    this.hasField ||= s.handle !== undefined && s.handle.field > 0;
     if (this.length > this.limit) ++this.begin;
   }
 
   clear(): void {
     this.begin = this.end = 0;
     this.#handle = undefined;
+    this.hasField = false;
   }
 
   at(time: number): number {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 import { Chart, type ChartEvents, type ChartSpec } from "./chart.js";
 import { h, mark, say } from "./dom.js";
+import { FieldPanel } from "./field.js";
 import { Histogram } from "./histogram.js";
 import { Lanes } from "./lanes.js";
 import { inSpace } from "./space/choice.js";
@@ -37,6 +38,10 @@ export const kCharts: readonly ChartSpec[] = [
     id: "energy", title: "Energy put in and not given back", unit: "mJ", scale: 1e3, positive: true, ownScale: true, least: 1,
     lines: [{ column: "energy", name: "energy", colour: "energy", width: 2, fill: "energy-fill" }],
   },
+  {
+    id: "depth", title: "Depth in the field", unit: "mm", scale: 1e3, positive: true, least: 0.5,
+    lines: [{ column: "depth", name: "from the proxy to the hand", colour: "second", width: 2 }],
+  },
 ];
 
 /** Additional data of a view: reports of a live server, or values computed from a recording. */
@@ -64,6 +69,7 @@ export class View {
   readonly element: HTMLElement;
   readonly #charts: Chart[];
   readonly #space: SpacePanel;
+  readonly #field = new FieldPanel();
   readonly #lanes = new Lanes();
   readonly #histogram = new Histogram();
   readonly #engines = h("div", { class: "engines" });
@@ -73,6 +79,7 @@ export class View {
   };
   readonly #alert = h("div", { class: "alert", role: "status", hidden: true });
   #cards = "";
+  #hasField = false;
 
   constructor(events: ChartEvents) {
     this.#charts = kCharts.map((spec) => new Chart(spec, events));
@@ -82,23 +89,26 @@ export class View {
       h("div", { class: "tiles" }, ...Object.values(this.#tiles).map((t) => t.element)), this.#alert,
       h("div", { class: "columns" },
         h("div", { class: "charts" }, ...this.#charts.map((chart) => chart.element)),
-        h("div", { class: "side" }, this.#lanes.element, engines, this.#histogram.element)));
+        h("div", { class: "side" }, this.#field.element, this.#lanes.element, engines, this.#histogram.element)));
   }
 
   /** Shows [from, to]. Tiles and legends show the values at `cursor`. `instant` describes that time; empty: now. */
   draw(track: Track, from: number, to: number, cursor: number, instant: string, facts: Facts): void {
+    this.#hasField = track.hasField;
+    this.space();
     for (const chart of this.#charts) chart.draw(track, from, to, cursor);
+    this.#field.draw(track, from, to, cursor);
     this.#lanes.draw(track, from, to);
     this.#histogram.draw(facts.lateness.buckets, facts.lateness.what, facts.lateness.more);
     this.#drawTiles(track, cursor, instant, facts);
     this.#drawEngines(facts);
   }
 
-  /** Returns whether the 3-D view is visible and needs `drawSpace` for each frame. Only the force plot is then shown.
+  /** Returns whether the 3-D view is visible and needs `drawSpace` for each frame. Only the force plot is then shown. The plot of the depth is hidden if there is no field.
    */
   space(): boolean {
     const shown = inSpace() && !this.#space.missing;
-    for (const chart of this.#charts) chart.element.hidden = shown && chart.spec.id !== "force";
+    for (const { element, spec: { id } } of this.#charts) element.hidden = (shown && id !== "force") || (id === "depth" && !this.#hasField);
     if (!inSpace()) this.#space.hide();
     return shown;
   }

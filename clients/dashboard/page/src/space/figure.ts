@@ -45,6 +45,8 @@ export interface Pose {
   readonly gripForce?: number | undefined;
   readonly buttons: number;
   readonly contact?: Contact | undefined;
+  /** Of the rendered field, with the depth of the hand in m. */
+  readonly proxy?: { readonly at: Vec; readonly depth: number } | undefined;
 }
 
 /** A flat surface. `gap`: m, distance of the tool along the normal; negative inside. */
@@ -59,11 +61,12 @@ export function poseAt(track: Track, i: number): Pose | undefined {
   const base = (name: Parameters<Track["column"]>[0]): number => track.column(name)[i]!;
   const position = vec(base("x"), base("y"), base("z"));
   if (i < track.begin || i >= track.end || !position) return undefined;
-  const held = (name: Parameters<Track["handle"]>[0]): number => track.handle(name)?.[i] ?? NaN;
+  const held = (name: Parameters<Track["column"]>[0]): number => track.column(name)[i] ?? NaN;
   const number = (value: number): number | undefined => (Number.isFinite(value) ? value : undefined);
   const q: Quat = [held("qw"), held("qx"), held("qy"), held("qz")];
   const normal = vec(held("nx"), held("ny"), held("nz"));
   const gap = number(held("gap"));
+  const [proxy, depth] = [vec(held("px"), held("py"), held("pz")), number(held("depth"))];
   return {
     position,
     orientation: q.every(Number.isFinite) ? q : undefined,
@@ -75,6 +78,7 @@ export function poseAt(track: Track, i: number): Pose | undefined {
     gripForce: number(held("gripForce")),
     buttons: number(held("buttons")) ?? 0,
     contact: normal && gap !== undefined ? { normal, gap } : undefined,
+    proxy: proxy && depth !== undefined ? { at: proxy, depth } : undefined,
   };
 }
 
@@ -94,6 +98,7 @@ export interface Figure {
   readonly buttons: readonly { readonly name: string; readonly held: boolean }[];
   /** The point of the surface closest to the handle, and its normal. */
   readonly plane: { readonly at: Vec; readonly normal: Vec; readonly gap: number } | undefined;
+  readonly proxy: { readonly at: Vec; readonly depth: number } | undefined;
 }
 
 /** Without a `handle` or its frame, x is right, y up and z to the user. */
@@ -120,6 +125,7 @@ export function figureOf(pose: Pose, handle: HandleInfo | null | undefined): Fig
       normal,
       gap: pose.contact!.gap,
     },
+    proxy: pose.proxy && { at: rotated(frame, pose.proxy.at), depth: pose.proxy.depth },
   };
 }
 
@@ -192,6 +198,7 @@ export function wordsOf(figure: Figure): string {
   if (some(figure.hand, kLeastForce)) parts.push("the hand's force");
   if (figure.opening !== undefined) parts.push("two fingers");
   if (figure.plane) parts.push("a surface");
+  if (figure.proxy) parts.push("a proxy");
   for (const button of figure.buttons) if (button.held) parts.push(`${button.name} held`);
   return parts.join(", ");
 }

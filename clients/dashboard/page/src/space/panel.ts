@@ -44,7 +44,7 @@ export class SpacePanel {
     this.#seek = h("div", { class: "seek", hidden: true }, this.#play, this.#slider, this.#when);
     this.element = h("figure", { class: "chart spatial", "data-chart": "space", hidden: true },
       h("figcaption", {}, h("span", { class: "title" }, "In space"), h("span", { class: "legend" },
-        key("applied", "applied force"), key("wanted", "wanted force", true), h("span", { text: "1 cm for 1 N" }), key("torque", "torque"), key("energy", "surface"))),
+        key("applied", "applied force"), key("wanted", "wanted force", true), h("span", { text: "1 cm for 1 N" }), key("torque", "torque"), key("energy", "surface"), key("second", "proxy"))),
       this.#said, h("div", { class: "stage" }, this.#canvas), this.#seek, this.#rows);
   }
 
@@ -187,6 +187,7 @@ function valuesOf(figure: Figure): string {
   if (figure.gripForce !== undefined) parts.push(`grip ${fixed(figure.gripForce, 2)} N`);
   if (figure.hand) parts.push(`hand ${fixed(size(figure.hand), 2)} N`);
   if (figure.plane) parts.push(figure.plane.gap < 0 ? `${digits(-1e3 * figure.plane.gap, 2)} mm in the surface` : `${digits(1e3 * figure.plane.gap, 2)} mm above it`);
+  if (figure.proxy) parts.push(figure.proxy.depth > 0 ? `${digits(1e3 * figure.proxy.depth, 2)} mm below the proxy` : "at the proxy");
   return parts.join(" · ");
 }
 

@@ -174,6 +174,13 @@ class Path {
   }
 }
 
+function span(line: Line, from: Vec, to: Vec): void {
+  const ends = line.geometry.getAttribute("position");
+  ends.setXYZ(0, ...from);
+  ends.setXYZ(1, ...to);
+  ends.needsUpdate = true;
+}
+
 /** All moving parts of one device, in the operator frame with the origin of the device. */
 export class Prop {
   readonly object = new Group();
@@ -189,9 +196,11 @@ export class Prop {
   readonly #ring: Ring;
   readonly #plane = new Group();
   readonly #gap: Line;
+  readonly #proxy: Mesh;
+  readonly #depth: Line;
   readonly #path: Path;
   readonly #materials: Record<"body" | "tip" | "applied" | "wanted" | "torque" | "hand" | "off" | "on" | "finger", MeshLambertMaterial>;
-  readonly #flat: Record<"plane" | "rim" | "path", MeshBasicMaterial>;
+  readonly #flat: Record<"plane" | "rim" | "path" | "proxy", MeshBasicMaterial>;
   readonly #line = new LineBasicMaterial();
 
   /** `triad` creates three axes of the given length. */
@@ -199,7 +208,7 @@ export class Prop {
     const lit = (): MeshLambertMaterial => new MeshLambertMaterial();
     this.#materials = { body: lit(), tip: lit(), applied: lit(), wanted: lit(), torque: lit(), hand: lit(), off: lit(), on: lit(), finger: lit() };
     const see = (opacity: number): MeshBasicMaterial => new MeshBasicMaterial({ transparent: true, opacity, side: DoubleSide, depthWrite: false });
-    this.#flat = { plane: see(0.28), rim: see(0.9), path: see(0.85) };
+    this.#flat = { plane: see(0.28), rim: see(0.9), path: see(0.85), proxy: see(0.55) };
     this.#flat.path.vertexColors = true;
     const m = this.#materials;
     const tip = new Mesh(shapes.tip, m.tip);
@@ -216,8 +225,11 @@ export class Prop {
     this.#plane.add(new Mesh(shapes.disc, this.#flat.plane), new Mesh(shapes.rim, this.#flat.rim));
     this.#gap = new Line(new BufferGeometry().setAttribute("position", new BufferAttribute(new Float32Array(6), 3)), this.#line);
     this.#gap.frustumCulled = false;
+    this.#proxy = new Mesh(shapes.ball, this.#flat.proxy);
+    this.#depth = this.#gap.clone();
+    this.#depth.geometry = this.#gap.geometry.clone();
     this.#path = new Path(this.#flat.path);
-    this.object.add(this.#tool, this.#force.object, this.#wanted.object, this.#hand.object, this.#ring.object, this.#plane, this.#gap, this.#path.object);
+    this.object.add(this.#tool, this.#force.object, this.#wanted.object, this.#hand.object, this.#ring.object, this.#plane, this.#gap, this.#proxy, this.#depth, this.#path.object);
   }
 
   paint(colour: Paint, watched: boolean): void {
@@ -235,6 +247,7 @@ export class Prop {
     this.#flat.plane.color.copy(colour("energy"));
     this.#flat.rim.color.copy(colour("energy"));
     this.#flat.path.color.copy(colour("applied"));
+    this.#flat.proxy.color.copy(colour("second"));
     this.#line.color.copy(colour("text"));
   }
 
@@ -262,6 +275,11 @@ export class Prop {
     this.#ring.object.position.copy(this.#tool.position);
     this.#ring.show(figure.torque, mostTorque);
     this.#showPlane(figure);
+    this.#proxy.visible = this.#depth.visible = figure.proxy !== undefined;
+    if (figure.proxy) {
+      this.#proxy.position.fromArray(figure.proxy.at);
+      span(this.#depth, figure.position, figure.proxy.at);
+    }
     this.#path.show(path, points, eye, width);
   }
 
@@ -283,15 +301,13 @@ export class Prop {
     if (!plane) return;
     this.#plane.position.fromArray(plane.at);
     this.#plane.quaternion.setFromUnitVectors(kAhead, scratch.to.fromArray(plane.normal));
-    const ends = this.#gap.geometry.getAttribute("position");
-    ends.setXYZ(0, ...position);
-    ends.setXYZ(1, ...plane.at);
-    ends.needsUpdate = true;
+    span(this.#gap, position, plane.at);
   }
 
   dispose(): void {
     for (const material of [...Object.values(this.#materials), ...Object.values(this.#flat), this.#line]) material.dispose();
     this.#gap.geometry.dispose();
+    this.#depth.geometry.dispose();
     this.#ring.dispose();
     this.#path.dispose();
   }
