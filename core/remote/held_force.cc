@@ -120,7 +120,8 @@ void HeldForce::disengage() noexcept {
 }
 
 HeldForce::Wanted HeldForce::beside_field(const Motion& hand) noexcept {
-  Wanted result{.mode = Mode::kActive};
+  Wanted result;
+  result.mode = Mode::kActive;
   const Duration since_engaged = std::max(Duration::zero(), hand.at - engaged_);
   if (since_engaged < ramp_) {
     const double rest = 1 - seconds(since_engaged) / seconds(ramp_);

@@ -179,7 +179,7 @@ it("shows four devices in 3-D, and goes back to the plots", async (test) => {
   assert.equal(await page.locator("#space").getAttribute("aria-pressed"), "true", "the choice is kept");
 });
 
-it("shows the field that a device renders: the proxy, the depth, and another field", async (test) => {
+it("shows the field that a device renders, and its depth", async (test) => {
   const { url } = await startDash(test, "127.0.0.1:9");
   const page = await visit(test, url, { viewport: { width: 1280, height: 960 }, before: (made) => fakeFeed(made, { devices: [...kDevices, kTouching] }) });
   await page.locator("#device option").nth(4).waitFor({ state: "attached" });
