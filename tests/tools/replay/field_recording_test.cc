@@ -14,6 +14,8 @@
 #include "server/recording/recording_reader.h"
 #include "tests/server/clients/field_server.h"
 #include "tests/server/scratch_folder.h"
+#include "tests/tools/lab/recordings/field_summary.h"
+#include "tests/tools/lab/recordings/report.h"
 #include "tests/tools/replay/replay.h"
 
 namespace tendon::replay::field_recording_test {
@@ -101,6 +103,42 @@ TEST_F(FieldRecording, IsRenderedAgainToTheLastBitOverThreeParts) {
   const Options options{.recording = parts()[0], .more_parts = {parts()[1], parts()[2]}, .fields = true};
   EXPECT_TRUE(replay(options, out)) << out.str();
   EXPECT_NE(out.str().find(" steps are identical"), std::string::npos) << out.str();
+}
+
+lab::FieldSummary summary_of(const std::filesystem::path& part) {
+  lab::FieldObserver observer;
+  RecordingReader reader(part);
+  while (const auto record = reader.next()) {
+    if (const auto* const step = std::get_if<StepRecord>(&*record)) observer.observe(*step);
+  }
+  return observer.summary().value_or(lab::FieldSummary{});
+}
+
+TEST_F(FieldRecording, IsSummarizedByTheReport) {
+  live();
+  std::uint64_t with_field = 0;
+  std::uint64_t touched = 0;
+  RecordingReader reader(parts()[0]);
+  while (const auto record = reader.next()) {
+    const auto* const step = std::get_if<StepRecord>(&*record);
+    if (step == nullptr || !step->field) continue;
+    ++with_field;
+    touched += step->field->depth > 0 ? 1 : 0;
+  }
+  const lab::FieldSummary fields = summary_of(parts()[0]);
+  EXPECT_EQ(fields.steps, with_field);
+  EXPECT_EQ(fields.contact_steps, touched);
+  EXPECT_EQ(fields.used, 2U) << "the third use is in the second part";
+  EXPECT_EQ(fields.swaps, 1U);
+  EXPECT_GT(fields.swap_slew.value_or(0), 1) << "the hand touches the field within 200 ms after the swap";
+  EXPECT_LT(fields.swap_slew.value_or(0), 200);
+  EXPECT_GT(fields.largest_stored, 1e-4);
+  EXPECT_GE(fields.least_account, 0);
+  EXPECT_EQ(summary_of(parts()[1]).swaps, 1U);
+
+  std::ostringstream table;
+  lab::report({.recordings = {parts()[0]}}, table);
+  EXPECT_NE(table.str().find("\nFields\n  fields used "), std::string::npos) << table.str();
 }
 
 TEST_F(FieldRecording, AnotherPoseOrBrickIsNoticed) {

@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <cstdio>
 #include <functional>
+#include <iterator>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -72,7 +73,7 @@ std::string kept(const Run& run) {
 
 std::string felt(const RunSummary& run) {
   if (!run.stable) return "not stable";
-  if (!run.pushed) return "no contact";
+  if (!run.pushed) return run.fields && run.fields->contact_steps > 0 ? "only fields" : "no contact";
   if (!run.operational_stiffness) return "not measurable";
   return digits(*run.operational_stiffness, "%.0f N/m");
 }
@@ -101,6 +102,31 @@ struct Row {
   std::string name;
   Cell cell;  ///< empty for a heading
 };
+
+std::vector<Row> field_rows() {
+  const auto row = [](std::string name, std::string (*cell)(const FieldSummary&)) {
+    return Row{"  " + std::move(name),
+               [cell](const Run& run) { return run.summary.fields ? cell(*run.summary.fields) : "no fields"; }};
+  };
+  return {
+      {"Fields", {}},
+      row("fields used", [](const FieldSummary& fields) { return count(fields.used); }),
+      row("swaps while a field is in use", [](const FieldSummary& fields) { return count(fields.swaps); }),
+      row("fastest force change after a swap",
+          [](const FieldSummary& fields) {
+            return fields.swap_slew ? digits(*fields.swap_slew * 1e-3, "%.3f N/ms") : "no swap";
+          }),
+      row("steps in contact", [](const FieldSummary& fields) { return percent(fields.share_in_contact()); }),
+      row("steps with energy refused by the gate",
+          [](const FieldSummary& fields) { return percent(fields.share_refused()); }),
+      row("refused energy, sum over the steps",
+          [](const FieldSummary& fields) { return with_unit(fields.refused, "J"); }),
+      row("energy credited by the tank", [](const FieldSummary& fields) { return with_unit(fields.credit, "J"); }),
+      row("largest stored energy H", [](const FieldSummary& fields) { return with_unit(fields.largest_stored, "J"); }),
+      row("least account E with a field",
+          [](const FieldSummary& fields) { return with_unit(fields.least_account, "J"); }),
+  };
+}
 
 std::vector<Row> rows(std::span<const Run> runs) {
   std::vector<Row> rows = {
@@ -142,6 +168,9 @@ std::vector<Row> rows(std::span<const Run> runs) {
     if (std::ranges::none_of(runs, occurs)) continue;
     rows.push_back({std::string("  ") + name.meaning,
                     [&name](const Run& run) { return percent(run.summary.share_limited(name.reason)); }});
+  }
+  if (std::ranges::any_of(runs, [](const Run& run) { return run.summary.fields.has_value(); })) {
+    std::ranges::move(field_rows(), std::back_inserter(rows));
   }
   rows.insert(
       rows.end(),
@@ -193,6 +222,15 @@ std::string notes(std::span<const Run> runs) {
     note(
         "         A longer hold can give out (T_act − T)(‖F‖ − f_c)²/(4b), which is included in the energy given out.");
   }
+  if (some([](const Run& run) { return run.summary.fields.has_value(); })) {
+    note("fields: percentages are of the steps with a field, and after a swap means within 200 ms.");
+  }
+  if (some([](const Run& run) { return run.summary.fields && run.summary.fields->refused_steps > 0; })) {
+    note("refused energy: a field can request it again in the next step, so the sum can count it several times.");
+  }
+  if (some([](const Run& run) { return felt(run.summary) == "only fields"; })) {
+    note("only fields: a felt stiffness is only computed from the forces of an engine.");
+  }
   for (const Run& run : runs) {
     if (&run != &*std::ranges::find(runs, run.recording, &Run::recording)) continue;  // once per recording
     if (run.truncated)
@@ -214,6 +252,21 @@ std::optional<double> p50_ms(const std::optional<Spread>& times) {
 }
 std::optional<double> p99_ms(const std::optional<Spread>& times) {
   return times ? std::optional(ms(times->p99)) : std::nullopt;
+}
+
+JsonLine field_json(const FieldSummary& fields) {
+  JsonLine json;
+  json.add("steps", fields.steps)
+      .add("used", fields.used)
+      .add("swaps", fields.swaps)
+      .add("swap_force_change_n_per_ms", fields.swap_slew ? std::optional(*fields.swap_slew * 1e-3) : std::nullopt)
+      .add("contact_percent", fields.share_in_contact() * 100)
+      .add("refused_steps", fields.refused_steps)
+      .add("refused_j", fields.refused)
+      .add("tank_j", fields.credit)
+      .add("largest_stored_j", fields.largest_stored)
+      .add("least_account_j", fields.least_account);
+  return json;
 }
 
 }  // namespace
@@ -304,6 +357,7 @@ std::string to_json(const Run& run) {
       .add("overruns", s.overruns)
       .add("watchdogs", s.watchdogs)
       .add("longest_interval_ms", ms(s.longest_interval));
+  if (s.fields) json.add("fields", field_json(*s.fields));
   return json.str();
 }
 

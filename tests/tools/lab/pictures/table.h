@@ -32,7 +32,8 @@ std::string padded(const std::string& text, std::size_t to);
 /// UTF-8, with a row per quantity, followed by notes.
 std::string to_table(std::span<const Run> runs);
 
-/// One line without line end. Each key ends with the unit. Values that are not known are null.
+/// One line without line end. Each key ends with the unit. Values that are not known are null. The key `fields` is
+/// only written if the recording contains fields.
 std::string to_json(const Run& run);
 
 }  // namespace tendon::lab

@@ -64,6 +64,7 @@ void RunObserver::observe(const StepRecord& step) {
   observe_torque(step);
   if (!step.reasons.has(Reason::kUnseen)) observe_motion(step);
   observe_force(step);
+  fields_.observe(step);
 }
 
 void RunObserver::Ledger::observe(double energy_now, bool beyond_bound) noexcept {
@@ -279,6 +280,7 @@ RunSummary RunObserver::summary() const {
   summary.round_trip = spread(round_trips_);
   if (summary.forces > 1 && last_force_ > first_force_)
     summary.forces_per_s = static_cast<double>(summary.forces - 1) / seconds(last_force_ - first_force_);
+  summary.fields = fields_.summary();
   return summary;
 }
 

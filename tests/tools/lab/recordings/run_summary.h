@@ -19,6 +19,7 @@
 #include "server/recording/records.h"
 #include "tests/tools/lab/experiments/thinned.h"
 #include "tests/tools/lab/recordings/contact.h"
+#include "tests/tools/lab/recordings/field_summary.h"
 
 namespace tendon::lab {
 
@@ -88,6 +89,8 @@ struct RunSummary {
   bool sealed = false;               ///< some datagrams were sealed; they have no round trip here
   std::uint64_t forces = 0;          ///< remote forces that were used
   std::optional<double> forces_per_s;  ///< in the time from the first force to the last force
+
+  std::optional<FieldSummary> fields;  ///< empty: no step has a field
 };
 
 /// Computes the summary of a run from its steps in one pass and bounded memory.
@@ -222,6 +225,8 @@ class RunObserver {
   Thinned<Push> asked_{kMostSamples};
   Thinned<FeltStep> felt_{kMostSamples};
   Thinned<Duration> loop_ages_{kMostSamples};
+
+  FieldObserver fields_;
 
   DataReader reader_;
   std::map<std::uint32_t, Sent> sent_;  ///< by connection
