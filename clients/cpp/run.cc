@@ -45,13 +45,18 @@ class RunningClient {
         who_(options.client.name + (device.empty() ? "" : " at " + device)),
         transport_(options.server, options.client.key.has_value()),
         client_(options.busy ? static_cast<Link&>(busy_) : transport_, transport_.server(), config(options, device),
-                std::move(callback), start) {}
+                marking(std::move(callback)), start) {
+    if (options.field) client_.use(*options.field);
+  }
   RunningClient(const RunningClient&) = delete;
   RunningClient& operator=(const RunningClient&) = delete;
 
   /// Performs the work due at `now` and prints changes. Returns the time of the next turn; empty: stopped permanently.
   std::optional<LocalTime> turn(LocalTime now);
-  void answer(LocalTime now, const Reply& reply) { client_.answer(now, reply); }
+  void answer(LocalTime now, Reply reply) {
+    mark(reply.touch);
+    client_.answer(now, reply);
+  }
   std::uint64_t sessions() const { return client_.stats().sessions; }
   bool open() const { return client_.phase() == ForceClient::Phase::kOpen; }
   void leave(LocalTime now) { client_.stop(now); }
@@ -61,8 +66,21 @@ class RunningClient {
   bool look(LocalTime& now) { return busy_.look(now); }
 
  private:
+  Watch marking(Watch watch) { return watch; }
+  Physics marking(Physics physics) {
+    if (!options_.field) return physics;
+    return [this, physics = std::move(physics)](const DeviceState& hand) {
+      Touch touch = physics(hand);
+      mark(touch);
+      return touch;
+    };
+  }
+  void mark(Touch& touch) const {
+    if (options_.field) touch.is_truth = client_.field().generation > 0;
+  }
   ForceClient::Config config(const Options& options, const std::string& device) const;
   std::string sentence() const;
+  std::string about_field() const;
   void say(const std::string& text) const { std::cerr << who_ + ": " + visible(text) + "\n"; }
   void look_up_again();
   Json to_json(const LinkReport& report) const;
@@ -77,6 +95,7 @@ class RunningClient {
   ForceClient client_;
 
   std::string said_;
+  std::string said_of_field_;
   std::string missing_;
   std::string_view unusable_;  // last printed reason
   std::string_view left_out_;  ///< last printed reason for an omitted part of a force
@@ -89,6 +108,7 @@ ForceClient::Config RunningClient::config(const Options& options, const std::str
   if (!device.empty()) config.device = device;
   if (config.device.empty()) config.device = transport_.device();
   config.seed = seed_from_system();
+  if (options.field) config.fields = true;
   return config;
 }
 
@@ -112,6 +132,17 @@ std::string RunningClient::sentence() const {
       return {};
   }
   return {};
+}
+
+/// Empty if there is nothing to report.
+std::string RunningClient::about_field() const {
+  if (!options_.field || !open()) return {};
+  const std::vector<std::string>& features = client_.welcome()->features;
+  const bool known = std::ranges::find(features, kFeatureFields) != features.end();
+  const FieldUpload::Progress& progress = client_.field();
+  if (progress.current) return "the server renders the field";
+  const std::string refused = known ? progress.refused : "the server does not support fields";
+  return refused.empty() ? refused : "the field is not rendered: " + refused;
 }
 
 Json RunningClient::to_json(const LinkReport& report) const {
@@ -163,6 +194,9 @@ std::optional<LocalTime> RunningClient::turn(LocalTime now) {
   const LocalTime next = client_.turn(now);
   const std::string text = sentence();
   if (!text.empty() && text != said_) say(said_ = text);
+  if (const std::string of_field = about_field(); !of_field.empty() && of_field != said_of_field_) {
+    say(said_of_field_ = of_field);
+  }
   if (const auto why = client_.stats().unusable; !why.empty() && why != unusable_) {
     say("a force was not sent: " + std::string(unusable_ = why));
   }

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "clients/cpp/field/field.h"
 #include "clients/cpp/force_client.h"
 #include "clients/cpp/server_name.h"
 
@@ -25,6 +26,9 @@ struct Options {
   /// before the first state. Stop anything here that must not continue without an operator. Only for one device.
   std::function<void(LocalTime now)> on_silence{};
   Duration silence = std::chrono::milliseconds(10);
+  /// Uploaded in each session (ForceClient::use). While the server renders it, the answers of the engine are sent as
+  /// truths (Touch::truth). Until then, and if the server refuses it, they are sent as forces. run() prints the reason.
+  std::optional<Field> field{};
 };
 
 /// Runs a client in real time on the calling thread until Options::duration, SIGINT or SIGTERM, then sends a Bye.

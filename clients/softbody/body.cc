@@ -14,6 +14,7 @@
 
 #include "clients/softbody/fem/gmsh.h"
 #include "clients/softbody/models/linear.h"
+#include "clients/softbody/surface/outside.h"
 #include "clients/softbody/touch/capsule.h"
 #include "clients/softbody/touch/friction.h"
 #include "clients/softbody/touch/rigid_contact.h"
@@ -493,6 +494,8 @@ double Body::step() const noexcept { return parts_->model.step(); }
 Vec3 Body::touch_point() const { return place_of(parts_->solid.mesh(), parts_->patch); }
 
 const Vec3& Body::normal() const { return parts_->surface.normal(); }
+
+Triangles Body::rest_shape() const { return outside(parts_->solid.mesh()); }
 
 Body::Size Body::size() const {
   return {parts_->solid.mesh().nodes.size(), static_cast<std::size_t>(parts_->solid.mesh().element_count()),

@@ -13,6 +13,7 @@
 #include "clients/softbody/models/surface_table.h"
 #include "clients/softbody/near/fallback_model.h"
 #include "clients/softbody/near/near_model.h"
+#include "clients/softbody/surface/triangles.h"
 
 namespace tendon::softbody {
 
@@ -63,8 +64,9 @@ class Body {
 
   double step() const noexcept;  ///< s; 0: the body is always at rest
 
-  Vec3 touch_point() const;    ///< the surface point at `middle`, body frame
-  const Vec3& normal() const;  ///< unit vector towards the tool, body frame
+  Vec3 touch_point() const;      ///< the surface point at `middle`, body frame
+  const Vec3& normal() const;    ///< unit vector towards the tool, body frame
+  Triangles rest_shape() const;  ///< m, body frame, without gravity; see outside()
 
   struct Size {
     std::size_t nodes;

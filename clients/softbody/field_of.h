@@ -9,9 +9,11 @@
 
 namespace tendon::softbody {
 
-/// Samples the inside of a closed surface (m) as a field for ForceClient::use. Throws std::invalid_argument as check()
-/// and Field::from. Realtime-safe: no.
-inline Field field_of(const Triangles& surface, const Field::Sampling& sampling, std::string_view name = "surface") {
+/// Samples the inside of a closed surface (m) as a field for ForceClient::use. The solid is larger than the surface by
+/// `grown` (m) on all sides, for a tool with this radius. Throws std::invalid_argument as check() and Field::from.
+/// Realtime-safe: no.
+inline Field field_of(const Triangles& surface, const Field::Sampling& sampling, std::string_view name = "surface",
+                      double grown = 0) {
   check(surface, name);
   Vec3 low = surface.points.front();
   Vec3 high = low;
@@ -19,9 +21,9 @@ inline Field field_of(const Triangles& surface, const Field::Sampling& sampling,
     low = low.cwiseMin(point);
     high = high.cwiseMax(point);
   }
-  const Vec3 margin = Vec3::Constant(3 * sampling.spacing);  // BrickField::kBand is 2.5
+  const Vec3 margin = Vec3::Constant(grown + 3 * sampling.spacing);  // BrickField::kBand is 2.5
   const SurfaceDistance distance(surface);
-  return Field::from([&](const Vec3& x) { return distance.at(x); }, low - margin, high + margin, sampling);
+  return Field::from([&](const Vec3& x) { return distance.at(x) - grown; }, low - margin, high + margin, sampling);
 }
 
 }  // namespace tendon::softbody

@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "clients/softbody/field_of.h"
 #include "core/base/arithmetic.h"
 #include "protocol/rotation.h"
 
@@ -19,6 +20,7 @@ PlacedBody::PlacedBody(const Scene& scene, Body body)
       normal_(to_device_ * body_.normal()),
       only_pushes_(scene.body.side == PatchContact::Side::kUnilateral),
       turns_(turns_the_hand(scene.body)),
+      tool_(lowest_of_tool(scene.body, Mat3::Identity()).norm()),
       depths_(scene.table) {
   for (const Scene::Hand& hand : scene.hands) origins_.emplace_back(hand.at - to_device_ * body_.touch_point());
 }
@@ -75,6 +77,18 @@ std::vector<Touch> PlacedBody::answer(std::span<const std::optional<DeviceState>
     }
   }
   return touches;
+}
+
+Field PlacedBody::field(const Scene::Upload& upload) const {
+  Triangles shape = body_.rest_shape();
+  for (Vec3& point : shape.points) point = origin_ + to_device_ * point;
+  Field field = field_of(shape, {.spacing = upload.spacing}, "the surface of the body", tool_);
+  FieldMaterial& material = field.materials.front();
+  material.stiffness = upload.stiffness;
+  material.friction = upload.friction;
+  material.relaxation = upload.relaxation.value_or(0);
+  if (upload.relaxation) material.branch_stiffness = upload.branch_stiffness.value_or(upload.stiffness);
+  return field;
 }
 
 Touch PlacedBody::touch_of(const Feel& feel, const DeviceState& hand) {

@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "clients/cpp/field/field.h"
 #include "clients/cpp/force_client.h"
 #include "clients/softbody/scene.h"
 
@@ -33,6 +34,10 @@ class PlacedBody {
 
   /// Answers all hands of the scene. An absent hand has an empty state and an empty answer.
   std::vector<Touch> answer(std::span<const std::optional<DeviceState>> hands);
+
+  /// Returns the shape at rest in the frame of the device, as a field for a tool that is a point. Throws
+  /// std::invalid_argument as field_of().
+  Field field(const Scene::Upload& upload) const;
 
   void prepare_by(Background background) { body_.prepare_by(std::move(background)); }
 
@@ -63,6 +68,7 @@ class PlacedBody {
   Vec3 normal_;
   bool only_pushes_;
   bool turns_;
+  double tool_;                    ///< m, distance from the handle at which the tool touches
   double depths_;                  ///< m, depth range of the force table
   std::optional<PeerTime> first_;  ///< time of the first sample
   std::optional<Followed> followed_;

@@ -404,6 +404,23 @@ void declare_hands(Table& root, Scene& scene) {
   });
 }
 
+template <class Table>
+void declare_field(Table& root, Scene& scene) {
+  root.part(Name{"field", "the server renders the body at rest"}, scene.field, [](Table& keys, Scene::Upload& field) {
+    keys.key("stiffness_n_per_m", field.stiffness, up_to(1e12),
+             "Upload the body's shape at rest, which the server then renders with this stiffness and without the delay "
+             "of the network. The answers correct it. `explain` prints the stiffness at first touch",
+             kRequired);
+    keys.key("friction", field.friction, Number{.least = 0, .most = 2}, "Coulomb coefficient of the shape");
+    keys.key("spacing_mm", field.spacing, Number{.least = 0.25, .most = 8},
+             "Distance of the samples. Walls must be at least twice as thick");
+    keys.key("relax_s", field.relaxation, Number{.least = 0.01, .most = 10},
+             "Time constant of a second spring, whose force decays", Absent{.text = "no second spring"});
+    keys.key("branch_n_per_m", field.branch_stiffness, up_to(1e12), "With relax_s: stiffness of the second spring",
+             Absent{.text = "stiffness_n_per_m"});
+  });
+}
+
 /// The list must contain all effects that the model always simulates, and only effects that it supports.
 void check_effects(const SceneErrors& errors, const Draft& draft) {
   const BodyConfig& body = draft.scene.body;
@@ -439,6 +456,19 @@ void check_effects(const SceneErrors& errors, const Draft& draft) {
                    : "the law does not simulate \"material-nonlinearity\", which is listed: only \"neo-hookean\" does");
 }
 
+void check_field(const SceneErrors& errors, const Draft& draft) {
+  const BodyConfig& body = draft.scene.body;
+  const auto refuse = [&](const std::string& why) { errors.blame("field", {}, why); };
+  if (!draft.scene.hands.empty()) refuse("expected one hand, because a field has one holder");
+  if (draft.lists(kCutting)) refuse("expected a body without cutting, because the field is its uncut shape");
+  if (body.side == PatchContact::Side::kBilateral) refuse("expected a unilateral side, because a field cannot pull");
+  if (turns_the_hand(body))
+    refuse("expected a patch or a sphere without tool_offset_mm, because a field has no torque");
+  if (draft.scene.field->branch_stiffness && !draft.scene.field->relaxation) {
+    errors.blame("field.branch_n_per_m", {}, "expected relax_s");
+  }
+}
+
 void check_values(const SceneErrors& errors, const Draft& draft) {
   const BodyConfig& body = draft.scene.body;
   if (draft.lists(kCutting) && body.cuts.empty()) {
@@ -453,6 +483,7 @@ void check_values(const SceneErrors& errors, const Draft& draft) {
         "expected the model condensed, unilateral and without friction, because the others depend on the past");
   }
   const std::vector<Scene::Hand>& hands = draft.scene.hands;
+  if (draft.scene.field) check_field(errors, draft);
   if (hands.size() == 1) errors.blame("hands", {}, "expected two or more; omit [[hands]] for one hand");
   for (std::size_t i = 0; i < hands.size(); ++i) {
     const auto same = [&](const Scene::Hand& other) {
@@ -480,6 +511,7 @@ Scene parse_scene(std::string_view text, const std::string& name, const std::fil
   declare_body(root, draft);
   declare_touch(root, draft);
   declare_hands(root, draft.scene);
+  declare_field(root, draft.scene);
   root.refuse_unknown();
   problems.throw_first(name);
   check_values(errors, draft);
@@ -501,6 +533,7 @@ std::string scene_reference() {
   declare_body(root, draft);
   declare_touch(root, draft);
   declare_hands(root, draft.scene);
+  declare_field(root, draft.scene);
   return text;
 }
 

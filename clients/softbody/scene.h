@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <iosfwd>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -25,6 +26,15 @@ struct Scene {
   };
   std::vector<Hand> hands = {};
   double table = 0;  ///< m, depth range of the force table in an answer; 0: no table
+  /// The shape at rest is uploaded, and the server renders it with this material. See FieldMaterial.
+  struct Upload {
+    double spacing = 2e-3;                     ///< m, of the nodes of the field
+    double stiffness = 0;                      ///< N/m
+    double friction = 0;                       ///< coefficient
+    std::optional<double> branch_stiffness{};  ///< N/m
+    std::optional<double> relaxation{};        ///< s
+  };
+  std::optional<Upload> field = {};
 };
 
 Mat3 to_device(const Scene& scene);  ///< rotation from the body frame to the device frame

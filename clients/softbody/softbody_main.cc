@@ -188,6 +188,7 @@ int simulate(int argc, char** argv, std::string_view first) {
   if (std::holds_alternative<softbody::NearConfig>(scene.body.model)) {
     options.client.ways.assign(softbody::kSolverPathNames.begin(), softbody::kSolverPathNames.end());
   }
+  if (scene.field) options.field = body.field(*scene.field);
   const int exit_code = answer(scene, options, body);
   const softbody::Answered answered{body.fallbacks(), thread ? body.near_field() : std::nullopt};
   if (options.json) {
