@@ -9,7 +9,7 @@ from types import SimpleNamespace
 
 import pytest
 from conftest import ROOT
-from processes import Server, example, scene, tendond
+from processes import PATIENCE_S, PROGRAMS, Process, Server, example, scene, tendond
 from shapes import binary_stl, cube
 
 import tendon
@@ -99,3 +99,49 @@ def test_a_scene_without_fields_tells_the_engine(tmp_path):
         with tendon.connect(server.address) as hand:
             hand.use(tendon.Field.from_primitives(tendon.Sphere()))
             assert any(hand.field_refused == "the server does not support fields" for _ in hand.states(30))
+
+
+@pytest.fixture
+def soft_body(tmp_path):
+    """The command of tendon-softbody, whose body is stiffer than its field."""
+    program = PROGRAMS / "tendon-softbody"
+    if not program.exists():
+        pytest.skip(f"{program} is not built; TENDON_PROGRAMS names another folder")
+    body = tmp_path / "body.toml"
+    body.write_text(scene("softbody") + "[field]\nstiffness_n_per_m = 300\nspacing_mm = 4\n", encoding="utf-8")
+    return [program, body, "--server"]
+
+
+def test_a_soft_body_is_rendered_by_the_server_and_corrected_by_the_engine(tmp_path, soft_body):
+    stiffness = 457.9  # N/m, of the body
+    hand = scene("demo").replace("amplitude_mm = 15", "amplitude_mm = 8")
+    with Server(tmp_path, scenes={"scene": hand + "\n[field]\n"}) as server:
+        with Process(tmp_path, [*soft_body, server.address]) as engine:
+            engine.wait_for_line("the server renders the field")
+            pressed = []
+            with tendon.connect(server.address, role=tendon.Role.OBSERVER) as observer:
+                for state in observer.states(PATIENCE_S):
+                    if state.field is not None and state.field.depth > 2e-3:
+                        pressed.append(-state.force_applied[0] / state.position[0])
+                    if len(pressed) >= 1000:
+                        break
+            assert engine.stop() == 0, engine.said
+    assert len(pressed) >= 500
+    right = [one for one in pressed if abs(one / stiffness - 1) < 0.05]
+    assert len(right) > len(pressed) / 2, sorted(pressed)[:: len(pressed) // 10]
+
+
+@pytest.mark.parametrize(
+    ("table", "why"),
+    [
+        ("", "the server does not support fields"),
+        ("[field]\nmax_stiffness_n_per_m = 100\n", "materials[0].stiffness = 300: expected above 0, and at most 100"),
+    ],
+)
+def test_a_soft_body_without_its_field_sends_forces_and_says_why(tmp_path, soft_body, table, why):
+    with Server(tmp_path, scenes={"scene": scene("demo") + "\n" + table}) as server:
+        with Process(tmp_path, [*soft_body, server.address, "--duration-s", "2"]) as engine:
+            assert why in engine.wait_for_line("the field is not rendered: ")
+            assert engine.wait() == 0, engine.said
+        assert sum("the field is not rendered" in line for line in engine.said) == 1, engine.said
+        assert server.end()["forces"] > 100
