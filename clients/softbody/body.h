@@ -66,7 +66,7 @@ class Body {
 
   Vec3 touch_point() const;      ///< the surface point at `middle`, body frame
   const Vec3& normal() const;    ///< unit vector towards the tool, body frame
-  Triangles rest_shape() const;  ///< m, body frame, without gravity; see outside()
+  Triangles rest_shape() const;  ///< in m, in the body frame; see outside()
 
   struct Size {
     std::size_t nodes;

@@ -4,6 +4,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <sstream>
 #include <stdexcept>
 #include <utility>
 
@@ -82,7 +83,14 @@ std::vector<Touch> PlacedBody::answer(std::span<const std::optional<DeviceState>
 Field PlacedBody::field(const Scene::Upload& upload) const {
   Triangles shape = body_.rest_shape();
   for (Vec3& point : shape.points) point = origin_ + to_device_ * point;
-  Field field = field_of(shape, {.spacing = upload.spacing}, "the surface of the body", tool_);
+  Field field;
+  try {
+    field = field_of(shape, {.spacing = upload.spacing}, "the surface of the body", tool_);
+  } catch (const std::invalid_argument& refused) {
+    std::ostringstream text;
+    text << "[field] with spacing_mm = " << 1e3 * upload.spacing << ": " << refused.what();
+    throw std::invalid_argument(text.str());
+  }
   FieldMaterial& material = field.materials.front();
   material.stiffness = upload.stiffness;
   material.friction = upload.friction;

@@ -35,8 +35,8 @@ class PlacedBody {
   /// Answers all hands of the scene. An absent hand has an empty state and an empty answer.
   std::vector<Touch> answer(std::span<const std::optional<DeviceState>> hands);
 
-  /// Returns the shape at rest in the frame of the device, as a field for a tool that is a point. Throws
-  /// std::invalid_argument as field_of().
+  /// Returns the shape at rest as a field for ForceClient::use, in the frame of the device. The shape is larger by the
+  /// radius of the tool. Throws std::invalid_argument as field_of().
   Field field(const Scene::Upload& upload) const;
 
   void prepare_by(Background background) { body_.prepare_by(std::move(background)); }

@@ -28,7 +28,7 @@ struct Scene {
   double table = 0;  ///< m, depth range of the force table in an answer; 0: no table
   /// The shape at rest is uploaded, and the server renders it with this material. See FieldMaterial.
   struct Upload {
-    double spacing = 2e-3;                     ///< m, of the nodes of the field
+    double spacing = 2e-3;                     ///< m, distance of the nodes
     double stiffness = 0;                      ///< N/m
     double friction = 0;                       ///< coefficient
     std::optional<double> branch_stiffness{};  ///< N/m

@@ -10,7 +10,7 @@
 namespace tendon::softbody {
 namespace {
 
-/// The corners of a facet, counterclockwise seen from outside; −1: a triangle has no such corner.
+/// Returns the corners of a facet, counterclockwise seen from outside. The fourth corner of a triangle is −1.
 std::array<int, 4> corners_of(const Mesh& mesh, const Facet& facet) {
   const Face& face = faces(mesh.shape)[static_cast<std::size_t>(facet.face)];
   const bool triangle = mesh.shape == Shape::kTet4;

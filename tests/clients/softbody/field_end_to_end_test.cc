@@ -101,14 +101,21 @@ TEST(SoftbodyField, ItIsTheSurfaceInTheFrameOfTheDevice) {
   }
 }
 
+TEST(SoftbodyField, ASpacingWithTooManyBricksIsRefusedWithItsKey) {
+  const Scene scene = scene_with("[field]\nstiffness_n_per_m = 420\nspacing_mm = 0.5\n");
+  const PlacedBody body(scene);
+  EXPECT_EQ(thrown_by([&] { body.field(*scene.field); }),
+            "[field] with spacing_mm = 0.5: bricks = 1024: expected at most 1023");
+}
+
 struct Pressed {
   double error = 0;  ///< root mean square of the applied force minus the force of the body at this position, N
-  double rms = 0;    ///< of the force of the body, N
+  double rms = 0;    ///< root mean square of the force of the body, N
   std::uint64_t steps = 0;
   std::uint64_t truths = 0;
 };
 
-/// A hand presses and releases every 2 s. The last 4 s of 10 s count.
+/// The hand presses with a period of 2 s. The result is for the last 4 s of 10 s.
 Pressed press(Duration one_way, bool truths, double stiffness) {
   using namespace simulation;
   const Scene scene = scene_with("[field]\nspacing_mm = 4\nstiffness_n_per_m = " + std::to_string(stiffness) + "\n");
