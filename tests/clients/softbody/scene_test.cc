@@ -100,8 +100,9 @@ TEST(SoftbodyScene, AnEffectsKeysAreKnownOnlyWhereItIsListed) {
   EXPECT_EQ(body.effects.viscosity, 0.004);
   EXPECT_EQ(body.effects.density, 900);
   EXPECT_EQ(body.friction, 0.5);
-  EXPECT_EQ(refusal(with("[body]", "friction = 0.5\n[body]")),
-            "s.toml:2: friction: unknown key; expected one of effects, model, body, region, touch, hands, place");
+  EXPECT_EQ(
+      refusal(with("[body]", "friction = 0.5\n[body]")),
+      "s.toml:2: friction: unknown key; expected one of effects, model, body, region, touch, hands, place, field");
   EXPECT_EQ(refusal(with("[\"contact\"]", "[\"contact\", \"friction\"]")),
             "s.toml: friction: missing, expected a number from 0 to 10");
   EXPECT_EQ(refusal(with("[\"contact\"]", "[\"contact\",\n\"inertia\"]")),
@@ -140,8 +141,9 @@ TEST(SoftbodyScene, WhatIsWrongWithACutIsNamed) {
             "s.toml:2: effects: \"stiffening\" cannot be simulated together with \"gravity\"");
   EXPECT_EQ(refusal(listing("linear", effects, "")),
             "s.toml: cutting: missing, expected one or more tables [[cutting]]");
-  EXPECT_EQ(refusal(listing("linear", "[\"contact\"]", cut + "at_s = 1\n")),
-            "s.toml:15: cutting: unknown key; expected one of effects, model, body, region, touch, hands, place");
+  EXPECT_EQ(
+      refusal(listing("linear", "[\"contact\"]", cut + "at_s = 1\n")),
+      "s.toml:15: cutting: unknown key; expected one of effects, model, body, region, touch, hands, place, field");
   EXPECT_EQ(refusal(listing("linear", effects, cut)), "s.toml:16: cutting[0]: expected either at_s or above_n");
   EXPECT_EQ(refusal(listing("linear", effects, cut + "at_s = 1\nabove_n = 1\n")),
             "s.toml:16: cutting[0]: expected either at_s or above_n");
@@ -244,8 +246,9 @@ TEST(SoftbodyScene, AYieldArrivesAndWhatIsWrongWithItIsNamed) {
             "s.toml:16: plasticity.hardening_pa: missing, expected a number above 0 Pa");
   EXPECT_EQ(refusal(listing("corotational", effects, table + "creep = 1\n")),
             "s.toml:19: plasticity.creep: unknown key; expected one of yield_pa, hardening_pa");
-  EXPECT_EQ(refusal(listing("linear", "[\"contact\"]", table)),
-            "s.toml:15: plasticity: unknown table; expected one of effects, model, body, region, touch, hands, place");
+  EXPECT_EQ(
+      refusal(listing("linear", "[\"contact\"]", table)),
+      "s.toml:15: plasticity: unknown table; expected one of effects, model, body, region, touch, hands, place, field");
   for (const std::string model : {"condensed", "neo-hookean", "near"}) {
     EXPECT_EQ(refusal(listing(model, "[\"contact\",\n\"plasticity\"]", table)),
               "s.toml:2: effects: the model \"" + model + "\" does not simulate \"plasticity\", which is listed");
