@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tests/protocol/field/field_vectors.h"
 
+#include <bit>
 #include <span>
 #include <variant>
 
+#include "core/base/bytes.h"
+#include "core/base/expect.h"
 #include "core/field/field.h"
 #include "protocol/secrets/blake2b.h"
 
@@ -94,6 +97,23 @@ Encoded encoded(const Case& one) {
   for (Primitive& primitive : primitives) primitive.material = material_at(centre_of(primitive));
   out.manifest = encode_manifest(lattice, bricks, primitives);
   return out;
+}
+
+std::string numbers(std::span<const double> values) {
+  std::string out;
+  for (const double value : values) out += (out.empty() ? "" : ", ") + shortest(value);
+  return "[" + out + "]";
+}
+
+std::string shape(const field::Primitive& primitive) {
+  const std::vector<std::byte> manifest = encode_manifest({}, {}, std::span(&primitive, 1));
+  const std::span<const std::byte> entry = std::span(manifest).subspan(FieldManifest::kHead);
+  std::vector<double> values(FieldManifest::kNumbers);
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    values[i] = std::bit_cast<double>(get_little_endian<std::uint64_t>(&entry[3 + 8 * i]));
+  }
+  return R"({"kind": )" + std::to_string(std::to_integer<int>(entry[0])) + R"(, "hollow": )" +
+         (primitive.hollow ? "true" : "false") + R"(, "numbers": )" + numbers(values) + "}";
 }
 
 }  // namespace tendon::field_vectors

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -27,5 +28,10 @@ struct Encoded {
 
 const std::vector<Case>& cases();
 Encoded encoded(const Case& one);
+
+// In JSON.
+std::string numbers(std::span<const double> values);
+/// `kind` and `numbers` are those of a manifest.
+std::string shape(const field::Primitive& primitive);
 
 }  // namespace tendon::field_vectors

@@ -3,7 +3,6 @@
 
 #include <google/protobuf/util/json_util.h>
 
-#include <bit>
 #include <fstream>
 #include <iterator>
 #include <optional>
@@ -13,7 +12,6 @@
 #include <utility>
 #include <vector>
 
-#include "core/base/bytes.h"
 #include "core/base/expect.h"
 #include "protocol/field/manifest.h"
 #include "protocol/handshake.h"
@@ -562,28 +560,10 @@ std::string bounds_file() {
   return Object().json("bounds", list(out)).str() + "\n";
 }
 
-std::string numbers(std::span<const double> values) {
-  std::string out;
-  for (const double value : values) out += (out.empty() ? "" : ", ") + shortest(value);
-  return "[" + out + "]";
-}
-
-/// `kind` and `numbers` are those of a manifest.
-std::string shape(const field::Primitive& primitive) {
-  const std::vector<std::byte> manifest = encode_manifest({}, {}, std::span(&primitive, 1));
-  const std::span<const std::byte> entry = std::span(manifest).subspan(FieldManifest::kHead);
-  std::vector<double> values(FieldManifest::kNumbers);
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    values[i] = std::bit_cast<double>(get_little_endian<std::uint64_t>(&entry[3 + 8 * i]));
-  }
-  return R"({"kind": )" + std::to_string(std::to_integer<int>(entry[0])) + R"(, "hollow": )" +
-         (primitive.hollow ? "true" : "false") + R"(, "numbers": )" + numbers(values) + "}";
-}
-
 std::string shapes(const std::vector<field::Primitive>& primitives) {
   std::vector<std::string> out;
   out.reserve(primitives.size());
-  for (const field::Primitive& primitive : primitives) out.push_back(shape(primitive));
+  for (const field::Primitive& primitive : primitives) out.push_back(field_vectors::shape(primitive));
   return list(out);
 }
 
@@ -593,8 +573,8 @@ std::string fields_file() {
     const field_vectors::Encoded encoded = field_vectors::encoded(one);
     Object json;
     json.text("name", one.name).json("sampled", shapes(one.sampled));
-    json.json("low", numbers(std::span(one.low.data(), 3)))
-        .json("high", numbers(std::span(one.high.data(), 3)))
+    json.json("low", field_vectors::numbers(std::span(one.low.data(), 3)))
+        .json("high", field_vectors::numbers(std::span(one.high.data(), 3)))
         .json("spacing", shortest(one.spacing));
     json.json("region", shapes(one.region)).json("primitives", shapes(one.primitives));
     json.bytes("manifest", encoded.manifest).bytes("field", crypto::blake2b_256(encoded.manifest));

@@ -488,9 +488,10 @@ TEST(SceneError, OfAnElementInAListHasTheElementsLine) {
 TEST(SceneError, SurvivesTheDeepestNestingThatFits) {
   std::string deep = "[a";
   while (deep.size() + 4 < kMaxSceneBytes) deep += ".a";
-  EXPECT_EQ(error_of(deep + "]\n"),
-            "s.toml:1: a: unknown table; expected one of device, loop, safety, limiter, admittance, force, field, channel, "
-            "teleoperation, network, discovery, recording");
+  EXPECT_EQ(
+      error_of(deep + "]\n"),
+      "s.toml:1: a: unknown table; expected one of device, loop, safety, limiter, admittance, force, field, channel, "
+      "teleoperation, network, discovery, recording");
   EXPECT_TRUE(error_of("a = " + std::string(16'000, '[')).starts_with("s.toml:1: not TOML: "));
 }
 
