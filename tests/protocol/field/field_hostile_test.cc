@@ -109,9 +109,9 @@ struct Case {
 const std::vector<Case>& cases() {
   const auto offered = [](const Bytes& manifest) { return [manifest](Server& s) { return s.offer(manifest); }; };
   const auto number = [offered](std::size_t at, auto value) { return offered(with(at, value)); };
-  const auto primitive = [offered](const field::Primitive& one, std::size_t number, double value) {
+  const auto primitive = [offered](const field::Primitive& one, std::size_t place, double value) {
     Bytes manifest = manifest_of(bricks(), {one});
-    put_little_endian(std::bit_cast<std::uint64_t>(value), manifest.data() + kPrimitive + 3 + 8 * number);
+    put_little_endian(std::bit_cast<std::uint64_t>(value), manifest.data() + kPrimitive + 3 + 8 * place);
     return offered(manifest);
   };
   static const std::vector<Case> kCases = {

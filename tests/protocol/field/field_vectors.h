@@ -13,12 +13,12 @@ namespace tendon::field_vectors {
 /// A field that the clients must encode in the same way.
 struct Case {
   std::string name;
-  std::vector<field::Primitive> sampled;  ///< at most one; its distance is sampled between `low` and `high`
+  std::vector<field::Primitive> sampled{};  ///< at most one; its distance is sampled between `low` and `high`
   Vec3 low = Vec3::Zero();
   Vec3 high = Vec3::Zero();
   double spacing = 1e-3;
-  std::vector<field::Primitive> region;      ///< at most one; the material is 1 if the centre is in the region
-  std::vector<field::Primitive> primitives;  ///< without their materials
+  std::vector<field::Primitive> region{};      ///< at most one; the material is 1 if the centre is in the region
+  std::vector<field::Primitive> primitives{};  ///< without their materials
 };
 
 struct Encoded {
