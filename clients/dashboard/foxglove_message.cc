@@ -198,6 +198,12 @@ std::string step_payload(const DeviceState& state) {
     grip.set_velocity_radps(state.grip->velocity);
     if (state.grip_applied) grip.set_force_applied_n(*state.grip_applied);
   }
+  if (state.field) {
+    recorded::Field& field = *out.mutable_field();
+    field.set_generation(state.field->generation);
+    field.set_depth_m(state.field->depth);
+    put_recorded(field.mutable_proxy_m(), state.field->proxy);
+  }
   return out.SerializeAsString();
 }
 

@@ -57,6 +57,7 @@ DeviceState full_state() {
   state.torque_applied = Vec3(0, 0.3, 0.4);
   state.grip = Grip{.opening = 0.5, .velocity = -1};
   state.grip_applied = 2.5;
+  state.field = FieldState{.generation = 3, .depth = 0.25, .proxy = Vec3(1, 2, 4)};
   state.hand_force = Vec3(1, 0, 0);
   return state;
 }
@@ -105,12 +106,16 @@ TEST(FoxgloveMessage, AStateIsAStepUnderTheNamesOfARecording) {
   EXPECT_EQ(step.grip().opening_rad(), 0.5);
   EXPECT_EQ(step.grip().velocity_radps(), -1);
   EXPECT_EQ(step.grip().force_applied_n(), 2.5);
+  EXPECT_EQ(step.field().generation(), 3U);
+  EXPECT_EQ(step.field().depth_m(), 0.25);
+  EXPECT_EQ(step.field().proxy_m().z(), 4);
   EXPECT_EQ(vec3(step.hand_force_n()), *state.hand_force);
 }
 
 TEST(FoxgloveMessage, WhatAStateDoesNotKnowIsAbsent) {
   const auto step = parsed<recording::v1::Step>(step_payload({}));
-  EXPECT_FALSE(step.has_force_wanted_n() || step.has_turn() || step.has_grip() || step.has_hand_force_n());
+  EXPECT_FALSE(step.has_force_wanted_n() || step.has_turn() || step.has_grip() || step.has_hand_force_n() ||
+               step.has_field());
   EXPECT_FALSE(step.has_force_held_n() || step.has_force_commanded_n());
   EXPECT_EQ(step.stiffness_wanted_n_per_m_size(), 0);
 }

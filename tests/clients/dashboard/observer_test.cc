@@ -27,7 +27,7 @@ class ObserverTest : public Servers {
     std::vector<Scene> scenes;
     for (const std::string& name : names) {
       const std::string group = "group = \"of-" + name + "\"\n";
-      scenes.push_back(device_named(name, group + (port_ ? kCoupled : "")));
+      scenes.push_back(device_named(name, group + (port_ ? kCoupled : "") + more_));
     }
     scenes[0].network.max_observers = max_observers;
     Assembly::Config config{.watched = Mailboxes::Capacities{.steps = 16, .flight = 16, .datagrams = 1}};
@@ -57,6 +57,7 @@ class ObserverTest : public Servers {
       state.device = static_cast<std::uint32_t>(i);
       state.force_wanted = Vec3(1, 2, 3);
       state.buttons = 2;
+      state.field = FieldState{.generation = 3, .depth = 0.5};
       mail(i).state.put(state);
       if (port_) mail(i).port_out[0].put(*port_);
     }
@@ -81,6 +82,7 @@ class ObserverTest : public Servers {
   End own_{wire_, parse_address("127.0.0.1:5000")};
   std::uint64_t tick_ = 0;
   std::optional<PortState> port_;  ///< if set, the state of the coupling of every device
+  std::string more_;               ///< of every scene
   Board board_;
   std::optional<Observer> observer_{std::in_place, own_, server_, Observer::Config{.seed = 1}, board_, now_};
 };
@@ -159,6 +161,16 @@ TEST_F(ObserverTest, IsToldWhatTheEnginesWant) {
     ASSERT_TRUE(board_.devices().at(device).newest->force_wanted) << device;
     EXPECT_EQ(*board_.devices().at(device).newest->force_wanted, Vec3(1, 2, 3));
   }
+}
+
+TEST_F(ObserverTest, IsToldWhichFieldTheDeviceRenders) {
+  more_ = "[field]\nallow = [\"main\"]\n[[channel]]\nname = \"main\"\n";
+  serve({"left"});
+  run(milliseconds(200));
+  const auto& field = board_.devices().at(0).newest->field;
+  ASSERT_TRUE(field);
+  EXPECT_EQ(field->generation, 3U);
+  EXPECT_EQ(field->depth, 0.5);
 }
 
 TEST_F(ObserverTest, ComparesTheServersClockWithOurs) {

@@ -179,19 +179,27 @@ it("shows four devices in 3-D, and goes back to the plots", async (test) => {
   assert.equal(await page.locator("#space").getAttribute("aria-pressed"), "true", "the choice is kept");
 });
 
-it("shows the field that a device renders, and its depth", async (test) => {
+it("shows the field that a device renders: proxy, depth, generation", async (test) => {
   const { url } = await startDash(test, "127.0.0.1:9");
-  const page = await visit(test, url, { viewport: { width: 1280, height: 960 }, before: (made) => fakeFeed(made, { devices: [...kDevices, kTouching] }) });
-  await page.locator("#device option").nth(4).waitFor({ state: "attached" });
-  assert.equal(await page.locator(".field-panel").isVisible(), false, "the stylus renders no field");
-  assert.equal(await page.locator("[data-chart=depth]").isVisible(), false);
+  const page = await visit(test, url, { before: (made) => fakeFeed(made, { devices: [...kDevices, kTouching], begin: 5000, until: 5600 }) });
+  const cells = page.locator(".field-panel td");
+  const depth = "[data-chart=depth]";
+  await says(page, ".tile[data-tile=mode]", "Active");
+  assert.ok(!(await cells.first().isVisible()) && !(await page.locator(depth).isVisible()), "a device without a field");
   await page.selectOption("#device", "4");
-  await page.locator("[data-chart=depth]").waitFor();
-  await until("the hand is deep", async () => /^the hand is \d+(\.\d+)? mm below the proxy$/.test(await page.locator(".field-panel svg").getAttribute("aria-label")));
-  await says(page, ".field-panel td", "4"); // the generation
+  await until("the deepest place is told", async () => (await cells.allTextContents()).join("; ") === "4; 3.96 mm; −14.6, 6.2, 0.0 mm", () => cells.allTextContents());
+  assert.equal(await page.locator(".field-panel svg").getAttribute("aria-label"), "the hand is 3.96 mm below the proxy");
+  const [proxy, hand] = await Promise.all(["proxy", "hand"].map((name) => page.locator(`.field-panel circle.${name}`).boundingBox()));
+  assert.ok(hand.y > proxy.y + proxy.height && Math.abs(hand.x + hand.width / 2 - proxy.x - proxy.width / 2) < 1, "the hand is below the proxy");
+  assert.equal(await page.locator(`${depth} .value`).textContent(), "3.96");
+  await page.click("#pause");
+  await page.locator(`${depth} .u-over`).hover({ position: { x: 200, y: 50 } });
+  await until("another instant has its generation and no contact", async () => (await cells.allTextContents()).slice(0, 2).join("; ") === "3; no contact", () => cells.allTextContents());
   await page.click("#space");
-  await until("the proxy is drawn", async () => /touching: a point.*, a proxy/.test((await words(page)) ?? ""), () => words(page));
-  assert.match(await page.locator(".handle", { hasText: "touching" }).locator(".values").textContent(), /proxy/);
+  await until("the proxy is drawn", async () => /touching: a point, .*a proxy$/.test(await words(page)), () => words(page));
+  assert.ok((await coloured(page, "second"))[0] > 15);
+  assert.match(await page.locator(".handle", { hasText: "touching" }).locator(".values").textContent(), /at the proxy|mm below the proxy/);
+  assert.equal(await page.locator(depth).isVisible(), false, "beside the 3-D view only the force is plotted");
 });
 
 it("is turned by a mouse and keys, and on a phone leaves scrolling alone", async (test) => {
