@@ -270,6 +270,9 @@ fn every_bound_is_kept() {
         if field.starts_with("DeviceStates.") {
             continue; // needs the feature `state-columns`
         }
+        if field.contains("Field") || field.starts_with("DeviceState.field") {
+            continue; // needs the feature `fields`
+        }
         let accepted = match case.at("message").text() {
             "Hello" => continue,
             "Answer" => decode(&ANSWER, &body).map_or(false, |answer| fits(&ANSWER, &answer)),
