@@ -9,8 +9,8 @@
 
 namespace tendon::softbody {
 
-/// Samples the inside of a closed surface (m) as a field for ForceClient::use. The sampled solid
-/// is larger than the surface by the radius `grown` (m) of the tool. Throws std::invalid_argument as check() and Field::from.
+/// Samples the inside of a closed surface (m) as a field for ForceClient::use. The sampled solid is larger than the
+/// surface by the radius `grown` (m) of the tool. Throws std::invalid_argument as check() and Field::from.
 /// Realtime-safe: no.
 inline Field field_of(const Triangles& surface, const Field::Sampling& sampling, std::string_view name = "surface",
                       double grown = 0) {

@@ -36,7 +36,7 @@ class BrickField {
   static constexpr double kBand = 2.5;
   static constexpr double kLeastSpacing = 0.25e-3;  ///< m
   static constexpr double kMostSpacing = 8e-3;      ///< m
-  static constexpr double kMostExtent = 2;          ///< m, of the lattice, and of a distance
+  static constexpr double kMostExtent = 2;          ///< m, largest length of the lattice, and largest distance
   static constexpr double kMostOrigin = 1e12;       ///< m
 
   using Place = std::array<std::uint16_t, 3>;        ///< number of a brick along x, y and z

@@ -12,17 +12,17 @@
 
 namespace tendon::field {
 
-/// Corrects the errors of a field. A true force F_k is compared with the force of the
-/// field in the same step k, so the result does not depend on the delay. With the depth d, the direction n of the force
-/// and the spring part f of step k, without the table c of its material:
+/// Corrects the errors of a field. A true force F_k is compared with the force of the field in the same step k, so the
+/// result does not depend on the delay. With the depth d, the direction n of the force and the spring part f of step k,
+/// without the table c of its material:
 ///     e = F_k·n − f − c(d)             N, if the depth was above 0.2 mm
 ///     c_i ← c_i + 0.3 w_i e/Σw²        for the two knots beside d with the weights w of the interpolation; c₀ = 0
 ///     r = F_k − (f + c(d)) n           N, the rest, with the new table
 /// The table does not depend on time, so it is the same for every delay. The rest is held:
 ///     F = min(1, d/0.3 mm) (r e^(−age/0.1 s − ‖x − x_k‖²/2(3 mm)²) + r₀)
-/// with the age since step k, so that a rest of long ago is not felt, and r₀ chosen such that F does not jump at a truth;
-/// it fades with 12 ms. The table belongs to the material, so the
-/// energy gate and `most_stiffness` cover it. The held rest is only bounded by the limiter.
+/// The age is the time since step k, so the rest of a late truth is small. r₀ is chosen such that F does not jump at a
+/// truth, and fades with 12 ms. The table belongs to the material, so the energy gate and `most_stiffness` cover it. The
+/// held rest is only bounded by the limiter.
 /// Realtime-safe: yes.
 class Residual {
  public:

@@ -20,7 +20,7 @@
 namespace tendon::limits {
 
 inline constexpr std::size_t kBrickBytes = sizeof(field::BrickField::Weights);  ///< fits into a datagram
-inline constexpr std::size_t kMaxFieldPart = 1000;  ///< bytes, so that each part fits into a datagram
+inline constexpr std::size_t kMaxFieldPart = 1000;  ///< bytes; each part fits into a datagram
 
 }  // namespace tendon::limits
 

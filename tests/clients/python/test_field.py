@@ -110,7 +110,7 @@ def test_a_mesh_inside_out_is_the_same_solid():
 
 
 def test_each_node_near_the_surface_is_in_a_brick():
-    """The surface begins and ends beside a brick of 16 mm."""
+    """The faces of the cube are close to the borders of bricks, which are 16 mm wide."""
     points, faces = cube(0.014, (0.016, 0.016, 0.016))
     field, box = Field.from_triangles(points, faces, 2), Box((0.016, 0.016, 0.016), (0.014, 0.014, 0.014))
     weights = Received(field).weights

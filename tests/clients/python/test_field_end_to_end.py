@@ -19,7 +19,7 @@ AT_REST = SimpleNamespace(position=(0, 0, 0), turn=(1, 0, 0, 0), twist=(0, 0, 0,
 
 
 class Felt(Exception):
-    """Ends the loop over the states."""
+    """The hand has felt the part, so the test can end."""
 
 
 def code_on_the_page() -> str:

@@ -69,7 +69,7 @@ export class FieldPanel {
   }
 }
 
-/** m, in [from, to]; 0 without a field. */
+/** Returns the largest depth in [from, to], in m, or 0 if there is no field. */
 function deepest(track: Track, from: number, to: number): number {
   const depth = track.column("depth");
   const last = track.after(to);

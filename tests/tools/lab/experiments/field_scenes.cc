@@ -93,8 +93,8 @@ FieldScene liver() {
   return scene;
 }
 
-/// A cube of 40 mm. The hand moves around it and across its edges. If `inside` is true, the hand is in a cubic hole and
-/// moves along the edges and into the corners.
+/// A cube of 40 mm. The hand circles it and crosses its edges. If `inside` is true, the cube is a hole, and the hand
+/// follows its edges into the corners.
 FieldScene cube(bool inside) {
   FieldScene scene{.name = inside ? "corner" : "edge",
                    .low = Vec3::Constant(-0.03),

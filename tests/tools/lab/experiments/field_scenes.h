@@ -86,7 +86,7 @@ class TrueContact {
   Vec3 normal_ = Vec3::UnitZ();
 };
 
-/// Returns the force (N) on the hand for each ms. It is computed at 20 kHz, without a network and without a limiter.
+/// Returns the force (N) on the hand for each ms. The simulation runs at 20 kHz and has no network or limiter.
 std::vector<Vec3> true_forces(const FieldScene& scene, FieldHand hand, int milliseconds);
 
 }  // namespace tendon::lab
