@@ -179,6 +179,33 @@ it("shows four devices in 3-D, and goes back to the plots", async (test) => {
   assert.equal(await page.locator("#space").getAttribute("aria-pressed"), "true", "the choice is kept");
 });
 
+it("collects the surface where the tool touched it", async (test) => {
+  const { TouchedSurface, Track, noHandle, kMostPatches, kPatchCell } = await modules(test, "words", "track", "space/figure", "space/surface");
+  const step = (t, field, depth, [px, py, pz], [x, y, z]) => ({ ...kSample, t, x, y, z, handle: { ...noHandle(), field, depth, px, py, pz } });
+  const surface = new TouchedSurface();
+  const track = new Track();
+  track.push(step(0, 1, 1e-3, [0.01, 0, 0], [0.009, 0, 0]));
+  track.push(step(1, 1, 1e-3, [0.01 + 0.2 * kPatchCell, 0, 0], [0.009, 0, 0]));
+  track.push(step(2, 1, 1e-4, [0.05, 0, 0], [0.0499, 0, 0]));
+  track.push(step(3, 1, 0, [0.07, 0, 0], [0.07, 0, 0]));
+  track.push(step(4, 2, 2e-3, [0, 0.02, 0], [0, 0.022, 0]));
+  surface.follow(track);
+  const [first, ...more] = surface.patches(1, [1, 0, 0, 0]);
+  assert.deepEqual(more, [], "one patch per cell, none without depth");
+  near(first.at, [0.01, 0, 0], "place");
+  near(first.normal, [1, 0, 0], "normal");
+  // x points to the user, y to the right, and z up
+  near(surface.patches(2, kTurnedFrame)[0].normal, [-1, 0, 0], "normal in the frame of the viewer");
+  const { version } = surface;
+  surface.follow(track);
+  assert.equal(surface.version, version, "no step is new");
+  for (let i = 0; i <= kMostPatches; ++i) track.push(step(5 + i, 2, 1e-3, [i * kPatchCell, 0.1, 0], [i * kPatchCell, 0.099, 0]));
+  surface.follow(track);
+  assert.deepEqual([1, 2].map((generation) => surface.patches(generation, [1, 0, 0, 0]).length), [0, kMostPatches], "the oldest ones are removed");
+  surface.follow(new Track());
+  assert.equal(surface.patches(2, [1, 0, 0, 0]).length, 0, "another device");
+});
+
 it("shows the field that a device renders: proxy, depth, generation", async (test) => {
   const { url } = await startDash(test, "127.0.0.1:9");
   const page = await visit(test, url, { before: (made) => fakeFeed(made, { devices: [...kDevices, kTouching], begin: 5000, until: 5600 }) });
@@ -196,7 +223,7 @@ it("shows the field that a device renders: proxy, depth, generation", async (tes
   await page.locator(`${depth} .u-over`).hover({ position: { x: 200, y: 50 } });
   await until("another instant has its generation and no contact", async () => (await cells.allTextContents()).slice(0, 2).join("; ") === "3; no contact", () => cells.allTextContents());
   await page.click("#space");
-  await until("the proxy is drawn", async () => /touching: a point, .*a proxy$/.test(await words(page)), () => words(page));
+  await until("the proxy and the surface of its generation are drawn", async () => /touching: a point, .*a proxy, the touched surface$/.test(await words(page)), () => words(page));
   assert.ok((await coloured(page, "second"))[0] > 15);
   assert.match(await page.locator(".handle", { hasText: "touching" }).locator(".values").textContent(), /at the proxy|mm below the proxy/);
   assert.equal(await page.locator(depth).isVisible(), false, "beside the 3-D view only the force is plotted");

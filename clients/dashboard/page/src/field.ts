@@ -10,7 +10,7 @@ const [kTop, kBottom, kMiddle, kAxis] = [22, 138, 64, 292];
 
 /**
  * The field that the device renders: the proxy, and below it the hand at its depth. Up is from the hand to the proxy.
- * The shape is not drawn, because it is not sent to observers.
+ * The surface is drawn in the 3-D view.
  */
 export class FieldPanel {
   readonly element: HTMLElement;
@@ -25,7 +25,7 @@ export class FieldPanel {
     this.element = h("section", { class: "panel field-panel", hidden: true }, h("h3", { text: "The field that the device renders" }),
       this.#svg as unknown as HTMLElement,
       h("table", {}, row("generation in use", this.#generation), row("depth of the hand", this.#depth), row("proxy x, y, z", this.#proxy)),
-      h("p", { class: "note", text: "The server sends the proxy and the depth to observers, but not the shape of the object." }));
+      h("p", { class: "note", text: "The shape of the object is not sent to observers. The 3-D view shows the surface where it was touched." }));
   }
 
   /** Shows the values at `cursor`. The scale fits the largest depth in [from, to]. */

@@ -189,7 +189,8 @@ function quatOfRows(a: Vec, b: Vec, c: Vec): Quat {
   return q as unknown as Quat;
 }
 
-export function wordsOf(figure: Figure): string {
+/** `patches`: the number of places of the surface that were touched. */
+export function wordsOf(figure: Figure, patches = 0): string {
   const parts: string[] = [figure.kind === "stylus" ? "a stylus" : "a point"];
   const some = (v: Vec | undefined, least: number): boolean => v !== undefined && Math.hypot(...v) > least;
   if (some(figure.force, kLeastForce)) parts.push("a force");
@@ -199,6 +200,7 @@ export function wordsOf(figure: Figure): string {
   if (figure.opening !== undefined) parts.push("two fingers");
   if (figure.plane) parts.push("a surface");
   if (figure.proxy) parts.push("a proxy");
+  if (patches > 0) parts.push("the touched surface");
   for (const button of figure.buttons) if (button.held) parts.push(`${button.name} held`);
   return parts.join(", ");
 }

@@ -44,7 +44,7 @@ export class SpacePanel {
     this.#seek = h("div", { class: "seek", hidden: true }, this.#play, this.#slider, this.#when);
     this.element = h("figure", { class: "chart spatial", "data-chart": "space", hidden: true },
       h("figcaption", {}, h("span", { class: "title" }, "In space"), h("span", { class: "legend" },
-        key("applied", "applied force"), key("wanted", "wanted force", true), h("span", { text: "1 cm for 1 N" }), key("torque", "torque"), key("energy", "surface"), key("second", "proxy"))),
+        key("applied", "applied force"), key("wanted", "wanted force", true), h("span", { text: "1 cm for 1 N" }), key("torque", "torque"), key("energy", "surface"), key("second", "proxy and touched surface"))),
       this.#said, h("div", { class: "stage" }, this.#canvas), this.#seek, this.#rows);
   }
 

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 import {
-  BoxGeometry, BufferAttribute, BufferGeometry, CircleGeometry, Color, ConeGeometry, CylinderGeometry, DoubleSide, Group, Line,
-  LineBasicMaterial, Mesh, MeshBasicMaterial, MeshLambertMaterial, Quaternion, RingGeometry, SphereGeometry, Vector3,
-  type Material, type Object3D,
+  BoxGeometry, BufferAttribute, BufferGeometry, CircleGeometry, Color, ConeGeometry, CylinderGeometry, DoubleSide, Group,
+  InstancedMesh, Line, LineBasicMaterial, Matrix4, Mesh, MeshBasicMaterial, MeshLambertMaterial, Quaternion, RingGeometry,
+  SphereGeometry, Vector3, type Material, type Object3D,
 } from "three";
 import { kLeastForce, kLeastTorque, type Figure, type Vec } from "./figure.js";
+import { kMostPatches, kPatchCell, type Patch } from "./surface.js";
 
 /** Length of a force arrow: 1 cm/N. */
 export const kMetresPerNewton = 0.01;
@@ -18,7 +19,8 @@ export type Paint = (name: string) => Color;
 
 const kUp = new Vector3(0, 1, 0);
 const kAhead = new Vector3(0, 0, 1);
-const scratch = { to: new Vector3(), turn: new Quaternion() };
+const kOne = new Vector3(1, 1, 1);
+const scratch = { to: new Vector3(), at: new Vector3(), turn: new Quaternion(), place: new Matrix4() };
 
 const shapes = {
   shaft: new CylinderGeometry(0.5, 0.5, 1, 14).translate(0, 0.5, 0),
@@ -33,6 +35,7 @@ const shapes = {
   dot: new SphereGeometry(0.0034, 16, 10),
   disc: new CircleGeometry(0.038, 48),
   rim: new RingGeometry(0.0372, 0.0384, 64),
+  patch: new CircleGeometry(0.75 * kPatchCell, 12),
 };
 
 /** rad, sweep of the ring for the maximum torque. */
@@ -199,14 +202,15 @@ export class Prop {
   readonly #proxy: Mesh;
   readonly #depth: Line;
   readonly #path: Path;
-  readonly #materials: Record<"body" | "tip" | "applied" | "wanted" | "torque" | "hand" | "off" | "on" | "finger", MeshLambertMaterial>;
+  readonly #surface: InstancedMesh;
+  readonly #materials: Record<"body" | "tip" | "applied" | "wanted" | "torque" | "hand" | "off" | "on" | "finger" | "surface", MeshLambertMaterial>;
   readonly #flat: Record<"plane" | "rim" | "path" | "proxy", MeshBasicMaterial>;
   readonly #line = new LineBasicMaterial();
 
   /** `triad` creates three axes of the given length. */
   constructor(triad: (length: number) => Group) {
     const lit = (): MeshLambertMaterial => new MeshLambertMaterial();
-    this.#materials = { body: lit(), tip: lit(), applied: lit(), wanted: lit(), torque: lit(), hand: lit(), off: lit(), on: lit(), finger: lit() };
+    this.#materials = { body: lit(), tip: lit(), applied: lit(), wanted: lit(), torque: lit(), hand: lit(), off: lit(), on: lit(), finger: lit(), surface: lit() };
     const see = (opacity: number): MeshBasicMaterial => new MeshBasicMaterial({ transparent: true, opacity, side: DoubleSide, depthWrite: false });
     this.#flat = { plane: see(0.28), rim: see(0.9), path: see(0.85), proxy: see(0.55) };
     this.#flat.path.vertexColors = true;
@@ -229,7 +233,11 @@ export class Prop {
     this.#depth = this.#gap.clone();
     this.#depth.geometry = this.#gap.geometry.clone();
     this.#path = new Path(this.#flat.path);
-    this.object.add(this.#tool, this.#force.object, this.#wanted.object, this.#hand.object, this.#ring.object, this.#plane, this.#gap, this.#proxy, this.#depth, this.#path.object);
+    m.surface.side = DoubleSide;
+    this.#surface = new InstancedMesh(shapes.patch, m.surface, kMostPatches);
+    this.#surface.frustumCulled = false;
+    this.#surface.count = 0;
+    this.object.add(this.#surface, this.#tool, this.#force.object, this.#wanted.object, this.#hand.object, this.#ring.object, this.#plane, this.#gap, this.#proxy, this.#depth, this.#path.object);
   }
 
   paint(colour: Paint, watched: boolean): void {
@@ -242,6 +250,7 @@ export class Prop {
     m.torque.color.copy(colour("torque"));
     m.hand.color.copy(colour("text"));
     m.off.color.copy(colour("line"));
+    m.surface.color.copy(colour("second"));
     m.on.color.copy(colour("notice"));
     m.on.emissive.copy(colour("notice")).multiplyScalar(0.7);
     this.#flat.plane.color.copy(colour("energy"));
@@ -283,6 +292,16 @@ export class Prop {
     this.#path.show(path, points, eye, width);
   }
 
+  /** Sets the touched surface, which is drawn until the next call. */
+  showSurface(patches: readonly Patch[]): void {
+    this.#surface.count = patches.length;
+    patches.forEach(({ at, normal }, i) => {
+      scratch.turn.setFromUnitVectors(kAhead, scratch.to.fromArray(normal));
+      this.#surface.setMatrixAt(i, scratch.place.compose(scratch.at.fromArray(at), scratch.turn, kOne));
+    });
+    this.#surface.instanceMatrix.needsUpdate = true;
+  }
+
   /** Draws the buttons along the handle. They are lit while pressed. */
   #showButtons(figure: Figure, stylus: boolean): void {
     figure.buttons.forEach((button, i) => {
@@ -310,5 +329,6 @@ export class Prop {
     this.#depth.geometry.dispose();
     this.#ring.dispose();
     this.#path.dispose();
+    this.#surface.dispose();
   }
 }

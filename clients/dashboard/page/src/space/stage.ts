@@ -12,6 +12,7 @@ import type { Track } from "../track.js";
 import { figureOf, frameOf, poseAt, rotated, threeOrder, wordsOf, type Figure, type Quat, type Vec } from "./figure.js";
 import { Orbit, gridOf } from "./orbit.js";
 import { Prop, kPathPoints, kUsualTorque } from "./prop.js";
+import { TouchedSurface } from "./surface.js";
 
 export interface Shown {
   readonly name: string;
@@ -49,6 +50,10 @@ class Place {
   readonly prop: Prop;
   readonly still = new Group();
   readonly path = new Float32Array(3 * kPathPoints);
+  readonly surface = new TouchedSurface();
+  /** Of the surface that is drawn. */
+  surfaceKey = "";
+  patches = 0;
   key = "";
   box: Box = { min: [0, 0, 0], max: [0, 0, 0] };
   figure: Figure | undefined;
@@ -146,7 +151,19 @@ export class Stage {
     // Width of two pixels in the center of the picture.
     const width = (Math.tan((kFieldOfView * Math.PI) / 360) * eye.z * 2.2) / Math.max(this.canvas.clientHeight, 1);
     place.prop.show(place.figure, most, place.path, n, local, width);
-    return place.figure ? wordsOf(place.figure) : "no state has come";
+    this.#drawSurface(place, track, frame, track.column("field")[i] ?? NaN);
+    return place.figure ? wordsOf(place.figure, place.patches) : "no state has come";
+  }
+
+  /** Draws the surface of the field that is in use, as far as it was touched in the whole track. */
+  #drawSurface(place: Place, track: Track, frame: Quat, generation: number): void {
+    place.surface.follow(track);
+    const key = `${place.surface.version} ${generation} ${frame}`;
+    if (key === place.surfaceKey) return;
+    place.surfaceKey = key;
+    const patches = place.surface.patches(generation, frame);
+    place.patches = patches.length;
+    place.prop.showSurface(patches);
   }
 
   #arrange(): void {
