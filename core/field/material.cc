@@ -48,6 +48,37 @@ double integral(const DepthTable& table, double depth) noexcept {
   return sum + rest * (table.force[last] + 0.5 * rise * rest);
 }
 
+/// The correction in knot i of a table with this step.
+double in_knot(const Material& law, double step, std::size_t i) noexcept {
+  const DepthTable& table = law.table;
+  return table.step == step || !table.used ? table.force[i] : law.correction(static_cast<double>(i) * step);
+}
+
+struct Range {
+  double least = 0;
+  double most = 0;
+};
+
+/// The allowed corrections of a knot after one with the correction `before`, in N.
+Range range_after(double before, const Material& law, double max_stiffness) noexcept {
+  const double rise = std::max(max_stiffness - law.stiffness - law.branch, 0.0);
+  return {.least = before - (1 - Material::kLeastShare) * law.stiffness * law.table.step,
+          .most = before + rise * law.table.step};
+}
+
+void expect_valid_table(const Material& law, double max_stiffness) {
+  const DepthTable& table = law.table;
+  if (!table.used) return;
+  expect(table.step >= DepthTable::kLeastStep && table.step <= DepthTable::kMostStep, "table.step", table.step,
+         shortest(DepthTable::kLeastStep) + " … " + shortest(DepthTable::kMostStep) + " m");
+  expect(table.force[0] == 0, "table knot 0", table.force[0], "0 N");
+  for (std::size_t i = 1; i <= DepthTable::kKnots; ++i) {
+    const Range range = range_after(table.force[i - 1], law, max_stiffness);
+    expect(table.force[i] >= range.least && table.force[i] <= range.most, "table knot " + std::to_string(i),
+           table.force[i], rounded(range.least, 6) + " … " + rounded(range.most, 6) + " N");
+  }
+}
+
 double potential(const Material& law, double w, double dent) noexcept {
   const double stretch = w - dent;
   return 0.5 * law.stiffness * w * w + integral(law.table, w) + 0.5 * law.branch * stretch * stretch;
@@ -55,12 +86,19 @@ double potential(const Material& law, double w, double dent) noexcept {
 
 }  // namespace
 
+DepthTable DepthTable::of(double step, std::span<const double> forces) noexcept {
+  DepthTable table{.step = step, .used = true};
+  for (std::size_t i = 1; i <= kKnots; ++i) table.force[i] = forces[std::min(i, forces.size()) - 1];
+  return table;
+}
+
 void Material::expect_valid(double max_stiffness) const {
   expect(stiffness > 0 && stiffness + branch <= max_stiffness, "stiffness", stiffness + branch,
          "above 0, and at most " + shortest(max_stiffness) + " N/m with the branch");
   expect_not_negative(branch, "branch");
   expect(tau >= kLeastTau && tau <= kMostTau, "tau", tau, "0.01 … 10 s");
   expect(friction >= 0 && friction <= kMostFriction, "friction", friction, "0 … 2");
+  expect_valid_table(*this, max_stiffness);
 }
 
 double Material::rest(double dent) const noexcept {
@@ -138,19 +176,21 @@ Material blended(const Material& from, const Material& to, double share) noexcep
   result.friction = share * to.friction + rest * from.friction;
   result.table.used = from.table.used || to.table.used;
   if (!result.table.used) return result;
+  double& step = result.table.step;  // the larger step, because the result must contain both tables
+  if (from.table.used) step = to.table.used ? std::max(from.table.step, to.table.step) : from.table.step;
   for (std::size_t i = 0; i < result.table.force.size(); ++i) {
-    result.table.force[i] = share * to.table.force[i] + rest * from.table.force[i];
+    result.table.force[i] = share * in_knot(to, step, i) + rest * in_knot(from, step, i);
   }
   return result;
 }
 
-void bound_table(Material& material, double most_slope) noexcept {
+void bound_table(Material& material, double max_stiffness) noexcept {
   auto& force = material.table.force;
   force[0] = 0;
-  const double fall = (1 - Material::kLeastShare) * material.stiffness * material.table.step;
-  const double rise = most_slope * material.table.step;
-  for (std::size_t i = 1; i < force.size(); ++i)
-    force[i] = std::clamp(force[i], force[i - 1] - fall, force[i - 1] + rise);
+  for (std::size_t i = 1; i < force.size(); ++i) {
+    const Range range = range_after(force[i - 1], material, max_stiffness);
+    force[i] = std::clamp(force[i], range.least, range.most);
+  }
 }
 
 }  // namespace tendon::field

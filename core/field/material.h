@@ -3,16 +3,26 @@
 
 #include <array>
 #include <cstddef>
+#include <span>
 
 namespace tendon::field {
 
 /// The correction of the force in N as a function of the depth. Knot i is for the depth i · step. The table is linear
-/// between knots and constant beyond the last one. The correction at depth 0 is 0.
+/// between knots and constant beyond the last one. The correction at depth 0 is 0. An engine can describe a table, and
+/// true forces change it (Residual).
 struct DepthTable {
   static constexpr std::size_t kKnots = 16;
-  double step = 1e-3;                      ///< m
-  std::array<double, kKnots + 1> force{};  ///< N; force[0] = 0
-  bool used = false;                       ///< false: all zero
+  static constexpr double kLeastStep = 1e-4;  ///< m
+  static constexpr double kMostStep = 0.1;    ///< m
+  double step = 1e-3;                         ///< m
+  std::array<double, kKnots + 1> force{};     ///< N; force[0] = 0
+  bool used = false;                          ///< false: all zero
+
+  /// Returns a table with the given forces, which are for the depths step, 2 step, and so on. There must be between 1 and
+  /// kKnots forces. The last force is also used for the remaining knots.
+  static DepthTable of(double step, std::span<const double> forces) noexcept;
+
+  bool operator==(const DepthTable&) const = default;
 };
 
 /// The force of a surface at the depth d = ‖p − x‖ of the hand x below the proxy p: a spring, beside a spring in series
@@ -38,8 +48,8 @@ struct Material {
   double friction = 0;      ///< μ, 0 … kMostFriction
   DepthTable table{};
 
-  /// Throws std::invalid_argument with the name of the field if a number is out of its range, or if the stiffness with
-  /// the branch exceeds `max_stiffness`.
+  /// Throws std::invalid_argument with the name of the field if a number is out of its range, if the stiffness with the
+  /// branch exceeds `max_stiffness`, or if the table has a knot that bound_table would change.
   void expect_valid(double max_stiffness) const;
 
   double energy(double depth, double dent) const noexcept;                  ///< U, J
@@ -54,12 +64,15 @@ struct Material {
 
   double most_stiffness() const noexcept;          ///< K, N/m
   double correction(double depth) const noexcept;  ///< c, N
+
+  bool operator==(const Material&) const = default;
 };
 
-/// Returns a material between two: `share` 0 is `from`, 1 is `to`. The tables must have the same step.
+/// Returns a material between two: `share` 0 is `from`, 1 is `to`. If the tables have different steps, the result has
+/// the larger one, and the knots of the finer table that are not on it are lost.
 Material blended(const Material& from, const Material& to, double share) noexcept;
 
-/// Clamps the table from knot to knot, so that its slope is between −(1 − kLeastShare) k₁ and `most_slope` (N/m).
-void bound_table(Material& material, double most_slope) noexcept;
+/// Clamps the table from knot to knot. Its slope is then between −(1 − kLeastShare) k₁ and `max_stiffness` − k₁ − k_m.
+void bound_table(Material& material, double max_stiffness) noexcept;
 
 }  // namespace tendon::field

@@ -8,11 +8,6 @@
 namespace tendon::field {
 namespace {
 
-bool same(const Material& a, const Material& b) noexcept {
-  return a.stiffness == b.stiffness && a.branch == b.branch && a.tau == b.tau && a.friction == b.friction &&
-         a.table.step == b.table.step;
-}
-
 /// Returns the position at the distance `to` from x in the direction of p, which is at the distance `from`.
 Vec3 at_distance(const Vec3& p, const Vec3& x, double from, double to) noexcept {
   return from > 0 ? Vec3(x + (p - x) * (to / from)) : x;
@@ -40,10 +35,8 @@ void Renderer::use(const Field* field, LocalTime now) noexcept {
   }
   const std::size_t count = std::min(field->materials.size(), materials_.size());
   for (std::size_t i = 0; i < count; ++i) {
-    const DepthTable learned = materials_[i].table;
-    const bool kept = i < material_count_ && same(materials_[i], field->materials[i]);
-    materials_[i] = field->materials[i];
-    if (kept) materials_[i].table = learned;
+    if (i < material_count_ && described_[i] == field->materials[i]) continue;  // keeps what was learned
+    materials_[i] = described_[i] = field->materials[i];
   }
   material_count_ = count;
   from_ = law_;
@@ -59,8 +52,8 @@ double Renderer::stored(const Vec3& x) const noexcept {
 
 bool Renderer::observe(std::uint64_t tick, const Vec3& truth, LocalTime now) noexcept {
   if (!first_tick_ || tick < *first_tick_) return false;
-  return residual_.learn(tick, truth, now, config_.max_stiffness,
-                         std::span(materials_).first(config_.learns ? material_count_ : 0));
+  return residual_.learn(tick, truth, now, config_.max_stiffness, std::span(materials_).first(material_count_),
+                         config_.learns);
 }
 
 void Renderer::start(const Pose& pose, const Vec3& x) noexcept {

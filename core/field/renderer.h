@@ -61,8 +61,8 @@ class Renderer {
   /// Throws std::invalid_argument with the name of the field if it is out of range.
   explicit Renderer(const Config& config);
 
-  /// Replaces the field. `field` must be valid and outlive its use. Learned tables are kept if the material does not
-  /// change. If the pointer is null, the field is removed, and its pose, tables and true forces are forgotten.
+  /// Replaces the field. `field` must be valid and outlive its use. Learned tables are kept if the material and its table
+  /// do not change. If the pointer is null, the field is removed, and its pose, tables and true forces are forgotten.
   void use(const Field* field, LocalTime now) noexcept;
 
   /// Sets p to x in the next step. Must be called if the force was not applied.
@@ -99,7 +99,8 @@ class Renderer {
 
   Config config_;
   const Field* field_ = nullptr;
-  std::array<Material, Field::kMostMaterials> materials_{};  ///< with their tables
+  std::array<Material, Field::kMostMaterials> described_{};  ///< by the engine
+  std::array<Material, Field::kMostMaterials> materials_{};  ///< with the learned tables
   std::size_t material_count_ = 0;
   std::array<Pull, Field::kMostFixtures> pulls_{};
   std::size_t pull_count_ = 0;

@@ -10,7 +10,7 @@ namespace tendon::field {
 void Residual::note(const Given& given) noexcept { steps_[given.tick % kSteps] = given; }
 
 bool Residual::learn(std::uint64_t tick, const Vec3& truth, LocalTime now, double max_stiffness,
-                     std::span<Material> materials) noexcept {
+                     std::span<Material> materials, bool teaches) noexcept {
   const Given& given = steps_[tick % kSteps];
   if (!truth.allFinite() || given.tick != tick || (learned_ && tick <= *learned_)) return false;
   learned_ = tick;
@@ -18,7 +18,7 @@ bool Residual::learn(std::uint64_t tick, const Vec3& truth, LocalTime now, doubl
   if (given.material < materials.size()) {
     Material& material = materials[given.material];
     DepthTable& table = material.table;
-    if (given.depth > kLeastDepth) {
+    if (teaches && given.depth > kLeastDepth) {
       const double error = truth.dot(given.direction) - given.spring - material.correction(given.depth);
       const double place = std::min(given.depth / table.step, static_cast<double>(DepthTable::kKnots));
       const std::size_t i = std::min(static_cast<std::size_t>(place), DepthTable::kKnots - 1);
@@ -28,7 +28,7 @@ bool Residual::learn(std::uint64_t tick, const Vec3& truth, LocalTime now, doubl
       table.used = true;
       table.force[i] += lower * lesson;
       table.force[i + 1] += upper * lesson;
-      bound_table(material, std::max(max_stiffness - material.stiffness - material.branch, 0.0));
+      bound_table(material, max_stiffness);
     }
     known += material.correction(given.depth);
   }

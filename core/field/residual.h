@@ -48,10 +48,11 @@ class Residual {
   /// Stores a step. Ticks must increase.
   void note(const Given& given) noexcept;
 
-  /// Learns from the truth for step `tick`; `max_stiffness` (N/m) bounds the materials with their tables. Returns false
-  /// and does nothing if the truth is not finite, or if the step is unknown or not newer than that of the last truth.
-  bool learn(std::uint64_t tick, const Vec3& truth, LocalTime now, double max_stiffness,
-             std::span<Material> materials) noexcept;
+  /// Learns from the truth for step `tick`; `max_stiffness` (N/m) bounds the materials with their tables. If `teaches` is
+  /// false, the tables are not changed. Returns false and does nothing if the truth is not finite, or if the step is
+  /// unknown or not newer than that of the last truth.
+  bool learn(std::uint64_t tick, const Vec3& truth, LocalTime now, double max_stiffness, std::span<Material> materials,
+             bool teaches = true) noexcept;
 
   /// Forgets the rest of the last truth.
   void forget() noexcept { rest_ = ease_ = given_ = Vec3::Zero(); }

@@ -7,6 +7,7 @@
 #include <cstdlib>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "core/field/renderer.h"
 #include "devices/safety/safe_device.h"
@@ -106,7 +107,9 @@ TEST(FieldRenderer, TenThousandStepsMakeNoHeapCall) {
                 bricks);
   field::Field first{.bricks = &bricks, .materials = {{.stiffness = 600, .branch = 300, .friction = 0.3}}};
   first.fixtures = {{.kind = field::Fixture::Kind::kLine, .stiffness = 100}};
+  first.materials[0].table = field::DepthTable::of(2e-3, std::vector{0.5, 0.2});
   field::Field second{.bricks = &bricks, .materials = {{.stiffness = 900}}};
+  second.materials[0].table = field::DepthTable::of(1e-3, std::vector{0.3});
   const auto renderer = std::make_unique<field::Renderer>(
       field::Renderer::Config{.max_stiffness = 1500, .push = {.push_j = 0.01, .push_w = 0.1}});
   std::uint64_t calls = 0;

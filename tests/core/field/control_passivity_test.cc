@@ -14,6 +14,7 @@
 #include "core/base/rotation.h"
 #include "core/haptic_controller.h"
 #include "core/ledger/energy_ledger.h"
+#include "tests/core/field/random_table.h"
 #include "tests/core/field/shapes.h"
 #include "tests/support/dice.h"
 #include "tests/support/property_cases.h"
@@ -52,6 +53,7 @@ Field random_field(Dice& dice, double most_stiffness) {
                       .branch = dice.chance(0.5) ? 0 : 0.4 * most_stiffness,
                       .tau = dice.within(0.02, 0.3),
                       .friction = dice.chance(0.5) ? 0 : dice.uniform()}};
+  describe_table(dice, most_stiffness, field.materials[0]);
   return field;
 }
 

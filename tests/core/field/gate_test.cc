@@ -17,6 +17,7 @@
 #include "core/base/rotation.h"
 #include "core/field/renderer.h"
 #include "core/ledger/energy_ledger.h"
+#include "tests/core/field/random_table.h"
 #include "tests/core/field/shapes.h"
 #include "tests/support/dice.h"
 #include "tests/support/property_cases.h"
@@ -64,6 +65,7 @@ Field random_field(Dice& dice, double stiffness, double fixture_stiffness) {
   material.branch = dice.chance(0.5) ? 0 : 0.4 * stiffness;
   material.tau = dice.within(0.02, 0.32);
   material.stiffness = (stiffness - material.branch) * (dice.chance(0.7) ? 1 : dice.within(0.05, 1));
+  describe_table(dice, stiffness, material);
   field.materials = {material};
   return field;
 }

@@ -3,23 +3,26 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <vector>
 
 #include "core/field/fixture.h"
+#include "tests/core/field/random_table.h"
 #include "tests/support/dice.h"
+#include "tests/support/refusal.h"
 
 namespace tendon::field::material_test {
 namespace {
+
+constexpr double kMostStiffness = 1500;
 
 Material random_material(Dice& dice) {
   Material material{.stiffness = dice.within(50, 1000),
                     .branch = dice.chance(0.3) ? 0 : dice.within(0, 500),
                     .tau = dice.within(0.01, 1)};
-  if (dice.chance(0.7)) {
-    material.table.used = true;
-    for (double& force : material.table.force) force = dice.within(-2, 2);
-    bound_table(material, 500);
-  }
+  describe_table(dice, kMostStiffness, material);
   return material;
 }
 
@@ -107,6 +110,64 @@ TEST(FieldMaterial, ABlendIsLinearInTheForce) {
                   1e-12);
     }
   }
+}
+
+TEST(FieldMaterial, ABlendOfTwoStepsContainsBothTablesAndIsNotStiffer) {
+  Dice dice(13);
+  for (int run = 0; run < 2000; ++run) {
+    Material a = random_material(dice);
+    Material b = random_material(dice);
+    a.branch = b.branch = 0;
+    const double share = dice.uniform();
+    const Material both = blended(a, b, share);
+    EXPECT_LE(both.most_stiffness(), std::max(a.most_stiffness(), b.most_stiffness()) + 1e-6);
+    for (std::size_t i = 1; both.table.used && i <= DepthTable::kKnots; ++i) {
+      EXPECT_GE(both.table.force[i] - both.table.force[i - 1], -0.9 * both.stiffness * both.table.step - 1e-12);
+    }
+    const double end = 16 * both.table.step;
+    for (const double depth : {2 * both.table.step, end, 2 * end}) {
+      const double expected = (1 - share) * a.force(depth, 0) + share * b.force(depth, 0);
+      EXPECT_NEAR(both.force(depth, 0), expected, 1e-9 * (1 + expected)) << "run " << run;
+    }
+  }
+}
+
+TEST(FieldMaterial, ADescribedTableIsRefusedExactlyIfItWouldBeBounded) {
+  Dice dice(14);
+  int refused = 0;
+  for (int run = 0; run < 2000; ++run) {
+    Material law = random_material(dice);
+    EXPECT_NO_THROW(law.expect_valid(kMostStiffness));
+    if (!law.table.used) continue;
+    const std::size_t knot = 1 + dice.bits() % DepthTable::kKnots;
+    law.table.force[knot] += law.table.step * dice.within(-2000, 2000);
+    Material bounded = law;
+    bound_table(bounded, kMostStiffness);
+    const bool valid = thrown_by([&] { law.expect_valid(kMostStiffness); }).empty();
+    EXPECT_EQ(valid, bounded == law);
+    refused += valid ? 0 : 1;
+  }
+  EXPECT_GT(refused, 500);
+}
+
+TEST(FieldMaterial, ATableThatCannotBeIsRefusedWithItsKnot) {
+  const auto said = [](double step, std::vector<double> forces) {
+    const Material law{.stiffness = 200, .branch = 300, .table = DepthTable::of(step, forces)};
+    return thrown_by([&] { law.expect_valid(1500); });
+  };
+  EXPECT_EQ(said(1e-3, {1, 2, 2.5}), "");
+  EXPECT_EQ(said(1e-3, {1, 2.1}), "table knot 2 = 2.1: expected 0.82 … 2 N");
+  EXPECT_EQ(said(2e-3, {0, -0.37}), "table knot 2 = -0.37: expected -0.36 … 2 N");
+  EXPECT_EQ(said(1e-3, {0, std::nan("")}), "table knot 2 = nan: expected -0.18 … 1 N");
+  EXPECT_EQ(said(9e-5, {0}), "table.step = 9e-05: expected 1e-04 … 0.1 m");
+  EXPECT_EQ(said(0.11, {0}), "table.step = 0.11: expected 1e-04 … 0.1 m");
+}
+
+TEST(FieldMaterial, BeyondItsLastForceATableIsConstant) {
+  const Material law{.stiffness = 100, .table = DepthTable::of(2e-3, std::vector{0.1, 0.4})};
+  EXPECT_NEAR(law.correction(3e-3), 0.25, 1e-12);
+  for (const double depth : {4e-3, 5e-3, 32e-3, 1.0}) EXPECT_NEAR(law.correction(depth), 0.4, 1e-12) << depth;
+  EXPECT_NEAR(law.most_stiffness(), 250, 1e-9);
 }
 
 TEST(FieldFixture, PullsToAPointALineOrAPlaneUpToItsForce) {

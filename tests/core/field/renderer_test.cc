@@ -9,6 +9,7 @@
 #include <iostream>
 #include <memory>
 #include <numbers>
+#include <vector>
 
 #include "core/base/rotation.h"
 #include "core/control/limiter.h"
@@ -212,6 +213,77 @@ TEST(FieldRenderer, MaterialsBlendWhereTheHandCrossesTheirBorder) {
   }
   EXPECT_NEAR(force, 2.4, 1e-6);
   EXPECT_LT(jump, 1.8 / 50 + 1e-3);
+}
+
+TEST(FieldRenderer, ASwapToAnotherTableDoesNotJump) {
+  Field fine = flat(500);
+  fine.materials[0].table = DepthTable::of(2e-4, std::vector{0.1, 0.3});
+  Field coarse = flat(500);
+  coarse.materials[0].table = DepthTable::of(1e-3, std::vector{0.0, 0.5, 1.2, 2.0});
+  const Vec3 x(0, 0, -0.0045);  // between two knots
+  Renderer renderer({});
+  double jump = 0;
+  double before = 0;
+  const auto force_after = [&](const Field& field, int from) {
+    renderer.use(&field, at_ms(from));
+    for (int k = from; k < from + 1000; ++k) {
+      const double force =
+          renderer.render({.at = at_ms(k), .position = x}, kPaid, static_cast<std::uint64_t>(k)).force.z();
+      if (from > 0) jump = std::max(jump, std::abs(force - before));
+      before = force;
+    }
+    return before;
+  };
+  EXPECT_NEAR(force_after(fine, 0), 2.25 + 0.3, 1e-9);
+  EXPECT_NEAR(force_after(coarse, 1000), 2.25 + 2, 1e-9);
+  EXPECT_NEAR(force_after(fine, 2000), 2.25 + 0.3, 1e-9);
+  EXPECT_GT(jump, 1.7 / 51);
+  EXPECT_LT(jump, 1.7 / 50 + 1e-3);
+}
+
+TEST(FieldRenderer, ALearnedTableIsKeptIfTheSameTableIsDescribed) {
+  Field field = flat(500);
+  field.materials[0].table = DepthTable::of(1e-3, std::vector{0.1, 0.3, 0.6, 1.0});
+  const DepthTable& described = field.materials[0].table;
+  Renderer renderer({});
+  renderer.use(&field, at_ms(0));
+  EXPECT_EQ(renderer.material(0).table, described);
+  for (int k = 0; k < 500; ++k) {
+    renderer.render({.at = at_ms(k), .position = {0, 0, -0.0025}}, kPaid, static_cast<std::uint64_t>(k));
+  }
+  ASSERT_TRUE(renderer.observe(499, Vec3(0, 0, 500 * 0.0025 + 0.65), at_ms(500)));
+  const DepthTable learned = renderer.material(0).table;
+  EXPECT_NEAR(learned.force[2], described.force[2] + 0.06, 1e-9) << "0.3 of 0.2 N, which is too little at 2.5 mm";
+  EXPECT_NEAR(learned.force[3], described.force[3] + 0.06, 1e-9);
+  EXPECT_EQ(learned.force[4], described.force[4]);
+  Field same = field;
+  renderer.use(&same, at_ms(501));
+  EXPECT_EQ(renderer.material(0).table, learned);
+  Field other = field;
+  other.materials[0].table.force[16] += 0.1;
+  renderer.use(&other, at_ms(502));
+  EXPECT_EQ(renderer.material(0).table, other.materials[0].table);
+  const Field none = flat(500);
+  renderer.use(&none, at_ms(503));
+  EXPECT_EQ(renderer.material(0).table, DepthTable{});
+}
+
+// Regression: without learning, the held force contained the correction of the table twice.
+TEST(FieldRenderer, ATruthThatAgreesWithATableDoesNotChangeTheForce) {
+  Field field = flat(500);
+  field.materials[0].table = DepthTable::of(1e-3, std::vector{0.1, 0.3, 0.6, 1.0});
+  for (const bool learns : {false, true}) {
+    Renderer renderer({.learns = learns});
+    renderer.use(&field, at_ms(0));
+    for (int k = 0; k < 1000; ++k) {
+      const double force =
+          renderer.render({.at = at_ms(k), .position = {0, 0, -0.003}}, kPaid, static_cast<std::uint64_t>(k)).force.z();
+      if (k < 500) continue;
+      EXPECT_NEAR(force, 500 * 0.003 + 0.6, 1e-9);
+      renderer.observe(static_cast<std::uint64_t>(k), Vec3(0, 0, 500 * 0.003 + 0.6), at_ms(k));
+    }
+    EXPECT_NEAR(renderer.material(0).table.force[3], 0.6, 1e-9);
+  }
 }
 
 TEST(FieldRenderer, WithoutAFieldThereIsNoForceAndAWrongConfigIsRefused) {
