@@ -17,7 +17,8 @@ namespace tendon::field {
 /// Must be built outside the haptic thread.
 struct Field {
   static constexpr std::size_t kMostPrimitives = 32;
-  static constexpr std::size_t kMostMaterials = 16;
+  static constexpr std::size_t kMostMaterials = 8;
+  static constexpr std::size_t kMostTables = 3;  ///< of the materials; a UseField must fit into a datagram
   static constexpr std::size_t kMostFixtures = 4;
   static constexpr double kPrimitiveSpacing = 1e-3;  ///< m, the spacing of a field without bricks
 

@@ -23,9 +23,9 @@ using field::BrickField;
 constexpr std::array<std::string_view, 3> kAxisNames = {".x", ".y", ".z"};
 constexpr std::string_view kBricks = "at most 1023";
 constexpr std::string_view kPrimitives = "at most 32";
-constexpr std::string_view kMaterials = "0 … 15";
+constexpr std::string_view kMaterials = "0 … 7";
 static_assert(BrickField::kMostBricks == 1023 && field::Field::kMostPrimitives == 32);
-static_assert(field::Field::kMostMaterials == 16);
+static_assert(field::Field::kMostMaterials == 8);
 
 double f64_at(std::span<const std::byte> bytes, std::size_t at) noexcept {
   return std::bit_cast<double>(get_little_endian<std::uint64_t>(bytes.data() + at));

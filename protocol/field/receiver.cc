@@ -196,6 +196,8 @@ std::optional<FieldManifest> FieldReceiver::ready(const FieldName& field) const 
   return offer->manifest();
 }
 
+bool FieldReceiver::has(const FieldName& field) const noexcept { return offer_of(offers_, field) != nullptr; }
+
 bool FieldReceiver::drop(const FieldName& field) noexcept {
   Offer* const offer = offer_of(offers_, field);
   if (offer != nullptr) offer->open = false;

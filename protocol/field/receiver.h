@@ -47,6 +47,8 @@ class FieldReceiver {
   std::optional<FieldStatus> next_status(LocalTime now);
   LocalTime due() const noexcept;  ///< when next_status() should be called; LocalTime::max() without offers
 
+  bool has(const FieldName& field) const noexcept;  ///< true if the field was offered and not dropped
+
   /// Returns the manifest if all bricks were available at the time of the last status, or nullopt.
   std::optional<FieldManifest> ready(const FieldName& field) const noexcept;
   /// Returns null if the brick is not available.

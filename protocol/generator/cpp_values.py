@@ -109,6 +109,8 @@ class _Values:
             if above != heading:
                 heading = above
                 self._lines += wrapped(self._words.say(heading, message.name), "  ", "// ")
+            if member.field and member.field.repeated and member.field.kind == "number" and not member.field.is_matrix:
+                self._lines.append(f"  std::uint32_t size = 0;  ///< number of entries of `{member.name}`")
             self._lines += _commented(self._declared(member, message), self._comment(member, message, own))
         for oneof in message.oneofs if own else ():
             kinds = [message.wrapper(one.name) or one.type for one in message.oneof(oneof)]

@@ -106,6 +106,7 @@ std::string_view refused_field(SetShare wanted) noexcept { return refused(wanted
 std::string_view refused_field(UseField wanted) {
   if (wanted.materials.size() > field::Field::kMostMaterials) return "materials";  // the Writer truncates them
   if (wanted.fixtures.size() > field::Field::kMostFixtures) return "fixtures";
+  if (wanted.tables.size() > field::Field::kMostTables) return "tables";
   wanted.channel = 0;
   wanted.generation = 1;
   return refused<kMaxDatagram>(wanted, wire::kUseFieldFields);

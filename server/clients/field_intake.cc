@@ -5,6 +5,7 @@
 #include <atomic>
 #include <limits>
 #include <memory>
+#include <span>
 #include <stdexcept>
 #include <utility>
 
@@ -19,6 +20,8 @@ namespace {
 constexpr Duration kNoticeEvery = std::chrono::seconds(1);  ///< of a client
 constexpr std::size_t kMostFieldNotices = 16;
 constexpr std::size_t kCellsOfABrick = 64;  ///< number of cells that take as long to build as a brick
+constexpr std::string_view kWasOffered = "expected a field that was offered";
+constexpr std::string_view kHasArrived = "expected a field whose bricks have all arrived, found one that is incomplete";
 
 std::string named_field(const FieldName& name) { return "field " + short_name(name) + ": "; }
 
@@ -53,6 +56,21 @@ field::Fixture fixture_of(const FieldFixture& sent) {
   }
   fixture.direction = sent.normal;
   return fixture;
+}
+
+/// Adds the tables to the materials. Returns an error message if a table has no material of its own, or an empty string.
+std::string objection_to_tables(const UseField& wanted, std::vector<field::Material>& materials) {
+  for (std::size_t i = 0; i < wanted.tables.size(); ++i) {
+    const FieldDepthTable& sent = wanted.tables[i];
+    const std::string name = "tables[" + std::to_string(i) + "].material";
+    if (sent.material >= materials.size()) {
+      return not_expected(name, sent.material, "below " + std::to_string(materials.size()));
+    }
+    field::DepthTable& table = materials[sent.material].table;
+    if (table.used) return not_expected(name, sent.material, "a material without another table");
+    table = field::DepthTable::of(sent.step, std::span(sent.force).first(sent.size));
+  }
+  return {};
 }
 
 field::Field field_of(const FieldManifest& manifest, const UseField& wanted) {
@@ -162,7 +180,9 @@ Outcome FieldIntake::use(LocalTime now, const ServedClient& client, const UseFie
   Guest& guest = guest_of(client);
   const auto manifest = guest.receiver.ready(wanted.field);
   if (!manifest) {
-    return {.code = Code::kInvalid, .detail = named_field(wanted.field) + "expected a field that is complete"};
+    const bool known = guest.receiver.has(wanted.field);
+    return {.code = Code::kInvalid,
+            .detail = named_field(wanted.field) + std::string(known ? kHasArrived : kWasOffered)};
   }
   return pass_on(now, guest, *channel, *manifest, wanted, client.id());
 }
@@ -170,7 +190,8 @@ Outcome FieldIntake::use(LocalTime now, const ServedClient& client, const UseFie
 Outcome FieldIntake::pass_on(LocalTime now, Guest& guest, Channel& channel, const FieldManifest& manifest,
                              const UseField& wanted, std::uint32_t source) {
   field::Field field = field_of(manifest, wanted);
-  std::string objection = objection_to(field, manifest, devices_[wanted.device].fields->max_stiffness);
+  std::string objection = objection_to_tables(wanted, field.materials);
+  if (objection.empty()) objection = objection_to(field, manifest, devices_[wanted.device].fields->max_stiffness);
   if (!objection.empty()) return {.code = Code::kInvalid, .detail = named_field(wanted.field) + std::move(objection)};
   const std::size_t bricks = manifest.bricks();
   if (bricks > 0 && !channel.slots.has(wanted.field)) {
@@ -236,7 +257,7 @@ void FieldIntake::record(LocalTime now, const Guest& guest, Channel& channel, co
 
 Outcome FieldIntake::drop(LocalTime /*now*/, const ServedClient& client, const DropField& wanted) {
   if (!guest_of(client).receiver.drop(wanted.field)) {
-    return {.code = Code::kInvalid, .detail = named_field(wanted.field) + "expected a field that was offered"};
+    return {.code = Code::kInvalid, .detail = named_field(wanted.field) + std::string(kWasOffered)};
   }
   for (auto& channels : channels_) {
     for (const auto& channel : channels) {

@@ -363,6 +363,10 @@ std::string encode(const FieldData& data) {
     one.set_branch_stiffness_npm(material.branch);
     one.set_relaxation_s(material.tau);
     one.set_friction(material.friction);
+    if (!material.table.used) continue;
+    one.set_table_step_m(material.table.step);
+    const auto corrections = std::span(material.table.force).subspan(1);
+    one.mutable_table_force_n()->Add(corrections.begin(), corrections.end());
   }
   for (const field::Fixture& fixture : data.fixtures) {
     pb::FieldFixture& one = *out.add_fixtures();
@@ -513,6 +517,8 @@ FieldData decode_field_data(std::string_view message, LocalTime at) {
                              .branch = one.branch_stiffness_npm(),
                              .tau = one.relaxation_s(),
                              .friction = one.friction()});
+    const std::span corrections(one.table_force_n().data(), static_cast<std::size_t>(one.table_force_n_size()));
+    if (!corrections.empty()) out.materials.back().table = field::DepthTable::of(one.table_step_m(), corrections);
   }
   for (const pb::FieldFixture& one : in.fixtures()) {
     if (one.kind() > static_cast<std::uint32_t>(field::Fixture::Kind::kPlane))

@@ -127,6 +127,10 @@ void print(Line& line, const UseField& use) {
     line << "fixture" << one.kind << one.at << one.normal << one.stiffness;
     if (one.most_force) line << *one.most_force;
   }
+  for (const FieldDepthTable& one : use.tables) {
+    line << "table" << one.material << one.step;
+    for (std::size_t i = 0; i < one.size; ++i) line << one.force[i];
+  }
 }
 
 void print(Line& line, const LocalModel& model) {

@@ -45,7 +45,8 @@ inline UseField use_field() {
                         .at = {0.01, 0, -0.02},
                         .normal = {0.6, 0, 0.8},
                         .stiffness = 200,
-                        .most_force = 1.5}}};
+                        .most_force = 1.5}},
+          .tables = {{.material = 1, .step = 0.002, .size = 3, .force = {-0.125, 0, 0.5}}}};
 }
 inline DropField drop_field() { return {.field = field_name()}; }
 /// Of a manifest with 10 known bricks, the bricks 0 and 9 are missing.

@@ -42,9 +42,13 @@ class FieldEngine {
     return session() != nullptr ? session()->request(request).value_or(0) : 0;
   }
   std::uint32_t use(const FieldName& field, std::uint32_t generation,
-                    std::vector<FieldMaterial> materials = {{.stiffness = 500}}, std::uint32_t channel = 0) {
-    return ask(
-        UseField{.channel = channel, .generation = generation, .field = field, .materials = std::move(materials)});
+                    std::vector<FieldMaterial> materials = {{.stiffness = 500}}, std::uint32_t channel = 0,
+                    std::vector<FieldDepthTable> tables = {}) {
+    return ask(UseField{.channel = channel,
+                        .generation = generation,
+                        .field = field,
+                        .materials = std::move(materials),
+                        .tables = std::move(tables)});
   }
   const Answer* answer(std::uint32_t id) const {
     const auto found = answers.find(id);

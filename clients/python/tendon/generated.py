@@ -34,6 +34,7 @@ __all__ = [
     "Echo",
     "Engage",
     "FieldBrick",
+    "FieldDepthTable",
     "FieldFixture",
     "FieldFixtureKind",
     "FieldMaterial",
@@ -423,6 +424,18 @@ class FieldFixture:
 
 
 @dataclass(frozen=True, slots=True)
+class FieldDepthTable:
+    """This table is added to the force of the springs of a material. The correction is zero at the surface, and is
+    interpolated linearly between the entries. The last entry is also used for all greater depths. The slope of the
+    table must be at least −0.9 times the stiffness of the material. The sum of the slope and the stiffnesses must not
+    exceed the maximum stiffness of the server."""
+
+    material: int  # the number of the material
+    step: float  # m, the spacing of the entries
+    force: Sequence[float]  # N, entry i is for the depth (i + 1) · step
+
+
+@dataclass(frozen=True, slots=True)
 class UseField:
     """Uses a field in a channel instead of the previous one. The field must be complete on the server (FieldStatus),
     and the client must have the lease of the channel, as for a ForceCommand."""
@@ -433,6 +446,7 @@ class UseField:
     field: bytes  # the hash of the manifest
     materials: Sequence[FieldMaterial]  # the materials, which are numbered from 0 in the manifest
     fixtures: Sequence[FieldFixture] = ()
+    tables: Sequence[FieldDepthTable] = ()  # the tables of the materials that have one
 
 
 @dataclass(frozen=True, slots=True)

@@ -438,6 +438,16 @@ class FieldBrick(_message.Message):
     weights: bytes
     def __init__(self, hash: _Optional[bytes] = ..., weights: _Optional[bytes] = ...) -> None: ...
 
+class FieldDepthTable(_message.Message):
+    __slots__ = ["force_n", "material", "step_m"]
+    FORCE_N_FIELD_NUMBER: _ClassVar[int]
+    MATERIAL_FIELD_NUMBER: _ClassVar[int]
+    STEP_M_FIELD_NUMBER: _ClassVar[int]
+    force_n: _containers.RepeatedScalarFieldContainer[float]
+    material: int
+    step_m: float
+    def __init__(self, material: _Optional[int] = ..., step_m: _Optional[float] = ..., force_n: _Optional[_Iterable[float]] = ...) -> None: ...
+
 class FieldFixture(_message.Message):
     __slots__ = ["at_m", "kind", "most_force_n", "normal", "stiffness_npm"]
     AT_M_FIELD_NUMBER: _ClassVar[int]
@@ -949,20 +959,22 @@ class TakeLease(_message.Message):
     def __init__(self, device: _Optional[int] = ..., channel: _Optional[int] = ...) -> None: ...
 
 class UseField(_message.Message):
-    __slots__ = ["channel", "device", "field", "fixtures", "generation", "materials"]
+    __slots__ = ["channel", "device", "field", "fixtures", "generation", "materials", "tables"]
     CHANNEL_FIELD_NUMBER: _ClassVar[int]
     DEVICE_FIELD_NUMBER: _ClassVar[int]
     FIELD_FIELD_NUMBER: _ClassVar[int]
     FIXTURES_FIELD_NUMBER: _ClassVar[int]
     GENERATION_FIELD_NUMBER: _ClassVar[int]
     MATERIALS_FIELD_NUMBER: _ClassVar[int]
+    TABLES_FIELD_NUMBER: _ClassVar[int]
     channel: int
     device: int
     field: bytes
     fixtures: _containers.RepeatedCompositeFieldContainer[FieldFixture]
     generation: int
     materials: _containers.RepeatedCompositeFieldContainer[FieldMaterial]
-    def __init__(self, device: _Optional[int] = ..., channel: _Optional[int] = ..., generation: _Optional[int] = ..., field: _Optional[bytes] = ..., materials: _Optional[_Iterable[_Union[FieldMaterial, _Mapping]]] = ..., fixtures: _Optional[_Iterable[_Union[FieldFixture, _Mapping]]] = ...) -> None: ...
+    tables: _containers.RepeatedCompositeFieldContainer[FieldDepthTable]
+    def __init__(self, device: _Optional[int] = ..., channel: _Optional[int] = ..., generation: _Optional[int] = ..., field: _Optional[bytes] = ..., materials: _Optional[_Iterable[_Union[FieldMaterial, _Mapping]]] = ..., fixtures: _Optional[_Iterable[_Union[FieldFixture, _Mapping]]] = ..., tables: _Optional[_Iterable[_Union[FieldDepthTable, _Mapping]]] = ...) -> None: ...
 
 class Vec3(_message.Message):
     __slots__ = ["x", "y", "z"]

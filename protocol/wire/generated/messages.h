@@ -181,6 +181,17 @@ struct FieldFixture {
   std::optional<double> most_force{};  ///< N, > 0: the maximum force. Empty if the force is not limited
 };
 
+/// This table is added to the force of the springs of a material. The correction is zero at the surface, and is
+/// interpolated linearly between the entries. The last entry is also used for all greater depths. The slope of the
+/// table must be at least −0.9 times the stiffness of the material. The sum of the slope and the stiffnesses must not
+/// exceed the maximum stiffness of the server.
+struct FieldDepthTable {
+  std::uint32_t material = 0;      ///< 0 … 7: the number of the material
+  double step = 0;                 ///< m, 0.0001 … 0.1: the spacing of the entries
+  std::uint32_t size = 0;          ///< number of entries of `force`
+  std::array<double, 16> force{};  ///< N, entry i is for the depth (i + 1) · step
+};
+
 /// Uses a field in a channel instead of the previous one. The field must be complete on the server (FieldStatus), and
 /// the client must have the lease of the channel, as for a ForceCommand.
 struct UseField {
@@ -189,8 +200,9 @@ struct UseField {
   /// ≥ 1. A number that is increased with each UseField of a session, device and channel
   std::uint32_t generation = 0;
   std::array<std::byte, 32> field{};       ///< 32 bytes: the hash of the manifest
-  std::vector<FieldMaterial> materials{};  ///< 1 … 16: the materials, which are numbered from 0 in the manifest
+  std::vector<FieldMaterial> materials{};  ///< 1 … 8: the materials, which are numbered from 0 in the manifest
   std::vector<FieldFixture> fixtures{};    ///< at most 4
+  std::vector<FieldDepthTable> tables{};   ///< at most 3: the tables of the materials that have one
 };
 
 /// Removes a field from the server. If the field is used in a channel, it is no longer rendered. The bricks are kept in

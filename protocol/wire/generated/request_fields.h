@@ -142,13 +142,20 @@ inline constexpr auto kFieldFixtureFields = [](auto& way, auto& fixture) TENDON_
   way.maybe(field<5>, "fixtures.most_force_n", fixture.most_force, Within{.least = 0, .beyond = true});
 };
 
+inline constexpr auto kFieldDepthTableFields = [](auto& way, auto& table) TENDON_INLINE {
+  way.count(field<1>, "tables.material", table.material, Counts{.most = 7});
+  way.number(field<2>, "tables.step_m", table.step, Within{0.0001, 0.1});
+  way.numbers(field<3>, "tables.force_n", table.force, table.size, 1);
+};
+
 inline constexpr auto kUseFieldFields = [](auto& way, auto& wanted) TENDON_INLINE {
   way.count(field<1>, "device", wanted.device, Counts{.most = 15});
   way.count(field<2>, "channel", wanted.channel, Counts{.most = 7});
   way.count(field<3>, "generation", wanted.generation, Counts{.least = 1});
   way.bytes(field<4>, "field", wanted.field, Entries{32, 32});
-  way.messages(field<5>, "materials", wanted.materials, Entries{1, 16}, kFieldMaterialFields);
+  way.messages(field<5>, "materials", wanted.materials, Entries{1, 8}, kFieldMaterialFields);
   way.messages(field<6>, "fixtures", wanted.fixtures, Entries{0, 4}, kFieldFixtureFields);
+  way.messages(field<7>, "tables", wanted.tables, Entries{0, 3}, kFieldDepthTableFields);
 };
 
 inline constexpr auto kDropFieldFields = [](auto& way, auto& wanted) TENDON_INLINE {

@@ -155,12 +155,17 @@ inline constexpr std::array kFieldFixtureShapes = {
     FieldShape{4, Shape::kBits64}, FieldShape{5, Shape::kBits64}};
 inline constexpr Schema kFieldFixture{kFieldFixtureShapes};
 
+inline constexpr std::array kFieldDepthTableShapes = {FieldShape{1, Shape::kCount32}, FieldShape{2, Shape::kBits64},
+                                                      FieldShape{3, Shape::kBits64s}};
+inline constexpr Schema kFieldDepthTable{kFieldDepthTableShapes};
+
 inline constexpr std::array kUseFieldShapes = {FieldShape{1, Shape::kCount32},
                                                FieldShape{2, Shape::kCount32},
                                                FieldShape{3, Shape::kCount32},
                                                FieldShape{4, Shape::kBytes},
                                                FieldShape{5, Shape::kMessages, &kFieldMaterial},
-                                               FieldShape{6, Shape::kMessages, &kFieldFixture}};
+                                               FieldShape{6, Shape::kMessages, &kFieldFixture},
+                                               FieldShape{7, Shape::kMessages, &kFieldDepthTable}};
 inline constexpr Schema kUseField{kUseFieldShapes};
 
 inline constexpr std::array kDropFieldShapes = {FieldShape{1, Shape::kBytes}};

@@ -264,6 +264,8 @@ def _use_field(use: UseField) -> list[object]:
         words += ["fixture", int(fixture.kind), *_vector(fixture.at), *_vector(fixture.normal)]
         words += [_double(fixture.stiffness)]
         words += [] if fixture.most_force is None else [_double(fixture.most_force)]
+    for table in use.tables:
+        words += ["table", table.material, _double(table.step), *map(_double, table.force)]
     return words
 
 

@@ -220,11 +220,11 @@ def test_a_request_out_of_bounds_names_its_field_and_an_answer_is_refused():
     assert {field.partition(".")[0] for field in controls} == {
         *("SetStateRate", "Rearm", "Describe", "TakeLease", "GiveLease", "SetStateDeadband", "Disarm", "SetOutput"),
         *("Couple", "Engage", "Disengage", "SetScale", "SetShare", "LeaseLost"),
-        *("OfferField", "UseField", "FieldMaterial", "FieldFixture", "DropField"),
+        *("OfferField", "UseField", "FieldMaterial", "FieldFixture", "FieldDepthTable", "DropField"),
     }
     for field, found in controls.items():
         message, _, name = field.partition(".")
-        inside = {"FieldMaterial": "materials.", "FieldFixture": "fixtures."}.get(message, "")
+        inside = {"FieldMaterial": "materials.", "FieldFixture": "fixtures.", "FieldDepthTable": "tables."}.get(message, "")
         expected = "rotation" if name.startswith("rotation") else inside + re.sub(r"\.[xyz]$", "", name)
         assert {(control.request, control.invalid) for control in found} == {(None, expected)}, field
     answers = {field: found for field, found in frames.items() if field not in controls}

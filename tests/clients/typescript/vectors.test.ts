@@ -210,7 +210,7 @@ describe("bounds.json", () => {
 
   it("a request out of bounds names its field, and an answer is refused", () => {
     const requests = new Set<string>();
-    const lists = new Map([["FieldMaterial", "materials"], ["FieldFixture", "fixtures"]]);
+    const lists = new Map([["FieldMaterial", "materials"], ["FieldFixture", "fixtures"], ["FieldDepthTable", "tables"]]);
     for (const { message, field, body } of readVectors("bounds.json").bounds) {
       const isFrame = message === "Datagram" && !field.startsWith("Datagram.");
       const content = isFrame ? decodeData(fromHex(body)) : undefined;
@@ -226,6 +226,6 @@ describe("bounds.json", () => {
         assert.deepEqual([frame.value.code, frame.value.device, frame.value.handle], [Code.INVALID, undefined, undefined], field);
       }
     }
-    assert.equal(requests.size, 19);
+    assert.equal(requests.size, 20);
   });
 });

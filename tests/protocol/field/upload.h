@@ -26,7 +26,7 @@ inline std::vector<FieldSender::Brick> random_bricks(std::size_t count, std::uin
   for (std::size_t i = 0; i < count; ++i) {
     const auto n = static_cast<std::int32_t>(i);
     bricks[i].place = {n % 16, n / 16 % 8, n / 128};
-    bricks[i].material = static_cast<std::uint8_t>(i % 16);
+    bricks[i].material = static_cast<std::uint8_t>(i % 8);
     for (std::byte& byte : bricks[i].bytes) byte = static_cast<std::byte>(dice.bits());
   }
   return bricks;

@@ -14,6 +14,7 @@
 #include "protocol/limits.h"
 #include "protocol/secrets/client_key.h"
 #include "protocol/secrets/noise.h"
+#include "protocol/wire/bounds.h"
 #include "tests/protocol/examples.h"
 #include "tests/protocol/wire/drawn.h"
 #include "tests/protocol/wire/read_back.h"
@@ -177,14 +178,23 @@ TEST(Codec, AStateOrAForceWithAPoseFitsIntoASealedDatagram) {
 TEST(Codec, ABrickAndTheLargestUseOfAFieldFitIntoASealedDatagram) {
   expect_to_fit_into_a_sealed_datagram<FieldBrick>();
   UseField use{.device = 15, .channel = 7, .generation = ~0U, .field = examples::field_name()};
-  use.materials.resize(16, {.stiffness = 1, .branch_stiffness = 1, .relaxation = 1, .friction = 1});
+  use.materials.resize(field::Field::kMostMaterials,
+                       {.stiffness = 1, .branch_stiffness = 1, .relaxation = 1, .friction = 1});
   const Vec3 direction(0.6, 0.64, 0.48);
-  use.fixtures.resize(4, {.at = direction, .normal = direction, .stiffness = 1, .most_force = 1});
+  use.fixtures.resize(field::Field::kMostFixtures,
+                      {.at = direction, .normal = direction, .stiffness = 1, .most_force = 1});
+  FieldDepthTable table{.material = 7, .step = 0.1, .size = 16};
+  table.force.fill(0.1);
+  use.tables.resize(field::Field::kMostTables, table);
+  EXPECT_EQ(refused_field(use), "");
+  OutgoingEcho echo = examples::echo();
+  echo.packet_number = ~std::uint64_t{0};
   std::array<std::byte, kMaxDatagram> buffer;
   DataWriter writer;
-  writer.begin(std::span(buffer).first(kMaxDatagram - crypto::kTagSize), {}, LocalTime{limits::kMaxTime},
-               examples::echo());
+  writer.begin(std::span(buffer).first(kMaxDatagram - crypto::kTagSize), {}, LocalTime{limits::kMaxTime}, echo);
   EXPECT_TRUE(writer.add(Control{.id = ~0U, .request = use}));
+  use.tables.push_back(table);
+  EXPECT_EQ(refused_field(use), "tables");
 }
 
 constexpr std::uint64_t kOne = 0x3ff0'0000'0000'0000;  // 1.0

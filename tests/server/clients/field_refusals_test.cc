@@ -137,6 +137,35 @@ TEST_F(FieldRefusals, EachBoundOfAMaterialIsNamed) {
   EXPECT_FALSE(one->state->field);
 }
 
+TEST_F(FieldRefusals, ATableIsRefusedWithItsMaterialAndItsKnot) {
+  const Engine one = with_ball();
+  std::uint32_t generation = 0;
+  const auto use = [&](std::vector<FieldDepthTable> tables) {
+    return one->use(newest(one), ++generation, {{.stiffness = 100}, {.stiffness = 200}}, 0, std::move(tables));
+  };
+  const auto refused = [&](std::vector<FieldDepthTable> tables, const std::string& why) {
+    expect_refused(use(std::move(tables)), one, Code::kInvalid, of_ball(one, why));
+  };
+  const FieldDepthTable good{.material = 1, .step = 1e-3, .size = 2, .force = {0.5, 1.8}};
+  refused({{.material = 1, .step = 1e-3, .size = 3, .force = {0.5, 1.8, 3.2}}},
+          "materials[1].table knot 3 = 3.2: expected 1.62 … 3.1 N");
+  refused({{.material = 0, .step = 1e-3, .size = 2, .force = {0, -0.1}}},
+          "materials[0].table knot 2 = -0.1: expected -0.09 … 1.4 N");
+  refused({{.material = 2, .step = 1e-3, .size = 1}}, "tables[0].material = 2: expected below 2");
+  refused({good, good}, "tables[1].material = 1: expected a material without another table");
+  run(milliseconds(10), {&one});
+  EXPECT_FALSE(one->state->field);
+  EXPECT_EQ(answer_to(use({good}), one).code, Code::kOk);
+  for (const FieldDepthTable& wrong : {FieldDepthTable{.step = 0, .size = 1}, FieldDepthTable{.step = 1e-3, .size = 0},
+                                       FieldDepthTable{.step = 1e-3, .size = 1, .force = {std::nan("")}},
+                                       FieldDepthTable{.material = 8, .step = 1e-3, .size = 1}}) {
+    const std::uint32_t id = use({wrong});
+    if (id != 0) {
+      EXPECT_NE(answer_to(id, one).code, Code::kOk) << "out of the bounds of the wire";
+    }
+  }
+}
+
 TEST_F(FieldRefusals, WhatTheWireDoesNotAllowNeverArrives) {
   const Engine one = with_ball();
   for (const FieldMaterial& material : {FieldMaterial{.stiffness = std::nan("")}, FieldMaterial{.stiffness = -1},
@@ -166,7 +195,12 @@ TEST_F(FieldRefusals, OnlyACompleteFieldIsUsedAndGenerationsIncrease) {
   FieldName other = newest(one);
   other[0] ^= std::byte{1};
   expect_refused(one->use(other, 1), one, Code::kInvalid,
-                 "field " + short_name(other) + ": expected a field that is complete");
+                 "field " + short_name(other) + ": expected a field that was offered");
+  const std::uint32_t offer = one->ask(OfferField{.field = other, .size = 1000, .part = std::vector<std::byte>(10)});
+  EXPECT_EQ(answer_to(offer, one).code, Code::kOk);
+  expect_refused(
+      one->use(other, 1), one, Code::kInvalid,
+      "field " + short_name(other) + ": expected a field whose bricks have all arrived, found one that is incomplete");
   EXPECT_EQ(answer_to(one->use(newest(one), 5), one).code, Code::kOk);
   expect_refused(one->use(newest(one), 5), one, Code::kInvalid, of_ball(one, "generation = 5: expected above 5"));
   EXPECT_EQ(answer_to(one->use(newest(one), 6), one).code, Code::kOk);

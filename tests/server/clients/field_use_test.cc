@@ -339,7 +339,7 @@ TEST_F(FieldUse, APoseMovesTheObjectAlsoIfItArrivesBeforeItsField) {
   EXPECT_GE(least_energy_, -1e-9);
 }
 
-TEST_F(FieldUse, ATrueForceCorrectsTheNextSteps) {
+TEST_F(FieldUse, ATableAndTrueForcesCorrectTheNextSteps) {
   start({scene_of(kStir)});
   way_ = milliseconds(100);
   const Engine one = engine("127.0.0.1:4000");
@@ -355,6 +355,14 @@ TEST_F(FieldUse, ATrueForceCorrectsTheNextSteps) {
     });
     return sum / expected;
   };
+  EXPECT_NEAR(ratio(), 1, 0.01);
+  FieldDepthTable table{.step = 1e-3, .size = 16};
+  for (std::size_t i = 0; i < table.size; ++i) table.force[i] = 0.3 * static_cast<double>(i + 1);
+  EXPECT_EQ(answer_to(one->use(newest(one), 2, {{.stiffness = 500}}, 0, {table}), one).code, Code::kOk);
+  run(milliseconds(300), {&one});
+  EXPECT_NEAR(ratio(), 1.6, 0.01) << "the table adds 300 N/m";
+  EXPECT_EQ(answer_to(one->use(newest(one), 3), one).code, Code::kOk);
+  run(milliseconds(300), {&one});
   EXPECT_NEAR(ratio(), 1, 0.01);
   std::uint64_t told = 0;
   for (int i = 0; i < 600; ++i) {

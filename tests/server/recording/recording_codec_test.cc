@@ -191,7 +191,8 @@ FieldData a_field() {
           .generation = 3,
           .manifest = {std::byte{1}, std::byte{0}, std::byte{255}},
           .weights = std::vector<std::byte>(1024, std::byte{7}),
-          .materials = {{.stiffness = 900, .branch = 300, .tau = 0.1, .friction = 0.4}, {.stiffness = 500}},
+          .materials = {{.stiffness = 900, .branch = 300, .tau = 0.1, .friction = 0.4},
+                        {.stiffness = 500, .table = field::DepthTable::of(2e-3, std::vector{0.1, 1 / 3.0})}},
           .fixtures = {{.kind = field::Fixture::Kind::kPlane,
                         .at = {0.1, 0.2, 0.3},
                         .direction = {1, 0, 0},
@@ -218,6 +219,7 @@ TEST(RecordingCodec, InputsAndDataOfFieldsComeBackWithAllThatTheyHad) {
   EXPECT_EQ(recording::encode(read), recording::encode(data));
   EXPECT_EQ(read.manifest, data.manifest);
   EXPECT_EQ(read.weights, data.weights);
+  EXPECT_EQ(read.materials, data.materials);
   EXPECT_EQ(read.fixtures[0].kind, field::Fixture::Kind::kPlane);
   pb::FieldData message;
   ASSERT_TRUE(message.ParseFromString(recording::encode(data)));

@@ -46,7 +46,8 @@ class FieldRecording : public FieldServer {
     jitter_ms_ = 10;
     Engine one = engine("127.0.0.1:4000");
     ASSERT_TRUE(upload(one, ball(0.028)));
-    ASSERT_EQ(answer_to(one->use(newest(one), 1), one).code, Code::kOk);
+    const FieldDepthTable table{.step = 1e-3, .size = 2, .force = {0.1, 1 / 3.0}};
+    ASSERT_EQ(answer_to(one->use(newest(one), 1, {{.stiffness = 500}}, 0, {table}), one).code, Code::kOk);
     int turns = 0;
     const auto act = [&] {
       if (!one->state || !one->state->field || ++turns % 16 != 0) return;

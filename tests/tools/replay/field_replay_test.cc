@@ -32,6 +32,7 @@ HapticController::Config two_channels() {
 std::vector<StepRecord> lived(const HapticController::Config& config) {
   field::Field ball{.primitives = {{.shape = field::Sphere{.radius = 0.03}}}};
   ball.materials = {{.stiffness = 800, .branch = 300, .tau = 0.1, .friction = 0.3}};
+  ball.materials[0].table = field::DepthTable::of(1e-3, std::vector{0.2, 0.5, 0.3});
   field::Field plane{.primitives = {{.shape = field::Plane{.at = {0, 0, 0.03}}}}};
   HapticController controller(config);
   std::vector<StepRecord> steps;

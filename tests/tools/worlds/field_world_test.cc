@@ -164,6 +164,16 @@ class RandomEngine final : public CustomClient {
                                  .stiffness = most * dice_.within(0.01, 1),
                                  .most_force = dice_.decades(-1, 1)});
     }
+    if (dice_.chance(0.4)) {
+      FieldDepthTable& table = wanted.tables.emplace_back();
+      table.step = dice_.decades(-3.9, -1.1);
+      table.size = static_cast<std::uint32_t>(1 + dice_.bits() % table.force.size());
+      const double rise = (most - material.stiffness - material.branch_stiffness) * table.step;
+      for (std::uint32_t i = 0; i < table.size; ++i) {
+        const double change = dice_.within(-0.89 * material.stiffness * table.step, rise);
+        table.force[i] = (i == 0 ? 0 : table.force[i - 1]) + change;
+      }
+    }
     if (engine_->ask(wanted) == 0) return;
     ++generation_;
     ++used;

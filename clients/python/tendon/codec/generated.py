@@ -29,6 +29,7 @@ from ..generated import (
     Echo,
     Engage,
     FieldBrick,
+    FieldDepthTable,
     FieldFixture,
     FieldFixtureKind,
     FieldMaterial,
@@ -466,6 +467,23 @@ def write_field_fixture(m: pb.FieldFixture, value: FieldFixture) -> None:
         m.most_force_n = value.most_force
 
 
+def read_field_depth_table(m: pb.FieldDepthTable) -> FieldDepthTable:
+    material = m.material
+    if material > 7:
+        raise OutOfBounds("material")
+    step_m = m.step_m
+    if not 0.0001 <= step_m <= 0.1:
+        raise OutOfBounds("step_m")
+    force_n = read_numbers("force_n", m.force_n, 1, 16, -1e12, 1e12)
+    return FieldDepthTable(material, step_m, force_n)
+
+
+def write_field_depth_table(m: pb.FieldDepthTable, value: FieldDepthTable) -> None:
+    m.material = value.material
+    m.step_m = value.step
+    m.force_n.extend(value.force)
+
+
 def read_use_field(m: pb.UseField) -> UseField:
     device = m.device
     if device > 15:
@@ -479,9 +497,10 @@ def read_use_field(m: pb.UseField) -> UseField:
     field = m.field
     if not len(field) == 32:
         raise OutOfBounds("field")
-    materials = read_each("materials", m.materials, 1, 16, read_field_material)
+    materials = read_each("materials", m.materials, 1, 8, read_field_material)
     fixtures = read_each("fixtures", m.fixtures, 0, 4, read_field_fixture)
-    return UseField(device, channel, generation, field, materials, fixtures)
+    tables = read_each("tables", m.tables, 0, 3, read_field_depth_table)
+    return UseField(device, channel, generation, field, materials, fixtures, tables)
 
 
 def write_use_field(m: pb.UseField, value: UseField) -> None:
@@ -489,10 +508,12 @@ def write_use_field(m: pb.UseField, value: UseField) -> None:
     m.channel = value.channel
     m.generation = value.generation
     m.field = value.field[:32]
-    for material in value.materials[:16]:
+    for material in value.materials[:8]:
         write_field_material(m.materials.add(), material)
     for fixture in value.fixtures[:4]:
         write_field_fixture(m.fixtures.add(), fixture)
+    for table in value.tables[:3]:
+        write_field_depth_table(m.tables.add(), table)
 
 
 def read_drop_field(m: pb.DropField) -> DropField:

@@ -38,6 +38,7 @@ import type {
   Echo,
   Engage,
   FieldBrick,
+  FieldDepthTable,
   FieldFixture,
   FieldMaterial,
   FieldPose,
@@ -361,8 +362,9 @@ export function refusedUseField(m: pb.UseField): string | undefined {
   if (!isWhole(m.channel, 0, 7)) return "channel";
   if (m.generation < 1) return "generation";
   if (m.field.length !== 32) return "field";
-  if (!areMessages(m.materials, 1, 16, refusedFieldMaterial)) return "materials";
+  if (!areMessages(m.materials, 1, 8, refusedFieldMaterial)) return "materials";
   if (!areMessages(m.fixtures, 0, 4, refusedFieldFixture)) return "fixtures";
+  if (!areMessages(m.tables, 0, 3, refusedFieldDepthTable)) return "tables";
   return undefined;
 }
 
@@ -373,6 +375,7 @@ export const readUseField = (m: pb.UseField): UseField => ({
   field: m.field,
   materials: m.materials.map(readFieldMaterial),
   ...(m.fixtures.length > 0 && { fixtures: m.fixtures.map(readFieldFixture) }),
+  ...(m.tables.length > 0 && { tables: m.tables.map(readFieldDepthTable) }),
 });
 
 export const writeUseField = (value: UseField): pb.UseField =>
@@ -381,8 +384,9 @@ export const writeUseField = (value: UseField): pb.UseField =>
     channel: value.channel,
     generation: value.generation,
     field: value.field.subarray(0, 32),
-    materials: value.materials.slice(0, 16).map(writeFieldMaterial),
+    materials: value.materials.slice(0, 8).map(writeFieldMaterial),
     fixtures: (value.fixtures ?? []).slice(0, 4).map(writeFieldFixture),
+    tables: (value.tables ?? []).slice(0, 3).map(writeFieldDepthTable),
   });
 
 /** Returns the name of the first field that is out of bounds. */
@@ -419,6 +423,23 @@ export const writeFieldMaterial = (value: FieldMaterial): pb.FieldMaterial =>
     relaxationS: value.relaxation ?? 0,
     friction: value.friction ?? 0,
   });
+
+/** Returns the name of the first field that is out of bounds. */
+export function refusedFieldDepthTable(m: pb.FieldDepthTable): string | undefined {
+  if (!isWhole(m.material, 0, 7)) return "material";
+  if (!isWithin(m.stepM, 0.0001, 0.1)) return "step_m";
+  if (!areNumbers(m.forceN, 1, 16, -1e12, 1e12)) return "force_n";
+  return undefined;
+}
+
+export const readFieldDepthTable = (m: pb.FieldDepthTable): FieldDepthTable => ({
+  material: m.material,
+  step: m.stepM,
+  force: m.forceN,
+});
+
+export const writeFieldDepthTable = (value: FieldDepthTable): pb.FieldDepthTable =>
+  create(pb.FieldDepthTableSchema, { material: value.material, stepM: value.step, forceN: [...value.force] });
 
 /** Returns the name of the first field that is out of bounds. */
 export function refusedFieldFixture(m: pb.FieldFixture): string | undefined {

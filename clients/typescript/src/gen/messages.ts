@@ -278,6 +278,8 @@ export interface UseField {
   /** The materials, which are numbered from 0 in the manifest */
   readonly materials: readonly FieldMaterial[];
   readonly fixtures?: readonly FieldFixture[] | undefined;
+  /** The tables of the materials that have one */
+  readonly tables?: readonly FieldDepthTable[] | undefined;
 }
 
 /**
@@ -302,6 +304,21 @@ export interface FieldMaterial {
   readonly relaxation?: number | undefined;
   /** The coefficient of friction */
   readonly friction?: number | undefined;
+}
+
+/**
+ * This table is added to the force of the springs of a material. The correction is zero at the surface, and is
+ * interpolated linearly between the entries. The last entry is also used for all greater depths. The slope of the table
+ * must be at least −0.9 times the stiffness of the material. The sum of the slope and the stiffnesses must not exceed
+ * the maximum stiffness of the server.
+ */
+export interface FieldDepthTable {
+  /** The number of the material */
+  readonly material: number;
+  /** m, the spacing of the entries */
+  readonly step: number;
+  /** N, entry i is for the depth (i + 1) · step */
+  readonly force: readonly number[];
 }
 
 /** A spring that pulls the hand to a point, a line or a plane, in the frame of the object (core/field/fixture.h). */
