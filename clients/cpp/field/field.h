@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <span>
 #include <vector>
 
 #include "protocol/field/sender.h"
@@ -24,11 +25,18 @@ struct Field {
   static Field from(const std::function<double(const Vec3&)>& signed_distance, const Vec3& low, const Vec3& high,
                     const Sampling& sampling);
 
+  /// Sets the stiffness and the table of a material, so that they match a measured curve. The forces (N) and the depths
+  /// (m) must be increasing, and the curve starts at zero. If there are at most 16 points and they are equally spaced,
+  /// the table contains these points. Otherwise, the curve is resampled at 16 depths. For greater depths, only the
+  /// stiffness is used. Throws std::invalid_argument if the curve is not valid.
+  void set_curve(std::uint32_t material, std::span<const double> depths, std::span<const double> forces);
+
   FieldLattice lattice{};
   std::vector<FieldSender::Brick> bricks{};                   ///< at most 1023
   std::vector<field::Primitive> primitives{};                 ///< at most 32
-  std::vector<FieldMaterial> materials{{.stiffness = 1000}};  ///< 1 … 16; bricks and primitives contain an index
+  std::vector<FieldMaterial> materials{{.stiffness = 1000}};  ///< 1 … 8; bricks and primitives contain an index
   std::vector<FieldFixture> fixtures{};                       ///< at most 4
+  std::vector<FieldDepthTable> tables{};                      ///< at most 3, with the index of the material
 };
 
 /// The pose of the object of a field, and how it changes, in the base frame of the device.

@@ -15,14 +15,14 @@ namespace {
 
 constexpr Duration kAskAgain = std::chrono::milliseconds(100);  ///< after CODE_BUSY
 
-void expect_material(const std::string& name, std::uint8_t material, const Field& field) {
+void expect_material(const std::string& name, std::uint32_t material, const Field& field) {
   expect(material < field.materials.size(), name + ".material", material,
          "below " + std::to_string(field.materials.size()) + ", the number of materials");
 }
 
 /// encode_manifest() checks the rest.
 void expect_usable(const Field& field) {
-  const UseField wanted{.materials = field.materials, .fixtures = field.fixtures};
+  const UseField wanted{.materials = field.materials, .fixtures = field.fixtures, .tables = field.tables};
   if (const std::string_view refused = refused_field(wanted); !refused.empty()) {
     throw std::invalid_argument(std::string(refused) + ": expected a value within the bounds of protocol/WIRE.md");
   }
@@ -31,6 +31,9 @@ void expect_usable(const Field& field) {
   }
   for (std::size_t i = 0; i < field.primitives.size(); ++i) {
     expect_material("primitives[" + std::to_string(i) + "]", field.primitives[i].material, field);
+  }
+  for (std::size_t i = 0; i < field.tables.size(); ++i) {
+    expect_material("tables[" + std::to_string(i) + "]", field.tables[i].material, field);
   }
 }
 
@@ -120,7 +123,8 @@ void FieldUpload::turn(LocalTime now, Session& session, std::uint32_t device, st
                                   .generation = generation_ + 1,
                                   .field = sender.field(),
                                   .materials = uploaded_->field.materials,
-                                  .fixtures = uploaded_->field.fixtures});
+                                  .fixtures = uploaded_->field.fixtures,
+                                  .tables = uploaded_->field.tables});
   blocked_ = !use_;
   generation_ += use_ ? 1 : 0;
 }

@@ -32,7 +32,7 @@ from . import aio, cli, worker
 from .client import Client, connect
 from .config import Config, Phase, Stats
 from .deadband import ForceDeadband
-from .field import Field
+from .field import DepthTable, Field
 from .force_client import ForceClient
 from .guest import RefusedForGood
 from .keys import read_key
@@ -79,6 +79,7 @@ __all__ = [
     "Config",
     "Contact",
     "Delays",
+    "DepthTable",
     "DeviceDescription",
     "DeviceReport",
     "DeviceState",

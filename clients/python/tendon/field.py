@@ -23,7 +23,7 @@ from typing import Any
 from .expect import expect
 from .limits import UNIT_TOLERANCE
 from .mesh import Mesh, Node, NodeDistances, read_mesh
-from .messages import FieldBrick, FieldFixture, FieldFixtureKind, FieldMaterial, Vec3
+from .messages import FieldBrick, FieldDepthTable, FieldFixture, FieldFixtureKind, FieldMaterial, Vec3
 from .shape import Box, Capsule, Plane, Primitive, Sphere, rotated
 from .upload import Description
 
@@ -34,9 +34,13 @@ MOST_BRICKS = 1023
 MOST_CELLS = 65536
 MOST_EXTENT = 2.0
 MOST_PRIMITIVES = 32
-MOST_MATERIALS = 16
+MOST_MATERIALS = 8
+MOST_TABLES = 3
+MOST_ENTRIES = 16
 MOST_FIXTURES = 4
 
+_LEAST_STEP, _MOST_STEP = 1e-4, 0.1  # m
+_MOST_RATIO = 8  # of the stiffness to the smallest slope of a curve; must be less than 10 (core/field/material.h)
 _KINDS: dict[type, int] = {Plane: 1, Sphere: 2, Capsule: 3, Box: 4}
 _BIGGEST = 32767
 _SCALED_BAND = 16
@@ -82,6 +86,46 @@ class Brick:
 
 
 @dataclass(frozen=True)
+class DepthTable:
+    """This table is added to the force of the springs of a material. The correction is zero at the surface, and is
+    interpolated linearly between the entries. The last entry is also used for all greater depths. The server checks the
+    slope of the table."""
+
+    step: float  # m
+    force: Sequence[float]  # N; entry i is for the depth (i + 1) · step
+
+    def __post_init__(self) -> None:
+        expect(_LEAST_STEP <= self.step <= _MOST_STEP, "step", self.step, f"{_LEAST_STEP:g} to {_MOST_STEP:g} m")
+        expect(1 <= len(self.force) <= MOST_ENTRIES, "force", len(self.force), f"1 to {MOST_ENTRIES} entries")
+        expect(all(abs(force) <= 1e12 for force in self.force), "force", self.force, "±1e12 N")
+
+    @classmethod
+    def of_curve(cls, depths: Sequence[float], forces: Sequence[float]) -> tuple[float, DepthTable]:
+        """Returns the stiffness and the table of a material that match a measured curve. The forces (N) and the depths (m)
+        must be increasing, and the curve starts at zero. If there are at most 16 points and they are equally spaced, the
+        table contains these points. Otherwise, the curve is resampled at 16 depths. For greater depths, only the
+        stiffness is used."""
+        expect(len(forces) == len(depths) > 0, "forces", len(forces), f"as many as depths, {len(depths)}, and at least 1")
+        points = [(0.0, 0.0), *zip(depths, forces)]
+        slopes = []
+        for n, ((depth, force), (next_depth, next_force)) in enumerate(zip(points, points[1:])):
+            expect(depth < next_depth < math.inf, f"depths[{n}]", next_depth, f"above {depth} m")
+            expect(force < next_force < math.inf, f"forces[{n}]", next_force, f"above {force} N")
+            slopes.append((next_force - force) / (next_depth - depth))
+        count, end = len(depths), depths[-1]
+        even = all(abs(depth - end * (n + 1) / count) <= 1e-9 * end for n, depth in enumerate(depths))
+        count = count if even and count <= MOST_ENTRIES else MOST_ENTRIES
+        step = max(end / count, _LEAST_STEP)
+        stiffness = min(slopes[-1], _MOST_RATIO * min(slopes))
+
+        def correction(depth: float) -> float:
+            at = min(sum(start <= depth for start in depths), len(slopes) - 1)
+            return points[at][1] + slopes[at] * (depth - points[at][0]) - stiffness * depth
+
+        return stiffness, cls(step, tuple(correction(step * (n + 1)) for n in range(count)))
+
+
+@dataclass(frozen=True)
 class Material:
     """A spring that is parallel to a Maxwell branch with the stiffness `branch` (core/field/material.h)."""
 
@@ -91,6 +135,7 @@ class Material:
     branch: float = 0.0  # N/m
     relax_s: float = 0.0  # time constant; only used with a branch
     region: Primitive | None = None  # bricks and primitives whose centres are inside; None: all others
+    table: DepthTable | None = None
 
 
 class Field:
@@ -222,13 +267,14 @@ class Field:
         relax_s: float | None = None,
         branch: float | None = None,
         region: Primitive | None = None,
+        table: DepthTable | None = None,
     ) -> None:
         """Sets a material. If there is no region, the material is used for the whole object. Otherwise, it is used for
         each brick and each primitive with its centre in the region. If several regions contain the centre, the last
         material is used. If there is already a material with this name, it is replaced. Call `use` afterwards.
 
         `stiffness` is in N/m. With `relax_s`, a second spring of `branch` N/m (default: `stiffness`) is added, whose
-        force decays with this time constant in s."""
+        force decays with this time constant in s. `table` is added to this force."""
         expect(0 < stiffness <= 1e12, "stiffness", stiffness, "above 0 N/m, and at most 1e12")
         expect(0 <= friction <= 2, "friction", friction, "0 to 2")
         if relax_s is None:
@@ -237,15 +283,14 @@ class Field:
             expect(0.01 <= relax_s <= 10, "relax_s", relax_s, "0.01 to 10 s")
             expect(0 < (branch if branch is not None else stiffness) <= 1e12, "branch", branch, "above 0 N/m, and at most 1e12")
         spring = 0.0 if relax_s is None else stiffness if branch is None else branch
-        new = Material(name, stiffness, friction, spring, relax_s or 0.0, region)
+        new = Material(name, stiffness, friction, spring, relax_s or 0.0, region, table)
         known = [number for number, old in enumerate(self._materials) if number and old.name == name]
-        if region is None:
-            self._materials[0] = new
-        elif known:
-            self._materials[known[0]] = new
-        else:
-            expect(len(self._materials) < MOST_MATERIALS, "materials", len(self._materials) + 1, f"at most {MOST_MATERIALS}")
-            self._materials.append(new)
+        at = 0 if region is None else known[0] if known else len(self._materials)
+        expect(at < MOST_MATERIALS, "materials", at + 1, f"at most {MOST_MATERIALS}")
+        changed = [*self._materials[:at], new, *self._materials[at + 1 :]]
+        tables = sum(one.table is not None for one in changed)
+        expect(tables <= MOST_TABLES, "tables", tables, f"at most {MOST_TABLES}")
+        self._materials = changed
 
     def _material_at(self, centre: Vec3) -> int:
         for number in range(len(self._materials) - 1, 0, -1):
@@ -284,6 +329,11 @@ class Field:
             tuple(FieldBrick(brick.hash, brick.weights) for brick in self.bricks),
             tuple(FieldMaterial(one.stiffness, one.branch, one.relax_s, one.friction) for one in self._materials),
             tuple(self._fixtures),
+            tuple(
+                FieldDepthTable(number, one.table.step, tuple(one.table.force))
+                for number, one in enumerate(self._materials)
+                if one.table is not None
+            ),
         )
 
     def _manifest(self) -> bytes:

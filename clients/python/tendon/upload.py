@@ -15,6 +15,7 @@ from .messages import (
     ControlAck,
     DropField,
     FieldBrick,
+    FieldDepthTable,
     FieldFixture,
     FieldMaterial,
     FieldPose,
@@ -48,6 +49,7 @@ class Description:
     bricks: tuple[FieldBrick, ...]  # in the order of the manifest
     materials: tuple[FieldMaterial, ...]
     fixtures: tuple[FieldFixture, ...]
+    tables: tuple[FieldDepthTable, ...] = ()
 
 
 class BrickPace:
@@ -257,7 +259,10 @@ class FieldUser:
         if sender and sender.complete and holds and not self._asked and not self.refused and now >= self._ask_at:
             field, place = sender.field, self._place
             self._use = session.request(
-                UseField(place.device, place.channel, self._generation + 1, field.name, field.materials, field.fixtures)
+                UseField(
+                    *(place.device, place.channel, self._generation + 1, field.name),
+                    *(field.materials, field.fixtures, field.tables),
+                )
             )
             if self._use is None:
                 self._is_full = True

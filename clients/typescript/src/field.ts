@@ -5,7 +5,7 @@ import { blake2b } from "@noble/hashes/blake2";
 import { expect } from "./expect.js";
 import { kUnitTolerance } from "./limits.js";
 import { closedMesh, NodeDistances, type Point, type Triangle } from "./mesh.js";
-import { FieldFixtureKind, type FieldBrick, type FieldFixture, type FieldMaterial, type Vec3 } from "./messages.js";
+import { FieldFixtureKind, type FieldBrick, type FieldDepthTable, type FieldFixture, type FieldMaterial, type Vec3 } from "./messages.js";
 import { centreOf, distanceTo, kPrimitiveKinds, numbersOf, type Primitive } from "./shape.js";
 
 const kSide = 8;
@@ -15,8 +15,15 @@ const kMostBricks = 1023;
 const kMostCells = 65536;
 const kMostExtent = 2;
 const kMostPrimitives = 32;
-const kMostMaterials = 16;
+const kMostMaterials = 8;
+const kMostTables = 3;
+const kMostEntries = 16;
 const kMostFixtures = 4;
+/** m, of a table. */
+const kLeastStep = 1e-4;
+const kMostStep = 0.1;
+/** The maximum ratio of the stiffness to the smallest slope of a curve. It must be less than 10 (core/field/material.h). */
+const kMostRatio = 8;
 const kBiggest = 32767;
 const kScaledBand = 16;
 /** The distances in spacings between the mesh and the ends of the lattice, whose last node is one spacing before its end. */
@@ -31,6 +38,19 @@ export interface FieldDescription {
   readonly bricks: readonly FieldBrick[];
   readonly materials: readonly FieldMaterial[];
   readonly fixtures: readonly FieldFixture[];
+  readonly tables: readonly FieldDepthTable[];
+}
+
+/**
+ * This table is added to the force of the springs of a material. The correction is zero at the surface, and is
+ * interpolated linearly between the entries. The last entry is also used for all greater depths. The server checks the
+ * slope of the table.
+ */
+export interface DepthTable {
+  /** m, 0.0001 to 0.1. */
+  readonly step: number;
+  /** N, with 1 to 16 entries. Entry i is for the depth (i + 1) · step. */
+  readonly force: readonly number[];
 }
 
 export interface MaterialOptions {
@@ -42,6 +62,8 @@ export interface MaterialOptions {
   readonly relaxS?: number;
   /** The stiffness of the second spring in N/m. Default: `stiffness`. */
   readonly branch?: number;
+  /** The table that is added to the force of the springs. See depthTableOf. */
+  readonly table?: DepthTable;
   /** The material is used for bricks and primitives with their centre in the region. Absent: for the whole object. */
   readonly region?: Primitive;
 }
@@ -60,6 +82,7 @@ interface Brick extends FieldBrick {
 interface Material extends FieldMaterial {
   readonly name: string;
   readonly region: Primitive | undefined;
+  readonly table: DepthTable | undefined;
 }
 
 /**
@@ -71,7 +94,7 @@ export class Field {
   readonly primitives: readonly Primitive[];
   readonly #lattice: Lattice | undefined;
   readonly #bricks: readonly Brick[];
-  readonly #materials: Material[] = [{ name: "default", stiffness: 1000, branchStiffness: 0, relaxation: 0, friction: 0, region: undefined }];
+  readonly #materials: Material[] = [{ name: "default", stiffness: 1000, branchStiffness: 0, relaxation: 0, friction: 0, region: undefined, table: undefined }];
   readonly #fixtures: FieldFixture[] = [];
 
   protected constructor(lattice: Lattice | undefined, bricks: readonly Brick[], primitives: readonly Primitive[]) {
@@ -139,18 +162,21 @@ export class Field {
    * brick and each primitive with its centre in the region. If several regions contain the centre, the last material is
    * used. If there is already a material with this name, it is replaced.
    */
-  material(name: string, { stiffness, friction = 0, relaxS, branch, region }: MaterialOptions): void {
+  material(name: string, { stiffness, friction = 0, relaxS, branch, region, table }: MaterialOptions): void {
     expect(stiffness > 0 && stiffness <= 1e12, "stiffness", stiffness, "above 0 N/m, and at most 1e12");
     expect(friction >= 0 && friction <= 2, "friction", friction, "0 to 2");
     const second = branch ?? stiffness;
     expect(relaxS !== undefined || branch === undefined, "branch", branch, "a branch with relaxS");
     expect(relaxS === undefined || (relaxS >= 0.01 && relaxS <= 10), "relaxS", relaxS, "0.01 to 10 s");
     expect(second > 0 && second <= 1e12, "branch", second, "above 0 N/m, and at most 1e12");
+    if (table) expectTable(table);
     const branchStiffness = relaxS === undefined ? 0 : second;
-    const made: Material = { name, stiffness, branchStiffness, relaxation: relaxS ?? 0, friction, region };
+    const made: Material = { name, stiffness, branchStiffness, relaxation: relaxS ?? 0, friction, region, table };
     const known = region ? this.#materials.findIndex((old, number) => number > 0 && old.name === name) : 0;
     const at = known < 0 ? this.#materials.length : known;
     expect(at < kMostMaterials, "materials", at + 1, `at most ${kMostMaterials}`);
+    const tables = this.#materials.filter((old, number) => number !== at && old.table).length + (table ? 1 : 0);
+    expect(tables <= kMostTables, "tables", tables, `at most ${kMostTables}`);
     this.#materials[at] = made;
   }
 
@@ -178,6 +204,7 @@ export class Field {
       materials: this.#materials.map(({ stiffness, branchStiffness, relaxation, friction }) =>
         ({ stiffness, branchStiffness, relaxation, friction })),
       fixtures: [...this.#fixtures],
+      tables: this.#materials.flatMap(({ table }, material) => (table ? [{ material, step: table.step, force: [...table.force] }] : [])),
     };
   }
 
@@ -218,6 +245,40 @@ export class Field {
     }
     return bytes;
   }
+}
+
+function expectTable({ step, force }: DepthTable): void {
+  expect(step >= kLeastStep && step <= kMostStep, "step", step, `${kLeastStep} to ${kMostStep} m`);
+  expect(force.length >= 1 && force.length <= kMostEntries, "force", force.length, `1 to ${kMostEntries} entries`);
+  expect(force.every((one) => Math.abs(one) <= 1e12), "force", force, "±1e12 N");
+}
+
+/**
+ * Returns the stiffness and the table of a material that match a measured curve. The forces (N) and the depths (m) must
+ * be increasing, and the curve starts at zero. If there are at most 16 points and they are equally spaced, the table
+ * contains these points. Otherwise, the curve is resampled at 16 depths. For greater depths, only the stiffness is used.
+ */
+export function depthTableOf(depths: readonly number[], forces: readonly number[]): { readonly stiffness: number; readonly table: DepthTable } {
+  expect(forces.length === depths.length && forces.length > 0, "forces", forces.length, `as many as depths, ${depths.length}, and at least 1`);
+  const slopes = depths.map((depth, n) => {
+    const [from, least] = [depths[n - 1] ?? 0, forces[n - 1] ?? 0];
+    expect(depth > from && depth < Infinity, `depths[${n}]`, depth, `above ${from} m`);
+    expect(forces[n]! > least && forces[n]! < Infinity, `forces[${n}]`, forces[n], `above ${least} N`);
+    return (forces[n]! - least) / (depth - from);
+  });
+  const end = depths.at(-1)!;
+  const even = depths.every((depth, n) => Math.abs(depth - (end * (n + 1)) / depths.length) <= 1e-9 * end);
+  const count = even && depths.length <= kMostEntries ? depths.length : kMostEntries;
+  const step = Math.max(end / count, kLeastStep);
+  const stiffness = Math.min(slopes.at(-1)!, kMostRatio * Math.min(...slopes));
+  const force = Array.from({ length: count }, (_, n) => {
+    const depth = step * (n + 1);
+    const at = Math.min(depths.filter((start) => start <= depth).length, slopes.length - 1);
+    return (forces[at - 1] ?? 0) + slopes[at]! * (depth - (depths[at - 1] ?? 0)) - stiffness * depth;
+  });
+  const table = { step, force };
+  expectTable(table);
+  return { stiffness, table };
 }
 
 /** m per unit of a weight. */

@@ -4,7 +4,7 @@ export { connect, type ConnectConfig, type Guest, type OpenTransport, type Trans
 export type { ClientConfig, ClientStats, Phase } from "./config.js";
 export { ForceClient, type Physics, type Watch } from "./force_client.js";
 export type { Touch } from "./answer.js";
-export { Field, type FieldDescription, type MaterialOptions } from "./field.js";
+export { depthTableOf, Field, type DepthTable, type FieldDescription, type MaterialOptions } from "./field.js";
 export { Follower, type FollowerConfig, type Following, type Pose, type ToolContact } from "./follower.js";
 export type { ForceDeadband } from "./deadband.js";
 export { parseKeyFile, type ClientKey } from "./key_file.js";

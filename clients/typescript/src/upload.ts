@@ -214,8 +214,8 @@ export class FieldUser {
       state.parts.add(id);
     }
     if (!sender.complete || !holds || state.asked || now < state.askAt) return;
-    const { name: field, materials, fixtures } = sender.field;
-    state.use = session.request({ kind: "useField", ...place, generation: state.generation + 1, field, materials, fixtures });
+    const { name: field, materials, fixtures, tables } = sender.field;
+    state.use = session.request({ kind: "useField", ...place, generation: state.generation + 1, field, materials, fixtures, tables });
     state.full = state.use === undefined;
     if (state.use === undefined) return;
     ++state.generation;

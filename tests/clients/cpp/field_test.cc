@@ -2,12 +2,14 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <span>
 #include <string>
 #include <variant>
 #include <vector>
 
 #include "clients/cpp/force_client.h"
 #include "tests/clients/cpp/a_and_z.h"
+#include "tests/support/dice.h"
 #include "tests/support/refusal.h"
 
 namespace tendon::field_client_test {
@@ -59,6 +61,7 @@ TEST_F(FieldClientWithLoss, AFieldIsUploadedAndUsedThoughDatagramsAreLost) {
   Field field = ball();
   field.materials = {{.stiffness = 700, .friction = 0.5}};
   field.primitives = {{.shape = field::Plane{.at = {0, 0, -0.02}}}};
+  field.tables = {{.step = 1e-3, .size = 2, .force = {0, 0.25}}};
   const std::size_t bricks = field.bricks.size();
   EXPECT_GT(bricks, 20U);
   EXPECT_TRUE(client().use(field));
@@ -72,6 +75,7 @@ TEST_F(FieldClientWithLoss, AFieldIsUploadedAndUsedThoughDatagramsAreLost) {
   const auto used = requests<UseField>();
   ASSERT_EQ(used.size(), 1U);
   EXPECT_EQ(used[0].materials.at(0).stiffness, 700);
+  EXPECT_EQ(used[0].tables.at(0).force[1], 0.25);
   const auto manifest = world_.z->fields->ready(used[0].field);
   ASSERT_TRUE(manifest);
   EXPECT_EQ(manifest->primitives(), 1U);
@@ -175,9 +179,13 @@ TEST_F(FieldClient, AFieldThatCannotWorkIsRefusedBeforeItIsSent) {
     EXPECT_TRUE(said.starts_with(begin)) << said;
   };
   expect("materials: expected", [](Field& f) { f.materials.clear(); });
-  expect("materials: expected", [](Field& f) { f.materials.resize(17, {.stiffness = 1}); });
+  expect("materials: expected", [](Field& f) { f.materials.resize(9, {.stiffness = 1}); });
   expect("materials.friction: expected", [](Field& f) { f.materials[0].friction = 3; });
   expect("fixtures.stiffness_npm: expected", [](Field& f) { f.fixtures.emplace_back(); });
+  expect("tables: expected", [](Field& f) { f.tables.resize(4, {.step = 1e-3, .size = 1}); });
+  expect("tables.force_n: expected", [](Field& f) { f.tables = {{.step = 1e-3}}; });
+  expect("tables[0].material = 1: expected below 1",
+         [](Field& f) { f.tables = {{.material = 1, .step = 1e-3, .size = 1}}; });
   expect("bricks[4].material = 1: expected below 1", [](Field& f) { f.bricks[4].material = 1; });
   expect("primitives[0]: sphere.radius = 0", [](Field& f) { f.primitives = {{.shape = field::Sphere{}}}; });
   expect("bricks[0].place.x = 9: expected", [](Field& f) { f.bricks[0].place[0] = 9; });
@@ -187,6 +195,54 @@ TEST_F(FieldClient, AFieldThatCannotWorkIsRefusedBeforeItIsSent) {
   };
   EXPECT_TRUE(from(2e-4).starts_with("spacing = 2e-04: expected")) << from(2e-4);
   EXPECT_TRUE(from(6e-3).starts_with("bricks = 1024: expected at most 1023")) << from(6e-3);
+}
+
+double force_at(const Field& field, double depth) {
+  const FieldDepthTable& table = field.tables.at(0);
+  const auto corrections = field::DepthTable::of(table.step, std::span(table.force).first(table.size));
+  return field::Material{.stiffness = field.materials[0].stiffness, .table = corrections}.force(depth, 0);
+}
+
+TEST(FieldCurve, AMeasuredCurveIsMetBetweenItsPointsAndMayBeUsed) {
+  Dice dice(1);
+  for (int run = 0; run < 500; ++run) {
+    const std::size_t count = 1 + dice.bits() % 40;
+    const bool even = dice.chance(0.5);
+    const double step = dice.decades(-3.5, -2.5);
+    std::vector<double> depths;
+    std::vector<double> forces;
+    for (std::size_t i = 0; i < count; ++i) {
+      depths.push_back((i == 0 ? 0 : depths.back()) + step * (even ? 1 : dice.within(0.5, 2)));
+      forces.push_back((i == 0 ? 0 : forces.back()) + dice.decades(-2, 0.5));
+    }
+    Field field;
+    field.set_curve(0, depths, forces);
+    const FieldDepthTable& table = field.tables.at(0);
+    const field::Material law{.stiffness = field.materials[0].stiffness,
+                              .table = field::DepthTable::of(table.step, std::span(table.force).first(table.size))};
+    EXPECT_NO_THROW(law.expect_valid(1e6));
+    EXPECT_LE(table.size, 16U);
+    for (std::size_t i = 0; even && count <= 16 && i < count; ++i) {
+      EXPECT_NEAR(force_at(field, depths[i]), forces[i], 1e-9 * forces[i]) << "run " << run << ", point " << i;
+    }
+    EXPECT_NEAR(force_at(field, depths.back()), forces.back(), 1e-9 * forces.back()) << "run " << run;
+  }
+}
+
+TEST(FieldCurve, ASecondCurveReplacesTheFirstAndAWrongOneIsRefused) {
+  Field field;
+  field.set_curve(0, std::vector{1e-3, 2e-3}, std::vector{1.0, 3.0});
+  field.set_curve(0, std::vector{1e-3, 2e-3}, std::vector{0.5, 1.5});
+  EXPECT_EQ(field.tables.size(), 1U);
+  EXPECT_NEAR(force_at(field, 2e-3), 1.5, 1e-12);
+  const auto said = [&](std::uint32_t material, std::vector<double> depths, std::vector<double> forces) {
+    return thrown_by([&] { field.set_curve(material, depths, forces); });
+  };
+  EXPECT_EQ(said(0, {}, {}), "forces: expected as many as depths, which are 0, and at least 1");
+  EXPECT_EQ(said(0, {1e-3, 1e-3}, {1, 2}), "depths[1] = 0.001: expected above 0.001 m");
+  EXPECT_EQ(said(0, {1e-3, 2e-3}, {1, 1}), "forces[1] = 1: expected above 1 N");
+  EXPECT_EQ(said(1, {1e-3}, {1}), "material = 1: expected below 1");
+  EXPECT_EQ(said(0, {0.2}, {1}), "depths = 0.2: expected at most 0.1 m");
 }
 
 TEST(FieldClientWithoutFields, DoesNotUploadAnything) {

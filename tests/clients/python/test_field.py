@@ -12,9 +12,10 @@ from types import SimpleNamespace
 import pytest
 from shapes import Received, ascii_stl, ball, binary_stl, cube, joined, obj
 
-from tendon import Box, Capsule, Field, Plane, Sphere
+from tendon import Box, Capsule, DepthTable, Field, Plane, Sphere
 from tendon.field import _nodes
 from tendon.mesh import Mesh, NodeDistances, _Facet, read_mesh
+from tendon.messages import FieldDepthTable
 
 
 def ring(x):
@@ -305,11 +306,64 @@ def test_a_material_that_cannot_be_is_refused(values, said):
         field.material("x", **values)
 
 
-def test_there_are_at_most_16_materials_and_4_fixtures():
+def test_a_table_is_sent_with_the_number_of_its_material():
     field = Field.from_primitives(Sphere())
-    for number in range(15):
+    table = DepthTable(0.002, [0.1, 0.4])
+    field.material("pad", 300, region=Sphere((9, 9, 9)), table=table)
+    assert field.describe().tables == (FieldDepthTable(1, 0.002, (0.1, 0.4)),)
+    field.material("all", 200, table=DepthTable(0.001, [-0.1]))
+    assert [table.material for table in field.describe().tables] == [0, 1]
+    field.material("pad", 300, region=Sphere((9, 9, 9)))
+    assert [table.material for table in field.describe().tables] == [0]
+    for name in "ab":
+        field.material(name, 300, region=Sphere(), table=table)
+    with pytest.raises(ValueError, match="tables = 4: expected at most 3"):
+        field.material("c", 300, region=Sphere(), table=table)
+    assert len(field.describe().materials) == 4, "the refused material is not there"
+
+
+def force_of(stiffness, table, depth):
+    at = min(depth / table.step, len(table.force))
+    knots = [0.0, *table.force, table.force[-1]]
+    return stiffness * depth + knots[int(at)] + (at % 1) * (knots[int(at) + 1] - knots[int(at)])
+
+
+def test_a_table_of_a_curve_has_the_forces_of_the_curve():
+    depths, forces = [0.002, 0.004, 0.006], [0.2, 0.5, 1.4]
+    stiffness, table = DepthTable.of_curve(depths, forces)
+    assert (table.step, len(table.force)) == (0.002, 3), "points with the same distance are met"
+    assert [force_of(stiffness, table, depth) for depth in depths] == pytest.approx(forces)
+    assert stiffness == pytest.approx(450), "N/m, of the last segment"
+    stiffness, table = DepthTable.of_curve([0.001, 0.0045, 0.016], [0.01, 0.5, 4.0])
+    assert (stiffness, len(table.force)) == (pytest.approx(80), 16), "8 times the least slope"
+    assert force_of(stiffness, table, 0.001) == pytest.approx(0.01)
+    assert force_of(stiffness, table, 0.016) == pytest.approx(4.0)
+    slopes = [(b - a) / table.step for a, b in zip([0.0, *table.force], table.force)]
+    assert min(slopes) > -0.9 * stiffness
+    stiffness, table = DepthTable.of_curve([0.0005], [0.1])
+    assert (stiffness, table.step, table.force) == (200, 0.0005, (pytest.approx(0),))
+
+
+@pytest.mark.parametrize("make, said", [
+    (lambda: DepthTable(0, [1]), "step = 0: expected 0.0001 to 0.1 m"),
+    (lambda: DepthTable(0.001, []), "force = 0: expected 1 to 16 entries"),
+    (lambda: DepthTable(0.001, [0] * 17), "force = 17: expected 1 to 16 entries"),
+    (lambda: DepthTable(0.001, [math.nan]), "force = .*: expected ±1e12 N"),
+    (lambda: DepthTable.of_curve([], []), "forces = 0: expected as many as depths, 0, and at least 1"),
+    (lambda: DepthTable.of_curve([0.001, 0.001], [1, 2]), r"depths\[1\] = 0.001: expected above 0.001 m"),
+    (lambda: DepthTable.of_curve([0.001, 0.002], [1, 1]), r"forces\[1\] = 1: expected above 1 N"),
+    (lambda: DepthTable.of_curve([0.2], [1]), "step = 0.2: expected 0.0001 to 0.1 m"),
+])  # fmt: skip
+def test_a_table_that_cannot_be_is_refused(make, said):
+    with pytest.raises(ValueError, match=said):
+        make()
+
+
+def test_there_are_at_most_8_materials_and_4_fixtures():
+    field = Field.from_primitives(Sphere())
+    for number in range(7):
         field.material(str(number), 100, region=Sphere())
-    with pytest.raises(ValueError, match="materials = 17: expected at most 16"):
+    with pytest.raises(ValueError, match="materials = 9: expected at most 8"):
         field.material("x", 100, region=Sphere())
     for kind in ("point", "line", "plane", "line"):
         field.fixture(kind, (0, 0, 0), 100, (1, 0, 0), most_force=2)

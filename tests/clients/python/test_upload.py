@@ -11,7 +11,7 @@ import pytest
 from field_server import FieldStage
 from world import MS, SECOND, Weather, World
 
-from tendon import Code, DeviceState, Field, FieldState, Mode, Phase, Sphere, Touch
+from tendon import Code, DepthTable, DeviceState, Field, FieldState, Mode, Phase, Sphere, Touch
 from tendon.field import Brick, Lattice
 from tendon.messages import FieldPose, FieldStatus
 from tendon.session import Session
@@ -149,7 +149,7 @@ def test_a_config_that_cannot_work_is_refused():
 
 def test_a_field_is_used_with_its_materials_which_can_be_changed():
     field, store = random_field(3, 1), {}
-    field.material("steel", stiffness=1500, friction=0.3)
+    field.material("steel", stiffness=1500, friction=0.3, table=DepthTable(0.001, [-0.5]))
     field.fixture("point", (0, 0, 0.01), 200, most_force=2)
     stage = uploaded(field, store)
     field.material("steel", stiffness=700)
@@ -159,6 +159,7 @@ def test_a_field_is_used_with_its_materials_which_can_be_changed():
     assert (first.device, first.channel, first.generation, first.field) == (0, 0, 1, field.describe().name)
     assert [use.materials[0].stiffness for use in stage.uses] == [1500, 700]
     assert [use.fixtures[0].most_force for use in stage.uses] == [2, 2]
+    assert [len(use.tables) for use in stage.uses] == [1, 0] and first.tables[0].force == (-0.5,)
     assert (second.generation, second.field, stage.bricks, stage.drops) == (2, first.field, 3, [])
 
 

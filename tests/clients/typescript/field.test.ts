@@ -4,7 +4,7 @@ import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import { join } from "node:path";
 import { describe, it } from "node:test";
-import { Field } from "../../../clients/typescript/src/field.js";
+import { depthTableOf, Field } from "../../../clients/typescript/src/field.js";
 import type { Vec3 } from "../../../clients/typescript/src/messages.js";
 import { distanceTo, type Primitive } from "../../../clients/typescript/src/shape.js";
 import { toHex } from "./support/bytes.js";
@@ -74,6 +74,11 @@ describe("field", () => {
     assert.throws(() => Field.fromFunction((x) => x.z, vec([0, 0, 0]), vec([0.272, 0.272, 0.008])), /1156 bricks .* try a spacing of 1.1 mm/);
     assert.throws(() => field.material("x", { stiffness: 0 }), /stiffness = 0: expected above 0 N\/m/);
     assert.throws(() => field.material("x", { stiffness: 1, branch: 1 }), /branch = 1: expected a branch with relaxS/);
+    assert.throws(() => field.material("x", { stiffness: 1, table: { step: 0, force: [1] } }), /step = 0: expected 0.0001 to 0.1 m/);
+    assert.throws(() => field.material("x", { stiffness: 1, table: { step: 1e-3, force: [] } }), /force = 0: expected 1 to 16 entries/);
+    assert.throws(() => depthTableOf([1e-3, 1e-3], [1, 2]), /depths\[1\] = 0.001: expected above 0.001 m/);
+    assert.throws(() => depthTableOf([1e-3, 2e-3], [1, 1]), /forces\[1\] = 1: expected above 1 N/);
+    assert.throws(() => depthTableOf([0.2], [1]), /step = 0.2: expected 0.0001 to 0.1 m/);
     assert.throws(() => field.fixture("point", vec([0, 0, 0]), 100, vec([1, 1, 0])), /normal = 1.41.*: expected a vector of length 1/);
   });
 
@@ -81,11 +86,24 @@ describe("field", () => {
     const field = Field.fromPrimitives({ kind: "sphere", centre: vec([0, 0, 0]), radius: 0.01 });
     field.material("steel", { stiffness: 1500, friction: 0.3 });
     field.material("pad", { stiffness: 300, relaxS: 0.2, region: { kind: "sphere", centre: vec([0, 0, 0]), radius: 1 } });
+    const region: Primitive = { kind: "sphere", centre: vec([1, 0, 0]), radius: 0.1 };
+    field.material("liver", { ...depthTableOf([0.002, 0.004, 0.006], [0.25, 0.5, 1.25]), region });
     field.fixture("line", vec([0, 0, 0]), 200, vec([1, 0, 0]), 2);
     const told = field.describe();
     assert.deepEqual(told.materials.map((one) => [one.stiffness, one.branchStiffness, one.relaxation, one.friction]),
-      [[1500, 0, 0, 0.3], [300, 300, 0.2, 0]]);
+      [[1500, 0, 0, 0.3], [300, 300, 0.2, 0], [375, 0, 0, 0]]);
+    assert.deepEqual(told.tables, [{ material: 2, step: 0.002, force: [-0.5, -1, -1] }]);
     assert.equal(told.manifest[52], 1);
     assert.deepEqual(told.fixtures.map(({ kind, mostForce }) => [kind, mostForce]), [[2, 2]]);
+  });
+
+  it("a table of a curve has its forces, and there are at most three", () => {
+    const { stiffness, table } = depthTableOf([0.001, 0.0045, 0.016], [0.01, 0.5, 4]);
+    const [first, last] = [table.force[0]! + stiffness * 0.001, table.force[15]! + stiffness * 0.016];
+    assert.ok(Math.abs(stiffness - 80) < 1e-9 && Math.abs(first - 0.01) < 1e-9 && Math.abs(last - 4) < 1e-9);
+    const field = Field.fromPrimitives({ kind: "sphere", centre: vec([0, 0, 0]), radius: 0.01 });
+    const region: Primitive = { kind: "sphere", centre: vec([1, 0, 0]), radius: 0.1 };
+    for (const name of ["a", "b", "c", "c"]) field.material(name, { stiffness, table, region });
+    assert.throws(() => field.material("d", { stiffness, table, region }), /tables = 4: expected at most 3/);
   });
 });

@@ -21,7 +21,7 @@ function randomField(count: number, seed: number): FieldDescription {
   const bytes = (size: number): Uint8Array => Uint8Array.from({ length: size }, () => Math.floor(256 * random.uniform()));
   const bricks = Array.from({ length: count }, () => ({ hash: bytes(16), weights: bytes(1024) }));
   const materials = [{ stiffness: 1500, branchStiffness: 0, relaxation: 0, friction: 0 }];
-  return { name: bytes(32), manifest: bytes(1500), bricks, materials, fixtures: [] };
+  return { name: bytes(32), manifest: bytes(1500), bricks, materials, fixtures: [], tables: [{ material: 0, step: 0.001, force: [0.5] }] };
 }
 
 /** A session over a network with a constant delay, and the receiver of a server, which keeps `store`. */
@@ -120,8 +120,8 @@ describe("an upload", () => {
     assert.ok(stage.run(5000, () => stage.uses.length > 0));
     assert.equal(stage.bricks, 200, "no brick is repeated in vain");
     assert.ok(stage.now >= (1000n + 372n) * kMs, "183 bricks at 500 kB/s, after a burst of 17");
-    const { device, channel, generation, materials } = stage.uses[0]!;
-    assert.deepEqual([device, channel, generation, materials[0]!.stiffness], [1, 2, 1, 1500]);
+    const { device, channel, generation, materials, tables } = stage.uses[0]!;
+    assert.deepEqual([device, channel, generation, materials[0]!.stiffness, tables![0]!.force], [1, 2, 1, 1500, [0.5]]);
   });
 
   it("sends lost bricks again", () => {
