@@ -118,12 +118,12 @@ std::string text_of(const char* format, auto... values) {
 
 /// Prints a line for each variant of each scene. There is a column for each network.
 void print(const std::vector<FieldRow>& rows, std::size_t networks, std::ostream& out) {
-  out << "rms error, % of the true force, and (largest jump, N/ms)\nscene    method            ";
+  out << "rms error, % of the true force, and (largest jump, N/ms)\nscene       method            ";
   for (std::size_t i = 0; i < networks; ++i) out << text_of("%15.15s", rows[i].network.c_str());
   out << "  least E, J  gate binds  tank\n";
   for (std::size_t i = 0; i < rows.size(); i += networks) {
     const FieldRow& row = rows[i];
-    out << text_of("%-9s%-18s", row.scene->name.c_str(), Variant{row.method, row.ahead, row.push}.name().c_str());
+    out << text_of("%-12s%-18s", row.scene->name.c_str(), Variant{row.method, row.ahead, row.push}.name().c_str());
     FieldRun all;
     for (std::size_t j = i; j < i + networks; ++j) {
       const FieldRun& mean = rows[j].mean;

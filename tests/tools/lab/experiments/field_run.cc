@@ -74,6 +74,11 @@ Field upload_of(const FieldScene& scene) {
                       .branch_stiffness = material.branch,
                       .relaxation = material.tau,
                       .friction = material.friction}};
+  if (!material.table.used) return field;
+  FieldDepthTable& table = field.tables.emplace_back();
+  table.step = material.table.step;
+  table.size = static_cast<std::uint32_t>(table.force.size());
+  std::copy(material.table.force.begin() + 1, material.table.force.end(), table.force.begin());
   return field;
 }
 

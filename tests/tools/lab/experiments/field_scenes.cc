@@ -2,6 +2,7 @@
 #include "tests/tools/lab/experiments/field_scenes.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <numeric>
@@ -11,6 +12,8 @@
 
 namespace tendon::lab {
 namespace {
+
+constexpr double kTableStep = 1e-3;  // m
 
 double wave(double hertz, double t) { return std::sin(2 * std::numbers::pi * hertz * t); }
 double cosine(double hertz, double t) { return std::cos(2 * std::numbers::pi * hertz * t); }
@@ -78,15 +81,23 @@ FieldScene slot() {
   return scene;
 }
 
-/// The engine describes the relaxation, but not the hardening.
-FieldScene liver() {
-  FieldScene scene{.name = "liver",
+/// The engine describes the relaxation. It describes the hardening only if `tabled` is true, in a table.
+FieldScene liver(bool tabled) {
+  FieldScene scene{.name = tabled ? "liver-table" : "liver",
                    .low = {-0.03, -0.03, -0.012},
                    .high = {0.03, 0.03, 0.008},
                    .truth = {.stiffness = 150, .hardening = 3e4, .branch = 200, .tau = 0.2, .friction = 0.2}};
   scene.exact.primitives = {{.shape = field::Sphere{.centre = {0, 0, -0.08}, .radius = 0.08}}};
   scene.described = described(scene.truth);
   scene.described.stiffness = 250;
+  if (tabled) {
+    std::array<double, field::DepthTable::kKnots> corrections{};
+    for (std::size_t i = 0; i < corrections.size(); ++i) {
+      const double depth = kTableStep * static_cast<double>(i + 1);
+      corrections[i] = scene.truth.force(depth, depth) - scene.described.stiffness * depth;
+    }
+    scene.described.table = field::DepthTable::of(kTableStep, corrections);
+  }
   scene.target = [](double t, const FieldHand& hand) {
     return Vec3(0.006 * wave(0.3 * hand.pace, t), 0, 0.006 - 0.012 * hand.amplitude * (1 - cosine(0.6 * hand.pace, t)));
   };
@@ -176,7 +187,8 @@ Vec3 FieldScene::speed_at(double t, const FieldHand& hand) const {
 const std::vector<FieldScene>& field_scenes() {
   static const std::vector<FieldScene> scenes = [] {
     std::vector<FieldScene> all;
-    for (FieldScene scene : {wall(), sphere(), bowl(), slot(), liver(), cube(false), cube(true), moving()}) {
+    for (FieldScene scene :
+         {wall(), sphere(), bowl(), slot(), liver(false), liver(true), cube(false), cube(true), moving()}) {
       if (scene.truth.hardening == 0) scene.described = described(scene.truth);
       all.push_back(std::move(scene));
     }

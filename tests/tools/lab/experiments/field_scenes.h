@@ -53,7 +53,7 @@ struct FieldScene {
   Vec3 speed_at(double t, const FieldHand& hand) const;  ///< of the target
 };
 
-/// wall, sphere, bowl, slot, liver, edge, corner, moving
+/// wall, sphere, bowl, slot, liver, liver-table, edge, corner, moving
 const std::vector<FieldScene>& field_scenes();
 
 /// Computes the true force on a hand. A point p without mass is pulled by the hand x, and pushed by the surface i

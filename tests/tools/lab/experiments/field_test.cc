@@ -39,6 +39,16 @@ TEST(FieldExperiment, TrueForcesTeachTheHardeningAtEveryRoundTrip) {
   }
 }
 
+TEST(FieldExperiment, ADescribedHardeningIsFeltAtOnceAtEveryRoundTrip) {
+  const auto rows = field_rows({.hands = 1, .seed = 21, .scenes = {"liver-table"}, .round_trips_ms = {0, 600}});
+  for (const char* const network : {"0 ms", "600 ms"}) {
+    for (const FieldMethod method : {FieldMethod::kField, FieldMethod::kLearned}) {
+      EXPECT_LT(row_of(rows, method, network).mean.error, 0.03) << network << ", " << to_string(method);
+    }
+  }
+  for (const FieldRow& row : rows) EXPECT_GE(row.mean.least_energy, -1e-9) << to_string(row.method);
+}
+
 TEST(FieldExperiment, AMovingObjectNeedsATankAndPosesAheadOfTime) {
   const auto rows = field_rows({.hands = 1, .seed = 21, .scenes = {"moving"}, .round_trips_ms = {200}});
   const auto error = [&](bool ahead, bool tank) {
@@ -71,8 +81,9 @@ TEST(FieldExperiment, WrongUsageIsRefused) {
     field_rows({.scenes = {"cup"}});
     FAIL();
   } catch (const std::invalid_argument& error) {
-    EXPECT_EQ(std::string(error.what()),
-              "scene \"cup\" is unknown, expected one of wall, sphere, bowl, slot, liver, edge, corner, moving");
+    EXPECT_EQ(
+        std::string(error.what()),
+        "scene \"cup\" is unknown, expected one of wall, sphere, bowl, slot, liver, liver-table, edge, corner, moving");
   }
 }
 
