@@ -2,12 +2,13 @@
 """The files that are written by the generator."""
 
 import cpp
+import csharp
 import page
 import python
 import typescript
 from model import Wire
 
-BACKENDS = (cpp, python, typescript, page)
+BACKENDS = (cpp, csharp, python, typescript, page)
 
 
 def made(wire: Wire) -> dict[str, str]:

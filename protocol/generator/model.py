@@ -28,7 +28,7 @@ ROOT = Path(__file__).resolve().parents[2]
 PROTO = ROOT / "protocol/wire/tendon.proto"
 VALUES = Path(__file__).with_name("values.toml")
 
-CPP, PYTHON, TYPESCRIPT = "cpp", "python", "typescript"
+CPP, PYTHON, TYPESCRIPT, CSHARP = "cpp", "python", "typescript", "csharp"
 
 # ---- Bounds: the notation is at the top of tendon.proto ----
 
@@ -110,6 +110,11 @@ def camel(name: str) -> str:
     """As protobuf-es and the TypeScript client write names: lateness_us_log2 is latenessUsLog2."""
     first, *rest = name.split("_")
     return first + "".join(word[:1].upper() + word[1:] for word in rest)
+
+
+def pascal(name: str) -> str:
+    """As C# writes names: "force_applied" is ForceApplied, and "SAFE_STOP" is SafeStop."""
+    return "".join(word[:1].upper() + (word[1:].lower() if word.isupper() else word[1:]) for word in name.split("_"))
 
 
 def constant(short: str) -> str:
@@ -221,7 +226,8 @@ class Field:
 class Member:
     """A member of a value. It has one field, or several in a `part`."""
 
-    name: str  # as the language writes it: "sampled_ns" in Python, "sampledNs" in TypeScript, "sampled" in C++
+    # As the language writes it: "sampled_ns" in Python, "sampledNs" in TypeScript, "SampledNs" in C#, "sampled" in C++
+    name: str
     field: Field | None
     part: Part | None
     optional: bool  # may be empty
@@ -323,7 +329,7 @@ class Message:
         return None if found is None else str(found)
 
     def _written(self, name: str, language: str) -> str:
-        return camel(name) if language == TYPESCRIPT else name
+        return {TYPESCRIPT: camel, CSHARP: pascal}.get(language, str)(name)
 
     def _member(self, one: Field, language: str, renamed: Any) -> Member:
         bare, unit = split_unit(one.name)

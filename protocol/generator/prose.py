@@ -6,7 +6,7 @@ from __future__ import annotations
 import re
 import textwrap
 
-from model import CPP, Field, Member, Message, Part, Wire, constant
+from model import CPP, CSHARP, Field, Member, Message, Part, Wire, constant, pascal
 
 WIDTH = 120
 
@@ -19,8 +19,9 @@ class Words:
         self._language = language
         self._absent = absent  # the value of a part that is absent
         self._scope = "::" if language == CPP else "."
+        short = {CPP: constant, CSHARP: pascal}.get(language, str)
         self._enums = {
-            value.name: f"{enum.name}{self._scope}{constant(value.short) if language == CPP else value.short}"
+            value.name: f"{enum.name}{self._scope}{short(value.short)}"
             for enum in wire.enums.values()
             for value in enum.values
         }
