@@ -262,6 +262,9 @@ tendon_package(bullet DEBIAN libbullet-dev PKG_CONFIG bullet HEADERS btBulletDyn
 tendon_package(javac DEBIAN default-jdk-headless PROGRAM javac RUN -version VERSION 17)
 tendon_package(protobuf_jar DEBIAN libprotobuf-java FILES protobuf.jar PATHS /usr/share/java
   VERSION ${Protobuf_VERSION})
+tendon_package(mcs DEBIAN mono-mcs PROGRAM mcs RUN --version VERSION 6)
+tendon_package(mono DEBIAN mono-runtime PROGRAM mono RUN --version VERSION 6)
+tendon_package(mono_posix DEBIAN libmono-posix4.0-cil FILES Mono.Posix.dll PATHS /usr/lib/mono/4.5 /usr/lib/mono/4.0)
 # This checks that rustc can link a program to libsodium.
 tendon_package(rustc DEBIAN rustc PROGRAM rustc PROBE_FILE probe.rs RUN --edition 2021 probe.rs -l sodium -o probe
   PROBE "extern \"C\" { fn sodium_init() -> i32; }\nfn main() { unsafe { sodium_init(); } }\n")

@@ -21,6 +21,12 @@ static class VirtualWall
         force.Model.Stiffness.Set(new Vec3(Stiffness, 0, 0));
     }
 
+    private static uint Rate(string word)
+    {
+        if (uint.TryParse(word, out uint rate)) return rate;
+        throw new ArgumentException($"--rate is \"{word}\", expected a whole number of Hz");
+    }
+
     /// <summary>Ctrl-C and SIGTERM end the session with a Bye. SIGTERM is an event of its own in mono.</summary>
     private static void EndOnSignals()
     {
@@ -46,10 +52,10 @@ static class VirtualWall
             for (int i = 0; i < words.Length; ++i)
             {
                 if (words[i] == "--aes") config.OfferAes = true;
-                else if (i + 1 == words.Length) throw new ArgumentException($"{words[i]}: a value is missing or the option is unknown");
+                else if (i + 1 == words.Length) throw new ArgumentException($"{words[i]} has no value, or is unknown");
                 else if (words[i] == "--server") server = words[++i];
                 else if (words[i] == "--key") config.Key = KeyFile.Load(words[++i]);
-                else if (words[i] == "--rate") config.RateHz = uint.Parse(words[++i]);
+                else if (words[i] == "--rate") config.RateHz = Rate(words[++i]);
                 else throw new ArgumentException($"{words[i]} is unknown");
             }
             using (var client = new HapticClient(server, config))

@@ -24,7 +24,8 @@ namespace Tendon
     {
         private const long NextAddressAfter = Time.Second;
         private const long SilenceAfter = 3 * Time.Second;
-        private const int LongestWaitUs = 20_000;
+        private const int WaitMs = 10; // for a datagram. Socket.Poll waits ten times too long in Mono
+        private const int MostAtOnce = 64; // so that a flood does not keep the engine waiting
         private readonly string _server;
         private readonly Config _config;
         private readonly ForceClient _client;
@@ -161,29 +162,32 @@ namespace Tendon
 
         public void Dispose() => Close("the client was disposed");
 
-        /// <summary>Sends what is due, waits for a datagram, and handles all that have arrived.</summary>
+        /// <summary>Sends what is due, waits for a datagram, and handles those that have arrived.</summary>
         private void Turn()
         {
             Socket socket;
-            long wait;
             lock (_lock)
             {
                 SendDue();
-                if (_client.Unanswered(Now()) > NextAddressAfter * (1 + _address) && _address + 1 < _addresses.Length) UseNextAddress();
+                bool silent = _client.Unanswered(Now()) > NextAddressAfter * (1 + _address);
+                if (silent && _address + 1 < _addresses.Length) UseNextAddress();
                 socket = _socket;
-                wait = _client.NextTime() - Now();
             }
-            int waitUs = wait <= 0 ? 0 : (int)Math.Min(wait / 1000 + 1, LongestWaitUs);
-            if (!socket.Poll(waitUs, SelectMode.SelectRead)) return;
+            int count = socket.Receive(_received, 0, _received.Length, SocketFlags.None, out SocketError error);
+            if (error == SocketError.ConnectionRefused || error == SocketError.ConnectionReset)
+            {
+                Thread.Sleep(WaitMs); // the answer to an earlier datagram, which is treated as lost
+                return;
+            }
+            if (error != SocketError.Success) return; // mostly TimedOut
             lock (_lock)
             {
-                // An error is the answer to an earlier datagram, which is treated as lost.
-                do
+                _client.Receive(Now(), _received, count);
+                for (int i = 1; i < MostAtOnce && error == SocketError.Success && socket.Available > 0; ++i)
                 {
-                    int count = socket.Receive(_received, 0, _received.Length, SocketFlags.None, out SocketError error);
-                    if (error != SocketError.Success) break;
-                    _client.Receive(Now(), _received, count);
-                } while (socket.Available > 0);
+                    count = socket.Receive(_received, 0, _received.Length, SocketFlags.None, out error);
+                    if (error == SocketError.Success) _client.Receive(Now(), _received, count);
+                }
                 SendDue();
             }
         }
@@ -207,7 +211,7 @@ namespace Tendon
         {
             var socket = new Socket(_addresses[_address].AddressFamily, SocketType.Dgram, ProtocolType.Udp);
             socket.Connect(new IPEndPoint(_addresses[_address], _port));
-            socket.Blocking = false;
+            socket.ReceiveTimeout = WaitMs;
             return socket;
         }
 
