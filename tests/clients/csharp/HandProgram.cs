@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Plays the part of Unity: enables a TendonHand, calls FixedUpdate 50 times a second, and disables it.
 //
-//     mono hand.exe --server HOST:PORT --seconds S [--key FILE] [--pause-at S --pause S] [--throw] [--valid-for S]
+//     mono hand.exe --server HOST:PORT --seconds S [--key FILE] [--pause-at S --pause S] [--valid-for S] [--throw] [--no-stiffness]
 //
 // The hand feels a wall of 1000 N/m at Unity's x = 0. The last line of the output is a summary in JSON.
 using System;
@@ -19,6 +19,7 @@ namespace Tendon.Tests
         internal const float StiffnessNpm = 1000;
         internal int Touches;
         internal bool Throws;
+        internal bool SendsStiffness = true;
         internal double MostForce;
 
         protected override HandForce Touch(HandState hand)
@@ -28,7 +29,9 @@ namespace Tendon.Tests
             MostForce = Math.Max(MostForce, -hand.ForceApplied.x);
             float depth = hand.Position.x;
             if (depth <= 0) return default(HandForce);
-            return new HandForce { Force = new Vector3(-StiffnessNpm * depth, 0, 0), Stiffness = StiffnessNpm, Normal = new Vector3(1, 0, 0) };
+            var force = new HandForce { Force = new Vector3(-StiffnessNpm * depth, 0, 0), Normal = new Vector3(1, 0, 0) };
+            if (SendsStiffness) force.Stiffness = StiffnessNpm;
+            return force;
         }
 
         internal void Enable() => OnEnable();
@@ -43,12 +46,12 @@ namespace Tendon.Tests
             var options = new Dictionary<string, string>();
             for (int i = 0; i < words.Length; ++i)
             {
-                if (words[i] == "--throw") options[words[i]] = "";
+                if (words[i] == "--throw" || words[i] == "--no-stiffness") options[words[i]] = "";
                 else options[words[i]] = words[++i];
             }
             Func<string, double, double> number = (name, otherwise) =>
                 options.TryGetValue(name, out string text) ? double.Parse(text, CultureInfo.InvariantCulture) : otherwise;
-            var hand = new Wall { server = options["--server"], Throws = options.ContainsKey("--throw") };
+            var hand = new Wall { server = options["--server"], Throws = options.ContainsKey("--throw"), SendsStiffness = !options.ContainsKey("--no-stiffness") };
             if (options.TryGetValue("--key", out string key)) hand.keyFile = key;
             hand.validForSeconds = (float)number("--valid-for", 0.06);
             double seconds = number("--seconds", 5), pauseAt = number("--pause-at", 1e9), pauseEnd = pauseAt + number("--pause", 0);
