@@ -240,6 +240,26 @@ namespace Tendon.Tests
             Check.That(sent.HasModel && !sent.Torque.HasValue && !sent.GripForce.HasValue, "handle is not granted");
         }
 
+        public static void APressInAStateThatIsNotTakenIsNotLost()
+        {
+            var server = new FakeServer();
+            ForceClient client = server.Opened(new Config());
+            var hand = new DeviceState();
+            uint[] buttons = { 2, 0, 1 };
+            for (int i = 0; i < 3; ++i)
+            {
+                server.Frame.State.Buttons = buttons[i];
+                client.Receive(server.Now, server.Datagram, server.SayState((ulong)i + 1));
+            }
+            Check.That(client.TakeState(hand) && hand.Buttons == 3 && hand.Tick == 3, $"buttons {hand.Buttons}");
+            server.Frame.State.Buttons = 0;
+            client.Receive(server.Now, server.Datagram, server.SayState(4));
+            Check.That(client.TakeState(hand) && hand.Buttons == 0, "released");
+            Check.That(!client.TakeState(hand), "taken once");
+            client.Receive(server.Now, server.Datagram, server.SayState(4));
+            Check.That(!client.TakeState(hand) && client.Stats.Stale == 1, "stale");
+        }
+
         public static void ARefusalIsToldAndOnlySomeAreTriedAgain()
         {
             foreach (Code code in new[] { Code.Busy, Code.Shutdown, Code.Denied, Code.Unsupported, Code.Invalid })

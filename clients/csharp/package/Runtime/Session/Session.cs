@@ -60,7 +60,8 @@ namespace Tendon
         internal readonly OutgoingRequests Asked = new OutgoingRequests();
         internal readonly IncomingRequests Answering = new IncomingRequests();
 
-        /// <summary>The newest state of the device. It is new if HasState is true, which the owner resets.</summary>
+        /// <summary>The newest state of the device. It is new if HasState is true, which the owner resets. Its buttons
+        /// include those that were pressed in states that the owner has not taken.</summary>
         internal readonly DeviceState State = new DeviceState();
         internal bool HasState;
 
@@ -275,7 +276,9 @@ namespace Tendon
             }
             _ticks[state.Device] = state.Tick + 1;
             if (state.Device != _device) return;
+            uint pressed = HasState ? State.Buttons : 0;
             State.CopyFrom(state);
+            State.Buttons |= pressed;
             HasState = true;
         }
 

@@ -74,6 +74,9 @@ namespace Tendon.Unity
         [Tooltip("For how long a force is valid. At least three times Time.fixedDeltaTime")]
         public float validForSeconds = 0.06f;
 
+        [Tooltip("States that the server sends per second. 0: every one, which are 1000 on most devices")]
+        public uint statesPerSecond = 200;
+
         [Tooltip("Move this GameObject with the hand, relative to its parent")]
         public bool moves = true;
 
@@ -99,7 +102,7 @@ namespace Tendon.Unity
             _handleOf = client => client.Handle;
             try
             {
-                var config = new Config { Name = name, Device = device, Channel = channel };
+                var config = new Config { Name = name, Device = device, Channel = channel, RateHz = statesPerSecond };
                 config.ValidForUs = (uint)(Mathf.Clamp(validForSeconds, 1e-6f, 10) * 1e6f);
                 if (keyFile != "") config.Key = KeyFile.Load(keyFile);
                 _client = new HapticClient(server, config);
