@@ -18,7 +18,7 @@ namespace Tendon.Tests
                 Json file = Json.Vectors(suite);
                 var bodies = file["data"].List.FindAll(one => one["direction"].Text == "server_to_client");
                 Session session = VectorsTest.SessionOf(file, 0);
-                int count = suite == "plain" ? 100_000 : 10_000;
+                int count = suite == "plain" ? 100_000 : suite == "sealed" ? 20_000 : 2_000;
                 var datagrams = new byte[bodies.Count][];
                 for (int i = 0; i < bodies.Count; ++i) datagrams[i] = bodies[i]["datagram"].Bytes;
                 long allocated = 0;
@@ -29,7 +29,7 @@ namespace Tendon.Tests
                     byte[] good = datagrams[random.Next(bodies.Count)];
                     Buffer.BlockCopy(good, 0, datagram, 0, good.Length);
                     int length = Mutate(random, datagram, good.Length, suite == "plain" ? 16 : 0);
-                    if (length == good.Length && Check.Hex(good) == Check.Hex(datagram).Substring(0, 2 * length)) continue;
+                    if (length == good.Length && IsSame(good, datagram)) continue;
                     ulong before = Sum(session.Stats);
                     long begin = GC.GetAllocatedBytesForCurrentThread();
                     session.Receive(1, datagram, length);
@@ -67,6 +67,15 @@ namespace Tendon.Tests
             }
             if (from > 0) Little.Write64(datagram, 8, (ulong)random.Next(1 << 20));
             return length;
+        }
+
+        private static bool IsSame(byte[] good, byte[] datagram)
+        {
+            for (int i = 0; i < good.Length; ++i)
+            {
+                if (good[i] != datagram[i]) return false;
+            }
+            return true;
         }
 
         public static void BodiesThatLieAboutTheirSizesAreMalformed()
