@@ -14,8 +14,8 @@ _HEAD = """// SPDX-License-Identifier: Apache-2.0
 // Generated from protocol/wire/tendon.proto by protocol/generate. Do not edit.
 """
 
-# Messages that have hand-written code, and those of features that the client does not support: columns and fields. Their
-# frames and requests are unknown to the client.
+# Messages that have hand-written code, and those of features that the client does not support: columns and fields. The
+# client treats their frames and requests as unknown.
 _LEFT_OUT = {
     *("Datagram", "Vec3", "Quat", "DeviceStates"),
     *("OfferField", "UseField", "DropField", "FieldMaterial", "FieldFixture", "FieldBrick", "FieldStatus", "FieldPose"),
@@ -43,7 +43,7 @@ def files(wire: Wire) -> dict[str, str]:
     for file, wanted in _groups(wire, messages).items():
         body = "\n".join(line for message in wanted for line in _Class(wire, message).lines())
         out[f"{FOLDER}/{file}.cs"] = (
-            f"{_HEAD}using System.Collections.Generic;\n\nnamespace Tendon\n{{\n{body.rstrip()}\n}}\n"
+            f"{_HEAD}using System.Collections.Generic;\n\nnamespace Tendon {{\n{body.rstrip()}\n}}\n"
         )
     return out
 
@@ -75,13 +75,13 @@ def _enums(wire: Wire, enums: list[Enum]) -> str:
     words = Words(wire, CSHARP, "null")
     lines = []
     for enum in enums:
-        lines += [*_comment(words.say(enum.doc, "Frame"), "    "), f"    public enum {enum.name}", "    {"]
+        lines += [*_comment(words.say(enum.doc, "Frame"), "  "), f"  public enum {enum.name} {{"]
         for value in enum.known:
-            lines += _comment(words.say(value.doc, "Frame"), "        ")
-            lines.append(f"        {pascal(value.short)} = {value.number},")
-        lines += ["    }", ""]
+            lines += _comment(words.say(value.doc, "Frame"), "    ")
+            lines.append(f"    {pascal(value.short)} = {value.number},")
+        lines += ["  }", ""]
     body = "\n".join(lines).rstrip()
-    return f"{_HEAD}namespace Tendon\n{{\n{body}\n}}\n"
+    return f"{_HEAD}namespace Tendon {{\n{body}\n}}\n"
 
 
 def _is_vector(field: Field) -> bool:
@@ -104,7 +104,7 @@ class _Class:
         self._wire = wire
         self._message = message
         self._words = Words(wire, CSHARP, "null")
-        known = [field for field in message.fields if not (field.kind == "message" and field.type in _LEFT_OUT - {"Vec3", "Quat"})]
+        known = [field for field in message.fields if _is_vector(field) or field.type not in _LEFT_OUT]
         self._fields = known
         members = {member.wire: member for member in message.members(CSHARP)}
         self._members = {
@@ -116,8 +116,8 @@ class _Class:
         return self._members[field.name].name
 
     def lines(self) -> list[str]:
-        out = _comment(self._words.of_message(self._message), "    ")
-        out += [f"    public sealed class {self._message.name}", "    {"]
+        out = _comment(self._words.of_message(self._message), "  ")
+        out.append(f"  public sealed class {self._message.name} {{")
         for oneof in self._message.oneofs:
             out += self._cases(oneof)
         for field in self._fields:
@@ -132,26 +132,25 @@ class _Class:
             if "CopyFrom" in title and self._message.oneofs:
                 continue  # is never copied
             if "Objection" in title:
-                out += ["", "        /// <summary>The name of the first field that is out of bounds, or null.</summary>"]
+                out += ["", "    /// <summary>The name of the first field that is out of bounds, or null.</summary>"]
             else:
                 out.append("")
-            out += [f"        {title}", "        {", *(f"            {line}" for line in body), "        }"]
-        return [*out, "    }", ""]
+            out += [f"    {title} {{", *(f"      {line}" for line in body), "    }"]
+        return [*out, "  }", ""]
 
     # ---- Values ----
 
     def _cases(self, oneof: str) -> list[str]:
         fields = [field for field in self._fields if field.oneof == oneof]
         kind = f"{pascal(oneof)}Case"
-        cases = ", ".join(["None = 0", *(f"{pascal(field.name)} = {field.number}" for field in fields)])
+        cases = ["None = 0", *(f"{pascal(field.name)} = {field.number}" for field in fields)]
         return [
-            "        /// <summary>The member that is present.</summary>",
-            f"        public enum {kind}",
-            "        {",
-            *wrapped(cases, "            "),
-            "        }",
+            "    /// <summary>The member that is present.</summary>",
+            f"    public enum {kind} {{",
+            *(f"      {case}," for case in cases),
+            "    }",
             "",
-            f"        public {kind} {pascal(oneof)};",
+            f"    public {kind} {pascal(oneof)};",
         ]
 
     def _type(self, field: Field) -> str:
@@ -171,21 +170,21 @@ class _Class:
     def _declared(self, field: Field) -> list[str]:
         out = []
         if field.heading:
-            out += wrapped(self._words.say(field.heading, self._message.name), "        ", "// ")
+            out += wrapped(self._words.say(field.heading, self._message.name), "    ", "// ")
         kind, name = self._type(field), self._name(field)
         absent = "null" if self._is_nullable(field) else "absent" if _is_part(field) or field.is_matrix else None
-        out += _comment(self._words.of_field(field, absent), "        ")
+        out += _comment(self._words.of_field(field, absent), "    ")
         if field.repeated:
             most = max(field.bound.entries) if isinstance(field.bound.entries, (tuple, frozenset)) else 0
             size = str(most) if kind in ("Reals", "Counts") else ""
-            out.append(f"        public readonly {kind} {name} = new {kind}({size});")
+            out.append(f"    public readonly {kind} {name} = new {kind}({size});")
         elif _is_part(field):
             if field.oneof is None:
-                out.append(f"        public bool Has{name};")
-            out.append(f"        public readonly {kind} {name} = new {kind}();")
+                out.append(f"    public bool Has{name};")
+            out.append(f"    public readonly {kind} {name} = new {kind}();")
         else:
             value = ' = ""' if kind == "string" else ""
-            out.append(f"        public {kind}{'?' if self._is_nullable(field) else ''} {name}{value};")
+            out.append(f"    public {kind}{'?' if self._is_nullable(field) else ''} {name}{value};")
         return out
 
     def _clear(self) -> list[str]:
@@ -246,7 +245,8 @@ class _Class:
             for check in self._message.checks:
                 if re.findall(r"[a-z]\w+", check.replace("sum(", "("))[0] == place:
                     terms = re.sub(r"sum\((\w+)\)", r"\1.Sum()", check).replace(" or ", " || ")
-                    terms = re.sub(r"\b[a-z]\w+_\w+|\bsteps\b|\bunseen\b|\boverruns\b", lambda one: self._name(fields[one[0]]), terms)
+                    names = re.compile(rf"\b(?:{'|'.join(fields)})\b")
+                    terms = names.sub(lambda one: self._name(fields[one[0]]), terms)
                     out.append(f'if (!({terms})) return "{place}";')
         for part in self._message.values.get("parts", {}).values():
             if part.get("there") == "box":
@@ -289,7 +289,8 @@ class _Class:
                 return f"!Bounds.AreNumbers({name}, {fewest}, {most}, {bound.value.least}, {bound.value.most})"
             return f"{name}.Count > {most}"
         if field.type == "Quat":
-            return f"{name}.HasValue && !Bounds.IsRotation({name}.Value)" if field.is_optional else f"!Bounds.IsRotation({name})"
+            optional = f"{name}.HasValue && !Bounds.IsRotation({name}.Value)"
+            return optional if field.is_optional else f"!Bounds.IsRotation({name})"
         if field.type == "Vec3":
             if field.is_unit_vector:
                 return f"!Bounds.IsNormal({name})"
@@ -318,7 +319,8 @@ class _Class:
             return " || ".join(part for part in (below, f"{value} > {most}") if part)
         if bound.beyond:
             return f"!({value} > {least} && {value} <= {most})"
-        others = [f"{value} != {other}" for other, also in (("double.PositiveInfinity", bound.infinity), ("0", bound.zero)) if also]
+        also = (("double.PositiveInfinity", bound.infinity), ("0", bound.zero))
+        others = [f"{value} != {other}" for other, allowed in also if allowed]
         return " && ".join([*others, f"!({value} >= {least} && {value} <= {most})"])
 
     # ---- Bytes ----
@@ -328,13 +330,13 @@ class _Class:
         return field.number << 3 | kind
 
     def _read(self) -> list[str]:
-        out = ["while (r.Next())", "{", "    switch (r.Tag)", "    {"]
+        out = ["while (r.Next()) {", "  switch (r.Tag) {"]
         for field in self._fields:
-            labels = [f"        case {self._tag(field)}:"]
+            labels = [f"    case {self._tag(field)}:"]
             if field.packed:
-                labels.append(f"        case {field.number << 3 | (1 if field.kind == 'number' else 0)}:")
-            out += [*labels, *(f"            {line}" for line in self._read_one(field)), "            break;"]
-        return [*out, "        default:", "            r.Skip();", "            break;", "    }", "}"]
+                labels.append(f"    case {field.number << 3 | (1 if field.kind == 'number' else 0)}:")
+            out += [*labels, *(f"      {line}" for line in self._read_one(field)), "      break;"]
+        return [*out, "    default:", "      r.Skip();", "      break;", "  }", "}"]
 
     def _read_one(self, field: Field) -> list[str]:
         name, kind = self._name(field), field.type
@@ -361,7 +363,7 @@ class _Class:
         return [f"{name} = r.{_SCALARS[kind][1]}();"]
 
     def _inside(self, value: str) -> list[str]:
-        return ["{", "    int end = r.Enter();", f"    {value}.Read(ref r);", "    r.Leave(end);", "}"]
+        return ["{", "  int end = r.Enter();", f"  {value}.Read(ref r);", "  r.Leave(end);", "}"]
 
     def _write(self) -> list[str]:
         return [line for field in self._fields for line in self._write_one(field)]
@@ -373,16 +375,16 @@ class _Class:
         if field.repeated and field.kind == "text":
             return [f"w.Texts({tag}, {name}, {most}, {text});"]
         if field.repeated and field.kind == "message":
-            return [f"for (int i = 0; i < {name}.Count && i < {most}; ++i)", *self._within(tag, f"{name}[i]")]
+            return self._within(f"for (int i = 0; i < {name}.Count && i < {most}; ++i)", tag, f"{name}[i]")
         if field.repeated:
             return [f"w.Write({tag}, {name});"]
         if field.oneof is not None:
             there = f"if ({pascal(field.oneof)} == {pascal(field.oneof)}Case.{pascal(field.name)})"
             if field.kind == "message":
-                return [there, *self._within(tag, name)]
+                return self._within(there, tag, name)
             return [f"{there} w.Present{_SCALARS[field.type][1]}({tag}, {name});"]
         if _is_part(field):
-            return [f"if (Has{name})", *self._within(tag, name)]
+            return self._within(f"if (Has{name})", tag, name)
         if self._is_nullable(field):
             function = field.type if _is_vector(field) else _SCALARS[field.type][1]
             return [f"if ({name}.HasValue) w.Present{function}({tag}, {name}.Value);"]
@@ -392,5 +394,5 @@ class _Class:
             return [f"w.Text({tag}, {name}, {text});"]
         return [f"w.{field.type if _is_vector(field) else _SCALARS[field.type][1]}({tag}, {name});"]
 
-    def _within(self, tag: int, value: str) -> list[str]:
-        return ["{", f"    int begin = w.Begin({tag});", f"    {value}.Write(ref w);", "    w.End(begin);", "}"]
+    def _within(self, head: str, tag: int, value: str) -> list[str]:
+        return [f"{head} {{", f"  int begin = w.Begin({tag});", f"  {value}.Write(ref w);", "  w.End(begin);", "}"]

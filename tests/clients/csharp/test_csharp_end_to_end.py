@@ -51,14 +51,13 @@ def far_wall(folder: Path, limiter: bool, *words: str) -> tuple[dict[str, Any], 
     if not limiter:
         text = text.replace('kind = "aol+"', 'kind = "none"').replace('preset = "feel"', "")
     with Server(folder, scenes={"demo": text}) as server:
-        options = ["--listen", "127.0.0.1:0", "--to", server.address, "--profile", "delay=20ms", "--seed", "7", "--json"]
+        options = ["--listen", "127.0.0.1:0", "--to", server.address, "--profile", "delay=20ms", "--json"]
         with Process(folder, [PROGRAMS / "tendon-inject", *options]) as network:
             far = json.loads(network.wait_for_line('"listen"'))["listen"]
             with hand(folder, far, "--seconds", "12", "--valid-for", "0.1", *words) as wall:
                 felt = summary(wall)
         server.end()
-    found = subprocess.run([PROGRAMS / "tendon-report", recording, "--json"], capture_output=True, text=True, check=True)
-    report = json.loads(found.stdout)
+    report = json.loads(subprocess.check_output([PROGRAMS / "tendon-report", recording, "--json"]))
     names = ("limiter_on", "least_energy_j", "energy_given_out_j", "peak_force_n", "forces_per_s")
     print(felt, {name: report[name] for name in names})
     assert felt["touches"] > 200
@@ -67,9 +66,8 @@ def far_wall(folder: Path, limiter: bool, *words: str) -> tuple[dict[str, Any], 
     return felt, report
 
 
-@pytest.mark.parametrize("limiter", [True, False])
-def test_a_wall_with_stiffness_at_50_hz_and_20_ms_away_gives_out_no_energy(tmp_path, limiter):
-    _, report = far_wall(tmp_path, limiter)
+def test_a_wall_with_stiffness_at_50_hz_and_20_ms_away_gives_out_no_energy(tmp_path):
+    _, report = far_wall(tmp_path, True)
     assert report["energy_given_out_j"] == 0
     assert report["least_energy_j"] >= -1e-9
 

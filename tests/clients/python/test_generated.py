@@ -124,12 +124,12 @@ def test_a_new_field_needs_no_other_file(tmp_path):
     assert "  ...(m.biasN && { bias: readVec3(m.biasN) }),\n" in codec
     assert "    hints: clipAll(value.hints ?? [], 4, 24),\n" in codec
     frames, requests = (made[f"clients/csharp/package/Runtime/Wire/Generated/{name}.cs"] for name in ("Frames", "Requests"))
-    assert "        /// <summary>J, of the gripper</summary>\n        public double GripEnergy;\n" in frames
-    assert "        public Vec3? Bias;\n" in frames
-    assert '            if (!(GripEnergy >= -1e3 && GripEnergy <= 1e3)) return "grip_energy_j";\n' in frames
-    assert "            if (Bias.HasValue) w.PresentVec3(794, Bias.Value);\n" in frames
-    assert "            w.Texts(794, Hints, 4, 24);\n" in frames
-    assert '            if (RampMs > 5000) return "ramp_ms";\n' in requests
+    assert "    /// <summary>J, of the gripper</summary>\n    public double GripEnergy;\n" in frames
+    assert "    public Vec3? Bias;\n" in frames
+    assert '      if (!(GripEnergy >= -1e3 && GripEnergy <= 1e3)) return "grip_energy_j";\n' in frames
+    assert "      if (Bias.HasValue) w.PresentVec3(794, Bias.Value);\n" in frames
+    assert "      w.Texts(794, Hints, 4, 24);\n" in frames
+    assert '      if (RampMs > 5000) return "ramp_ms";\n' in requests
     if shutil.which("clang-format") is not None:
         frames, requests = (made[f"protocol/wire/generated/{name}_fields.h"] for name in ("frame", "request"))
         values = re.sub(r" +///<", "  ///<", made["protocol/wire/generated/messages.h"])
