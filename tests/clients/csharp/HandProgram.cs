@@ -3,8 +3,10 @@
 //
 //     mono hand.exe --server HOST:PORT --seconds S [--key FILE] [--pause-at S --pause S] [--valid-for S] [--throw]
 //                   [--no-stiffness]
+//     mono hand.exe --server HOST:PORT --turns N
 //
-// The hand feels a wall of 1000 N/m at Unity's x = 0. The last line of the output is a summary in JSON.
+// The hand feels a wall of 1000 N/m at Unity's x = 0. The last line of the output is a summary in JSON. With --turns, it
+// is HapticClient.Run instead, with a spring, and the summary has the bytes that N turns have allocated.
 using System;
 using System.Collections.Generic;
 using System.Diagnostics;
@@ -46,6 +48,7 @@ namespace Tendon.Tests {
       }
       Func<string, double, double> number = (name, otherwise) =>
         options.TryGetValue(name, out string text) ? double.Parse(text, CultureInfo.InvariantCulture) : otherwise;
+      if (options.ContainsKey("--turns")) return Turns(options["--server"], (int)number("--turns", 0));
       var hand = new Wall { server = options["--server"], Throws = options.ContainsKey("--throw") };
       hand.SendsStiffness = !options.ContainsKey("--no-stiffness");
       if (options.TryGetValue("--key", out string key)) hand.keyFile = key;
@@ -73,6 +76,29 @@ namespace Tendon.Tests {
       string force = hand.MostForce.ToString(CultureInfo.InvariantCulture), enabled = hand.enabled ? "true" : "false";
       Console.WriteLine($"{{\"touches\":{hand.Touches},\"most_force_n\":{force},\"measured\":{measured}," +
                         $"\"allocated\":{allocated},\"status\":\"{status}\",\"enabled\":{enabled}}}");
+      return 0;
+    }
+
+    private static int Turns(string server, int turns) {
+      const int warmUp = 500;
+      int turn = 0;
+      long begin = 0;
+      Physics spring = (hand, force) => {
+        force.Force = -100 * hand.Position;
+        force.HasModel = true;
+        force.Model.At = hand.Position;
+        force.Model.Stiffness.Set(100);
+        if (++turn == warmUp) begin = GC.GetAllocatedBytesForCurrentThread();
+      };
+      using (var client = new HapticClient(server, new Config())) {
+        var clock = Stopwatch.StartNew();
+        client.Run(spring, () => {
+          if (turn < warmUp + turns && clock.Elapsed.TotalSeconds < 60) return false;
+          long allocated = GC.GetAllocatedBytesForCurrentThread() - begin;
+          Console.WriteLine($"{{\"turns\":{turn - warmUp},\"allocated\":{allocated}}}");
+          return true;
+        });
+      }
       return 0;
     }
   }
