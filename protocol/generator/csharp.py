@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Writes the messages of the C# client: values that are read and written without allocation, and their bounds."""
+"""Writes the messages of the C# client, which can be read, checked and written without allocating memory."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ _HEAD = """// SPDX-License-Identifier: Apache-2.0
 // Generated from protocol/wire/tendon.proto by protocol/generate. Do not edit.
 """
 
-# Messages that have hand-written code, and those of features that the client does not support: columns and fields. The
-# client treats their frames and requests as unknown.
+# These messages have hand-written code, or belong to features that the client does not support (columns and fields). The
+# client treats the frames and requests of these features as unknown.
 _LEFT_OUT = {
     *("Datagram", "Vec3", "Quat", "DeviceStates"),
     *("OfferField", "UseField", "DropField", "FieldMaterial", "FieldFixture", "FieldBrick", "FieldStatus", "FieldPose"),
