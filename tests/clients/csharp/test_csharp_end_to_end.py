@@ -178,7 +178,10 @@ def test_a_key_file_that_others_can_read_is_refused(tmp_path):
         assert "users other than its owner can read it" in wall.said[-1]
 
 
-@pytest.mark.parametrize("words", [["--server", "nowhere"], ["--server"], ["--surprise", "1"], ["--rate", "x"]])
+@pytest.mark.parametrize(
+    "words",
+    [["--server", "nowhere"], ["--server", "no-such-host.invalid:1"], ["--server"], ["--surprise", "1"], ["--rate", "x"]],
+)
 def test_wrong_options_are_one_line(tmp_path, words):
     with program(tmp_path, "virtual_wall", *words) as wall:
         assert wall.wait() == 2

@@ -37,8 +37,8 @@ namespace Tendon {
     private Thread _thread;
     private volatile bool _ending;
 
-    /// <summary>Throws an ArgumentException that says what was expected if the address or a value of the config is
-    /// wrong, and a SocketException if the name has no address.</summary>
+    /// <summary>Throws an ArgumentException with the reason if the address or a value of the config is wrong, if the
+    /// name has no address, or if a key is needed.</summary>
     public HapticClient(string server, Config config) {
       int colon = server.LastIndexOf(':');
       if (colon <= 0 || !ushort.TryParse(server.Substring(colon + 1), out ushort port) || port == 0) {
@@ -48,12 +48,21 @@ namespace Tendon {
       _config = config;
       _server = server;
       _port = port;
-      _addresses = Dns.GetHostAddresses(server.Substring(0, colon).Trim('[', ']'));
-      if (_addresses.Length == 0) throw new ArgumentException($"{server}: the name has no address");
+      _addresses = AddressesOf(server.Substring(0, colon).Trim('[', ']'));
       if (config.Key == null && !Array.TrueForAll(_addresses, IPAddress.IsLoopback)) {
         throw new ArgumentException($"{server} is another machine: a key is needed (tendond keygen NAME)");
       }
       _socket = Connected();
+    }
+
+    private static IPAddress[] AddressesOf(string name) {
+      try {
+        IPAddress[] addresses = Dns.GetHostAddresses(name);
+        if (addresses.Length > 0) return addresses;
+      } catch (SocketException) {
+        // is the same as no address
+      }
+      throw new ArgumentException($"the name {name} has no address");
     }
 
     /// <summary>Text for the user: why there is no session. Empty if there is one.</summary>
