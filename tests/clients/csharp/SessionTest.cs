@@ -228,6 +228,14 @@ namespace Tendon.Tests {
       Check.That(sent.HasModel && !sent.Torque.HasValue && !sent.GripForce.HasValue, "handle is not granted");
     }
 
+    public static void AnObserverSendsNoForce() {
+      var server = new FakeServer();
+      ForceClient client = server.Opened(new Config { Observe = true });
+      Check.That(!client.Holds && client.Send(new DeviceState(), new ForceCommand()).Contains("an observer"), "refused");
+      server.Listen(client);
+      Check.That(!server.Heard.Exists(frame => frame.Body == Frame.BodyCase.Force), "no force");
+    }
+
     public static void APressInAStateThatIsNotTakenIsNotLost() {
       var server = new FakeServer();
       ForceClient client = server.Opened(new Config());
