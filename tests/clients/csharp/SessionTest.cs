@@ -228,6 +228,58 @@ namespace Tendon.Tests {
       Check.That(sent.HasModel && !sent.Torque.HasValue && !sent.GripForce.HasValue, "handle is not granted");
     }
 
+    public static void AFrameOutOfBoundsIsDroppedAndCountedAndTheNextIsTaken() {
+      var server = new FakeServer();
+      ForceClient client = server.Opened(new Config());
+      var hand = new DeviceState();
+      Action<DeviceState>[] changes = {
+        state => state.Position = new Vec3(0, double.NaN, 0), state => state.Mode = 0, state => state.Device = 16,
+        state => state.Energy = 2e12, state => state.Orientation = new Quat(1, 1, 0, 0),
+      };
+      ulong tick = 0;
+      foreach (Action<DeviceState> change in changes) {
+        var wrong = new Frame { Body = Frame.BodyCase.State };
+        wrong.State.CopyFrom(server.Frame.State);
+        wrong.State.Tick = ++tick;
+        change(wrong.State);
+        server.Tell(client, wrong);
+        Check.That(!client.TakeState(hand) && client.Stats.Invalid == tick, $"wrong state {tick}");
+      }
+      server.Tell(client, new Frame { Body = Frame.BodyCase.Force });
+      Check.Equal(tick + 1, client.Stats.Invalid, "servers send no forces");
+      client.Receive(server.Now, server.Datagram, server.SayState(1));
+      Check.That(client.TakeState(hand) && hand.Tick == 1, "the good one with the same tick");
+    }
+
+    public static void ARequestIsRepeatedMoreAndMoreSeldomUntilItIsAnswered() {
+      var server = new FakeServer();
+      ForceClient client = server.Opened(new Config());
+      server.Listen(client);
+      var times = new System.Collections.Generic.List<long>();
+      long begin = server.Now;
+      for (int ms = 1; ms <= 4000; ++ms) {
+        server.Now += Time.Millisecond;
+        if (ms % 500 == 0) client.Receive(server.Now, server.Datagram, server.Say(null)); // keeps the session alive
+        server.Heard.Clear();
+        server.Listen(client);
+        bool asked = server.Heard.Exists(frame => frame.Body == Frame.BodyCase.Control);
+        if (asked) times.Add((server.Now - begin) / Time.Millisecond);
+      }
+      Check.Equal("100 300 700 1500 2500 3500", string.Join(" ", times), "ms after the first one");
+      var answer = new Frame { Body = Frame.BodyCase.ControlAck };
+      answer.ControlAck.Id = 1;
+      answer.ControlAck.Code = Code.Ok;
+      server.Tell(client, answer);
+      server.Heard.Clear();
+      server.Now += Time.Second;
+      server.Listen(client);
+      Check.That(!server.Heard.Exists(frame => frame.Body == Frame.BodyCase.Control), "it is answered");
+      answer.ControlAck.Id = 9;
+      ulong invalid = client.Stats.Invalid;
+      server.Tell(client, answer);
+      Check.Equal(invalid + 1, client.Stats.Invalid, "an answer to no request");
+    }
+
     public static void AnObserverSendsNoForce() {
       var server = new FakeServer();
       ForceClient client = server.Opened(new Config { Observe = true });
@@ -325,13 +377,24 @@ namespace Tendon.Tests {
       Json file = Json.Vectors("sealed");
       Sealing client = VectorsTest.SealingOf(file, false, 0), server = VectorsTest.SealingOf(file, true, 0);
       var datagram = new byte[1200];
-      Check.Equal((byte)0, client.SendEpoch(589 * Time.Second), "after 589 s");
+      byte[] before = new byte[1200], late = new byte[1200];
+      int size = SealedAt(client, 589 * Time.Second, 1, before);
+      SealedAt(client, 589 * Time.Second, 2, late);
+      Check.Equal((byte)0, before[2], "the epoch after 589 s");
       Check.Equal((byte)1, client.SendEpoch(590 * Time.Second), "after 590 s");
       Header.Write(datagram, DatagramType.Data, 1, 1, FakeServer.Connection, 5);
       int count = client.Seal(5, datagram, 40);
       Check.Equal(Sealing.Result.Opened, server.Open(600 * Time.Second, 5, datagram, count), "the server follows");
+      Sealing.Result result = server.Open(602 * Time.Second - 1, 1, before, size);
+      Check.Equal(Sealing.Result.Opened, result, "the previous key, for 2 s");
+      Check.Equal(Sealing.Result.OldKey, server.Open(602 * Time.Second, 2, late, size), "and not longer");
       for (int i = 1; i < 1 << 20; ++i) client.Seal(1, datagram, 16);
       Check.Equal((byte)2, client.SendEpoch(600 * Time.Second), "after 2^20 datagrams");
+    }
+
+    private static int SealedAt(Sealing keys, long now, ulong number, byte[] datagram) {
+      Header.Write(datagram, DatagramType.Data, keys.SendEpoch(now), 1, FakeServer.Connection, number);
+      return keys.Seal(number, datagram, 40);
     }
 
     public static void BadConfigsSayWhatWasExpected() {
