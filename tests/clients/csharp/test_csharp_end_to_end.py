@@ -95,17 +95,20 @@ def test_a_paused_game_fades_its_force_and_feels_again(tmp_path):
     with Server(tmp_path) as server:
         with Client(server.address, Config(role=Role.OBSERVER)) as observer:
             with hand(tmp_path, server.address, "--seconds", "9", "--pause-at", "3", "--pause", "3") as wall:
-                modes = []
+                modes, since = [], 0
                 for state in observer.states(30):
                     if not modes or modes[-1] is not state.mode:
+                        # A busy machine can also be silent for a short time, but not for two seconds.
+                        if modes and modes[-1] is Mode.SAFE_STOP and state.tick - since > 2000:
+                            break
                         modes.append(state.mode)
+                        since = state.tick
                     if state.mode is Mode.SAFE_STOP:
                         assert abs(state.force_applied[0]) < 1e-6
-                    if Mode.SAFE_STOP in modes and modes[-1] is Mode.ACTIVE:
-                        break
                 assert summary(wall)["touches"] > 0
-        ladder = modes[: modes.index(Mode.SAFE_STOP) + 1][-4:]
-        assert ladder == [Mode.ACTIVE, Mode.HOLDING, Mode.DECAYING, Mode.SAFE_STOP]
+        assert state.mode is Mode.ACTIVE, modes
+        assert modes[-2:] == [Mode.DECAYING, Mode.SAFE_STOP], modes
+        assert Mode.ACTIVE in modes
         assert server.end()["welcomed"] == 2, "the session lives during the pause"
 
 
