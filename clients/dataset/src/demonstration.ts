@@ -2,7 +2,8 @@
 // Reads the JSON lines written by tendon.demonstration of clients/python.
 import { createReadStream } from "node:fs";
 import { createInterface } from "node:readline";
-import type { Vec3 } from "./recording.js";
+import type { Pose, Wrench } from "./episodes.js";
+import type { Quat, Vec3 } from "./geometry.js";
 
 /** The state of the robot when a state of the hand has arrived. */
 export interface Moment {
@@ -10,32 +11,53 @@ export interface Moment {
   readonly t: number;
   /** "engaged", "clutched" … */
   readonly phase: string;
-  /** The position of the tool in the frame of the robot, m. */
-  readonly position: Vec3;
-  /** m, of the tool. Undefined if the pose is held. */
-  readonly target?: Vec3 | undefined;
-  /** N, on the tool. Undefined if it was not measured. */
-  readonly contact?: Vec3 | undefined;
+  /** Of the tool, in the frame of the robot. */
+  readonly pose: Pose;
+  /** Of the tool. Undefined if the pose is held. */
+  readonly target?: Pose | undefined;
+  /** Who requested the target. */
+  readonly sender: string;
+  /** On the tool. Undefined if it was not measured. */
+  readonly contact?: Wrench | undefined;
 }
 
 const kKind = "tendon demonstration";
 const kVersion = 1;
 
-function vec3(name: string, value: unknown): Vec3 {
-  if (Array.isArray(value) && value.length === 3 && value.every(Number.isFinite)) return value as unknown as Vec3;
-  throw new Error(`${name}: expected three numbers`);
+type Line = Record<string, unknown>;
+
+function numbers<T>(line: Line, name: string, count: number): T {
+  const value = line[name];
+  if (Array.isArray(value) && value.length === count && value.every(Number.isFinite)) return value as unknown as T;
+  throw new Error(`${name}: expected ${["", "one number", "", "three numbers", "four numbers"][count]}`);
 }
 
-function momentOf(line: Record<string, unknown>): Moment {
-  const { sampled_ns: sampled, phase, position_m: position, target_m: target, contact_n: contact } = line;
+const has = (line: Line, name: string): boolean => line[name] !== undefined && line[name] !== null;
+
+function poseOf(line: Line, prefix: "" | "target_"): Pose {
+  const grip = line[`${prefix}grip`];
+  if (grip !== undefined && !Number.isFinite(grip)) throw new Error(`${prefix}grip: expected a number`);
+  return {
+    position: numbers<Vec3>(line, prefix === "" ? "position_m" : "target_m", 3),
+    orientation: has(line, `${prefix}orientation`) ? numbers<Quat>(line, `${prefix}orientation`, 4) : undefined,
+    grip: grip as number | undefined,
+  };
+}
+
+function momentOf(line: Line): Moment {
+  const { sampled_ns: sampled, phase, sender = "operator" } = line;
   if (typeof sampled !== "number") throw new Error("sampled_ns: expected a number");
   if (typeof phase !== "string") throw new Error("phase: expected a text");
+  if (typeof sender !== "string" || sender === "") throw new Error("sender: expected a text");
   return {
     t: sampled * 1e-9,
     phase,
-    position: vec3("position_m", position),
-    target: target == null ? undefined : vec3("target_m", target),
-    contact: contact == null ? undefined : vec3("contact_n", contact),
+    pose: poseOf(line, ""),
+    target: has(line, "target_m") ? poseOf(line, "target_") : undefined,
+    sender,
+    contact: has(line, "contact_n")
+      ? { force: numbers<Vec3>(line, "contact_n", 3), torque: has(line, "contact_nm") ? numbers<Vec3>(line, "contact_nm", 3) : undefined }
+      : undefined,
   };
 }
 

@@ -1,85 +1,189 @@
 // SPDX-License-Identifier: Apache-2.0
 // Extracts episodes from a coupling, one for each time that the operator engaged.
 import type { Moment } from "./demonstration.js";
-import type { Coupling, PoseMap, Port, Step, Vec3 } from "./recording.js";
+import { add, closer, inverse, less, product, times, type Quat, type Vec3 } from "./geometry.js";
+import type { Act, CouplingSink, End, Port, PoseMap, Step } from "./recording.js";
+
+/** A pose of the follower's tool in its base frame, m. Orientation and grip are undefined if they are not coupled. */
+export interface Pose {
+  readonly position: Vec3;
+  readonly orientation?: Quat | undefined;
+  /** The opening of the gripper: m at the fingers, or as the robot's program defines it. */
+  readonly grip?: number | undefined;
+}
+
+/** N and N·m, about the position of the tool or handle. */
+export interface Wrench {
+  readonly force: Vec3;
+  readonly torque?: Vec3 | undefined;
+}
 
 export interface Frame {
-  /** The position and velocity of the follower's tool in its base frame, m and m/s. */
-  readonly state: readonly number[];
-  /** The contact force on the tool, N. It is undefined if it was not measured. */
-  readonly contact?: Vec3 | undefined;
-  /** The position that was requested by the operator, in the base frame of the follower, m. */
-  readonly action: Vec3;
+  readonly pose: Pose;
+  /** m/s */
+  readonly velocity: Vec3;
+  /** On the tool. It is undefined if it was not measured. */
+  readonly contact?: Wrench | undefined;
+  /** Exerted by the leader's device on the hand. It is undefined if it is not known. */
+  readonly hand?: Wrench | undefined;
+  /** The requested pose. */
+  readonly action: Pose;
+  /** Who requested it, for example "operator". Undefined if the last request is held. */
+  readonly sender?: string | undefined;
 }
 
 export interface Episode {
   readonly frames: readonly Frame[];
+  /** s: the times of hand and tool agree within ± this value. Undefined if it is not known. */
+  readonly clockError?: number | undefined;
 }
 
-const add = (a: Vec3, b: Vec3): Vec3 => [a[0] + b[0], a[1] + b[1], a[2] + b[2]];
-const less = (a: Vec3, b: Vec3): Vec3 => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
+/** Finds the newest row that is not later than t. The t of calls must increase, since older rows are forgotten. */
+class Latest<T> {
+  #rows: { readonly t: number; readonly value: T }[] = [];
+  #first = 0;
 
-function mapped({ scale, rotation }: PoseMap, u: Vec3): Vec3 {
-  const row = (r: Vec3): number => scale * (r[0] * u[0] + r[1] * u[1] + r[2] * u[2]);
-  return [row(rotation[0]), row(rotation[1]), row(rotation[2])];
-}
+  push(t: number, value: T): void {
+    this.#rows.push({ t, value });
+  }
 
-/** Finds the last row in the sorted `rows` that is not later than t. The search starts at the previous result. */
-class Latest<T extends { readonly t: number }> {
-  readonly #rows: readonly T[];
-  #next = 0;
-
-  constructor(rows: readonly T[]) {
-    this.#rows = rows;
+  /** The time of the newest row, or −∞. */
+  get end(): number {
+    return this.#rows.at(-1)?.t ?? -Infinity;
   }
 
   at(t: number): T | undefined {
-    while (this.#next < this.#rows.length && this.#rows[this.#next]!.t <= t) ++this.#next;
-    return this.#rows[this.#next - 1];
+    while (this.#first + 1 < this.#rows.length && this.#rows[this.#first + 1]!.t <= t) ++this.#first;
+    if (2 * this.#first > this.#rows.length) {
+      this.#rows = this.#rows.slice(this.#first);
+      this.#first = 0;
+    }
+    const row = this.#rows[this.#first];
+    return row && row.t <= t ? row.value : undefined;
   }
 }
 
 const kEngaged = 4;
-
-/** Returns the time intervals in which the follower was engaged. */
-function acts(ports: readonly Port[]): { readonly from: number; readonly to: number }[] {
-  const found: { from: number; to: number }[] = [];
-  let before: Port | undefined;
-  for (const port of ports) {
-    if (port.phase === kEngaged) {
-      const same = before?.phase === kEngaged && before.engagement === port.engagement;
-      if (same) found.at(-1)!.to = port.t;
-      else found.push({ from: port.t, to: port.t });
-    }
-    before = port;
-  }
-  return found;
-}
-
-/** Returns frames at `fps` from the beginning of each engagement. Episodes with fewer than two frames are omitted. */
-export function episodesOf({ leader, follower, map }: Coupling, fps: number): Episode[] {
-  const tool = new Latest<Step>(follower.steps);
-  const told = new Latest<Port>(follower.ports);
-  const hand = new Latest<Port>(leader.ports);
-  const episodes: Episode[] = [];
-  for (const { from, to } of acts(follower.ports)) {
-    const frames: Frame[] = [];
-    for (let k = 0; from + k / fps <= to; ++k) {
-      const t = from + k / fps;
-      const [step, port, wish] = [tool.at(t), told.at(t), hand.at(t)];
-      if (!step || !port || !wish) continue;
-      const offset = less(step.position, port.displacement);
-      frames.push({
-        state: [...step.position, ...step.velocity], contact: step.contact, action: add(offset, mapped(map, wish.displacement)),
-      });
-    }
-    if (frames.length > 1) episodes.push({ frames });
-  }
-  return episodes;
-}
-
-/** If there is no state for this time (s), the robot has lost the hand. */
+/** A gap of this time (s) between two states ends an episode. */
 const kSilence = 0.5;
+/** s: messages of different ends and kinds may be out of order by this time. More does not wait for a stopped end. */
+const kDisorder = 1;
+
+/** A time interval in which the follower was engaged. */
+interface Interval {
+  readonly act: Act;
+  readonly from: number;
+  to: number;
+  over: boolean;
+  readonly frames: Frame[];
+  /** Number of the next frame. */
+  next: number;
+}
+
+/**
+ * Makes frames at `fps` from the beginning of each engagement. Episodes with fewer than two frames are omitted. Each
+ * frame uses the newest records that are not later. The memory does not depend on the length of the recording, except
+ * for the frames.
+ */
+export class CouplingEpisodes implements CouplingSink {
+  readonly #fps: number;
+  readonly #steps = { leader: new Latest<() => Step>(), follower: new Latest<() => Step>() };
+  readonly #ports = { leader: new Latest<() => Port>(), follower: new Latest<() => Port>() };
+  readonly #intervals: Interval[] = [];
+  readonly #episodes: Episode[] = [];
+  #map: PoseMap | undefined;
+  #clockError: number | undefined;
+
+  constructor(fps: number) {
+    this.#fps = fps;
+  }
+
+  map(map: PoseMap): void {
+    this.#map ??= map;
+  }
+
+  clockError(bound: number): void {
+    this.#clockError = Math.max(bound, this.#clockError ?? 0);
+  }
+
+  step(end: End, t: number, read: () => Step): void {
+    this.#steps[end].push(t, read);
+  }
+
+  port(end: End, t: number, act: Act, read: () => Port): void {
+    this.#ports[end].push(t, read);
+    if (end === "follower") {
+      const current = this.#intervals.at(-1);
+      const engaged = act.phase === kEngaged;
+      const same = engaged && current?.over === false && current.act.engagement === act.engagement && t - current.to < kSilence;
+      if (same) current.to = t;
+      else if (current) current.over = true;
+      if (engaged && !same) this.#intervals.push({ act, from: t, to: t, over: false, frames: [], next: 0 });
+    }
+    const ends = [this.#steps.leader, this.#steps.follower, this.#ports.leader, this.#ports.follower].map((rows) => rows.end);
+    this.#advance(Math.max(Math.min(...ends), Math.max(...ends) - kDisorder));
+  }
+
+  /** Must be called once, after all records. */
+  finish(): Episode[] {
+    for (const interval of this.#intervals) interval.over = true;
+    this.#advance(Infinity);
+    return this.#episodes.map((episode) => ({ ...episode, clockError: this.#clockError }));
+  }
+
+  /** Takes all frames before `settled`; no record before this time is expected any more. */
+  #advance(settled: number): void {
+    for (let interval = this.#intervals[0]; interval; interval = this.#intervals[0]) {
+      const timeOf = (frame: number): number => interval!.from + frame / this.#fps;
+      for (; timeOf(interval.next) <= interval.to && timeOf(interval.next) < settled; ++interval.next) {
+        const frame = this.#frame(timeOf(interval.next));
+        if (frame) interval.frames.push(frame);
+      }
+      if (settled - interval.to >= kSilence) interval.over = true;
+      if (!interval.over || timeOf(interval.next) <= interval.to) return;
+      if (interval.frames.length > 1) this.#episodes.push({ frames: interval.frames });
+      this.#intervals.shift();
+    }
+    for (const rows of [this.#steps, this.#ports]) {
+      rows.leader.at(settled);
+      rows.follower.at(settled);
+    }
+  }
+
+  #frame(t: number): Frame | undefined {
+    const step = this.#steps.follower.at(t)?.();
+    const port = this.#ports.follower.at(t)?.();
+    const wish = this.#ports.leader.at(t)?.();
+    const hand = this.#steps.leader.at(t)?.();
+    if (!step || !port || !wish || !this.#map) return undefined;
+    const coupled = port.turn && wish.turn && step.orientation;
+    return {
+      pose: { position: step.position, orientation: coupled && step.orientation, grip: wish.opening === undefined ? undefined : port.opening },
+      velocity: step.velocity,
+      contact: step.contact && { force: step.contact },
+      hand: hand && { force: hand.force, torque: hand.torque },
+      action: requested(this.#map, step, port, wish),
+      sender: wish.phase === kEngaged ? "operator" : undefined,
+    };
+  }
+}
+
+/** The pose that the leader requests: x_f − u_f + s R u_l and R r_l R⁻¹ r_f⁻¹ q_f (core/teleoperation/handle/turn_coupling.h). */
+function requested({ scale, rotation }: PoseMap, step: Step, port: Port, wish: Port): Pose {
+  const s = wish.positionScale || scale;
+  const [x, y, z] = times(rotation, wish.displacement);
+  let orientation: Quat | undefined;
+  if (wish.turn && port.turn && step.orientation) {
+    const [w, i, j, k] = wish.turn;
+    const mapped: Quat = [w, ...times(rotation, [i, j, k])];
+    orientation = closer(product(product(mapped, inverse(port.turn)), step.orientation), step.orientation);
+  }
+  return {
+    position: add(less(step.position, port.displacement), [s * x, s * y, s * z]), orientation,
+    grip: port.opening === undefined ? undefined : wish.opening,
+  };
+}
+
 /** s, because times are in ns and sums of floating-point numbers are not exact. */
 const kRounding = 1e-7;
 
@@ -100,27 +204,29 @@ function followed(moments: readonly Moment[]): Moment[][] {
 }
 
 /**
- * Like episodesOf, for a robot that is a client. The velocity is the finite difference between two samples. It is
+ * Like CouplingEpisodes, for a robot that is a client. The velocity is the finite difference between two samples. It is
  * zero in the first frame and unchanged in frames without a new sample. The action does not change while the robot is
  * not following.
  */
 export function episodesOfRobot(moments: readonly Moment[], fps: number): Episode[] {
   const episodes: Episode[] = [];
   for (const act of followed(moments)) {
-    const robot = new Latest<Moment>(act);
+    const robot = new Latest<Moment>();
+    for (const moment of act) robot.push(moment.t, moment);
     const [from, to] = [act[0]!.t + kRounding, act.at(-1)!.t + kRounding];
     const frames: Frame[] = [];
     let last = act[0]!;
-    let velocity = [0, 0, 0];
-    let wish = last.target ?? last.position;
+    let velocity: Vec3 = [0, 0, 0];
+    let action = last.target ?? last.pose;
     let at = 0;
     for (let k = 0; from + k / fps <= to; ++k) {
       const moment = robot.at(from + k / fps)!;
-      for (; act[at] !== moment; ++at) wish = act[at]!.target ?? wish;
-      wish = moment.target ?? wish;
+      for (; act[at] !== moment; ++at) action = act[at]!.target ?? action;
+      action = moment.target ?? action;
       const elapsed = moment.t - last.t;
-      if (elapsed > 0) velocity = less(moment.position, last.position).map((d) => d / elapsed);
-      frames.push({ state: [...moment.position, ...velocity], contact: moment.contact, action: wish });
+      const [x, y, z] = less(moment.pose.position, last.pose.position);
+      if (elapsed > 0) velocity = [x / elapsed, y / elapsed, z / elapsed];
+      frames.push({ pose: moment.pose, velocity, contact: moment.contact, action, sender: moment.target && moment.sender });
       last = moment;
     }
     if (frames.length > 1) episodes.push({ frames });

@@ -1,38 +1,44 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reads the output of `tendon-replay --merge`: both ends of a coupling, with times on the clock of the leader.
+// Reads the output of `tendon-replay --merge`: both ends of a coupling, with times on the clock of the leader. One hour
+// has about 15 million messages, so messages are passed on one at a time and decoded only if they are needed.
 import { createFileRegistry, fromBinary, type DescMessage, type FileRegistry } from "@bufbuild/protobuf";
 import { FileDescriptorSetSchema } from "@bufbuild/protobuf/wkt";
+import { BinaryReader } from "@bufbuild/protobuf/wire";
 import { McapStreamReader } from "@mcap/core";
 import { parse as parseToml } from "smol-toml";
 import { createReadStream } from "node:fs";
-
-export type Vec3 = readonly [number, number, number];
+import type { Quat, Vec3 } from "./geometry.js";
 
 /** A haptic step at one end of the coupling. */
 export interface Step {
-  /** The time on the clock of the leader, s. */
-  readonly t: number;
-  readonly tick: bigint;
   readonly position: Vec3;
   readonly velocity: Vec3;
+  /** It is undefined if the device does not measure it. */
+  readonly orientation?: Quat | undefined;
   /** The contact force, N. It is undefined if it was not measured. */
   readonly contact?: Vec3 | undefined;
+  /** N and N·m, exerted by the device on the hand. */
+  readonly force: Vec3;
+  readonly torque: Vec3;
 }
 
-/** The state that was sent from one end to the other in a step. */
-export interface Port {
-  readonly t: number;
-  readonly tick: bigint;
+/** The phase of a coupling, and the number of the act that it belongs to. */
+export interface Act {
   /** 4: engaged, 5: clutched. */
   readonly phase: number;
   readonly engagement: bigint;
-  /** The position relative to the offset, in its own frame and scale, m. */
-  readonly displacement: Vec3;
 }
 
-export interface End {
-  readonly steps: Step[];
-  readonly ports: Port[];
+/** The state that was sent from one end to the other in a step. */
+export interface Port extends Act {
+  /** The position relative to the offset, in its own frame and scale, m. */
+  readonly displacement: Vec3;
+  /** The rotation since the offset was set, in its base axes. It is undefined if orientations are not coupled. */
+  readonly turn?: Quat | undefined;
+  /** The opening of the gripper, m; for a leader, the requested one. It is undefined if grippers are not coupled. */
+  readonly opening?: number | undefined;
+  /** The scale of the leader since this state. It is 0 if it is that of the scene. */
+  readonly positionScale: number;
 }
 
 /** Mapping of displacements from leader to follower: u_f = scale · R · u_l. */
@@ -42,25 +48,66 @@ export interface PoseMap {
   readonly rotation: readonly [Vec3, Vec3, Vec3];
 }
 
-export interface Coupling {
-  readonly leader: End;
-  readonly follower: End;
-  readonly map: PoseMap;
+export type End = "leader" | "follower";
+
+/** Receives a coupling. The messages of each end and kind arrive sorted by `t` (s, clock of the leader). */
+export interface CouplingSink {
+  map(map: PoseMap): void;
+  /** s: the times of the follower are true within ± this value. */
+  clockError(bound: number): void;
+  step(end: End, t: number, read: () => Step): void;
+  port(end: End, t: number, act: Act, read: () => Port): void;
 }
 
-interface Vec3Message { readonly x: number; readonly y: number; readonly z: number }
-interface StepMessage {
-  readonly tick: bigint;
-  readonly positionM?: Vec3Message;
-  readonly velocityMps?: Vec3Message;
-  readonly handForceN?: Vec3Message;
-}
-interface PortMessage {
-  readonly tick: bigint;
-  readonly sent?: { readonly phase: number; readonly engagement: bigint; readonly displacementM?: Vec3Message };
-}
+type Message<Names extends string, T> = { readonly [name in Names]?: T };
+type Vec3Message = { readonly x: number; readonly y: number; readonly z: number };
+type QuatMessage = Vec3Message & { readonly w: number };
+type StepMessage = Message<"positionM" | "velocityMps" | "handForceN" | "forceAppliedN", Vec3Message> & {
+  readonly turn?: { readonly orientation?: QuatMessage; readonly torqueAppliedNm?: Vec3Message };
+};
+type PortStateMessage = Act & Message<"displacementM", Vec3Message> & {
+  readonly turn?: { readonly turn?: QuatMessage };
+  readonly grip?: { readonly openingM: number };
+  readonly positionScale: number;
+};
 
 const vec3 = (from: Vec3Message | undefined): Vec3 => (from ? [from.x, from.y, from.z] : [0, 0, 0]);
+const quat = (from: QuatMessage | undefined): Quat | undefined => from && [from.w, from.x, from.y, from.z];
+
+function stepOf(from: StepMessage): Step {
+  return {
+    position: vec3(from.positionM), velocity: vec3(from.velocityMps), orientation: quat(from.turn?.orientation),
+    contact: from.handForceN && vec3(from.handForceN),
+    force: vec3(from.forceAppliedN), torque: vec3(from.turn?.torqueAppliedNm),
+  };
+}
+
+function portOf({ sent }: { readonly sent?: PortStateMessage }): Port {
+  const { phase, engagement, displacementM, turn, grip, positionScale } = sent!;
+  return { phase, engagement, displacement: vec3(displacementM), turn: quat(turn?.turn), opening: grip?.openingM, positionScale };
+}
+
+/** Field numbers of server/recording/recording.proto. */
+const kSent = 6;
+const kPhase = 7;
+const kEngagement = 8;
+
+/** Reads only the act of a Port, which is needed in each step. It is undefined if no state was sent. */
+function actOf(bytes: Uint8Array): Act | undefined {
+  const reader = new BinaryReader(bytes);
+  let sent = false;
+  let [phase, engagement] = [0, 0n];
+  for (let end = reader.len; reader.pos < end;) {
+    const [field, type] = reader.tag();
+    if (!sent && field === kSent) {
+      sent = true;
+      end = reader.uint32() + reader.pos;
+    } else if (sent && field === kPhase) phase = reader.uint32();
+    else if (sent && field === kEngagement) engagement = BigInt(reader.uint64());
+    else reader.skip(type, field);
+  }
+  return sent ? { phase, engagement } : undefined;
+}
 
 const kIdentity: PoseMap = { scale: 1, rotation: [[1, 0, 0], [0, 1, 0], [0, 0, 1]] };
 
@@ -88,37 +135,38 @@ export function mapOf(scene: string): PoseMap {
   return { scale: map?.position_scale ?? 1, rotation: rotationOf(map?.rotation_deg ?? []) };
 }
 
-/** Throws an Error with the file name if it is not a merged recording. */
-export async function readCoupling(file: string): Promise<Coupling> {
-  const ends: Record<string, End> = { leader: { steps: [], ports: [] }, follower: { steps: [], ports: [] } };
+const kNeeded = ["/leader/scene", "/leader/haptic/port", "/follower/haptic/port"];
+const kTopics = new Set([...kNeeded, "/leader/haptic/step", "/follower/haptic/step", "/merge/clock"]);
+
+/** Passes a merged recording to `sink`. Throws an Error with the file name if it is not one. */
+export async function readCoupling(file: string, sink: CouplingSink): Promise<void> {
   const types = new Map<number, { readonly topic: string; readonly message: DescMessage }>();
   const registries = new Map<number, { readonly registry: FileRegistry; readonly name: string }>();
-  let scene: string | undefined;
+  const found = new Set<string>();
   let began: bigint | undefined;
-  const reader = new McapStreamReader();
   let ended = false;
   const take = (topic: string, message: DescMessage, logTime: bigint, data: Uint8Array): void => {
-    const [, end = "", kind = ""] = /^\/(leader|follower)(\/.*)$/.exec(topic) ?? [];
-    const place = ends[end];
-    if (!place) return;
+    const decode = <T>(bytes: Uint8Array): T => fromBinary(message, bytes) as unknown as T;
     began ??= logTime;
     const t = Number(logTime - began) * 1e-9;
-    if (kind === "/haptic/step") {
-      const step = fromBinary(message, data) as unknown as StepMessage;
-      place.steps.push({
-        t, tick: step.tick, position: vec3(step.positionM), velocity: vec3(step.velocityMps),
-        contact: step.handForceN && vec3(step.handForceN),
-      });
-    } else if (kind === "/haptic/port") {
-      const { tick, sent } = fromBinary(message, data) as unknown as PortMessage;
-      if (!sent) return;
-      place.ports.push({ t, tick, phase: sent.phase, engagement: sent.engagement, displacement: vec3(sent.displacementM) });
-    } else if (kind === "/scene" && end === "leader") {
-      scene = (fromBinary(message, data) as unknown as { readonly text: string }).text;
+    const [, end, kind] = topic.split("/", 3) as [string, End, string];
+    if (topic === "/merge/clock") {
+      const { errorNs } = decode<{ readonly errorNs: bigint }>(data);
+      sink.clockError(Number(errorNs) * 1e-9);
+    } else if (topic === "/leader/scene") {
+      sink.map(mapOf(decode<{ readonly text: string }>(data).text));
+    } else if (kind === "haptic") {
+      const bytes = data.slice();  // the reader uses its buffer again
+      if (topic.endsWith("/step")) return sink.step(end, t, () => stepOf(decode(bytes)));
+      const act = actOf(bytes);
+      if (!act) return;
+      sink.port(end, t, act, () => portOf(decode(bytes)));
     }
+    found.add(topic);
   };
+  const reader = new McapStreamReader();
   try {
-    for await (const piece of createReadStream(file)) {
+    for await (const piece of createReadStream(file, { highWaterMark: 1 << 20 })) {
       reader.append(piece as Uint8Array);
       for (let record = reader.nextRecord(); record; record = reader.nextRecord()) {
         if (record.type === "Schema") {
@@ -127,7 +175,7 @@ export async function readCoupling(file: string): Promise<Coupling> {
         } else if (record.type === "Channel") {
           const { registry, name } = registries.get(record.schemaId) ?? {};
           const message = name === undefined ? undefined : registry?.getMessage(name);
-          if (message) types.set(record.id, { topic: record.topic, message });
+          if (message && kTopics.has(record.topic)) types.set(record.id, { topic: record.topic, message });
         } else if (record.type === "DataEnd") {
           ended = true;
         } else if (record.type === "Message") {
@@ -142,10 +190,8 @@ export async function readCoupling(file: string): Promise<Coupling> {
     if (code !== undefined) throw new Error(`cannot read ${file}: ${message}`);
     throw new Error(`${file}: ${message}; tendon-replay ${file} --repair whole.mcap recovers the readable part`);
   }
-  const { leader, follower } = ends as { leader: End; follower: End };
-  if (scene === undefined || leader.ports.length === 0 || follower.ports.length === 0) {
+  if (kNeeded.some((topic) => !found.has(topic))) {
     if (!ended) throw new Error(`${file}: truncated before the data of both ends of a coupling`);
     throw new Error(`${file}: expected both ends of a coupling: tendon-replay LEADER.mcap --merge FOLLOWER.mcap --into pair.mcap`);
   }
-  return { leader, follower, map: mapOf(scene) };
 }

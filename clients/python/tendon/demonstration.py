@@ -38,6 +38,9 @@ class Demonstration:
         position_m    of the tool, robot frame
         target_m      of the tool; null: the robot holds its pose
         contact_n     force on the tool; absent: not measured
+        contact_nm    torque on the tool; absent: not measured
+        orientation, target_orientation, grip, target_grip    as in Pose; absent: None
+        sender        who requested the target; absent: the operator
 
     A state is omitted if its pose, target or contact is not finite. Existing files are not overwritten
     (FileExistsError). Lines are buffered, so that `add` rarely waits for the disk.
@@ -56,16 +59,34 @@ class Demonstration:
         self.close()
 
     def add(
-        self, hand: DeviceState, pose: Pose, target: Pose | None, phase: Following, contact: ToolContact | None = None
+        self,
+        hand: DeviceState,
+        pose: Pose,
+        target: Pose | None,
+        phase: Following,
+        contact: ToolContact | None = None,
+        sender: str | None = None,
     ) -> None:
-        """`pose` is the argument of Follower.target for `hand`, and `target` its result."""
+        """`pose` is the argument of Follower.target for `hand`, and `target` its result. If a program has chosen the
+        target instead of the operator, `sender` is its name, for example "policy".
+        """
         line: dict[str, object] = {"tick": hand.tick, "sampled_ns": hand.sampled_ns, "phase": phase.name.lower()}
         line["position_m"] = _three(pose.position)
         line["target_m"] = None if target is None else _three(target.position)
         if contact is not None:
             line["contact_n"] = _three(contact.force)
-        numbers = [x for value in line.values() if isinstance(value, list) for x in value]
-        if all(map(math.isfinite, numbers)):
+            if contact.torque is not None:
+                line["contact_nm"] = _three(contact.torque)
+        for prefix, of in (("", pose), ("target_", target)):
+            if of is not None and of.orientation is not None:
+                w, x, y, z = of.orientation
+                line[f"{prefix}orientation"] = [float(w), float(x), float(y), float(z)]
+            if of is not None and of.grip is not None:
+                line[f"{prefix}grip"] = float(of.grip)
+        if sender is not None:
+            line["sender"] = sender
+        values = [x for value in line.values() for x in (value if isinstance(value, list) else [value])]
+        if all(math.isfinite(x) for x in values if isinstance(x, float)):
             self._write(line)
 
     def close(self) -> None:

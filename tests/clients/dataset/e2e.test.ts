@@ -37,14 +37,19 @@ it("what an operator did becomes a dataset", async (test) => {
   const { episodes, frames } = JSON.parse(said) as { episodes: number; frames: number };
   assert.equal(episodes, 1);
   assert.ok(frames > 100, said);
-  const columns = readParquetFile(join(out, "data/chunk-000/episode_000000.parquet"));
+  assert.equal(execFileSync("node", [tool, "--check", out], { encoding: "utf8" }), `${out}: nothing found\n`);
+  const columns = readParquetFile(join(out, "data/chunk-000/file-000.parquet"));
   assert.equal(columns.get("frame_index")!.values.length, frames);
-  assert.equal(readJson(join(out, "meta/info.json")).total_frames, frames);
+  const info = readJson(join(out, "meta/info.json"));
+  assert.equal(info.total_frames, frames);
+  assert.ok(info.features.action.info.clock_error_s < 0.01, "both servers are on one machine");
   const x = (name: string): number[] => columns.get(name)!.values.map((row) => (row as number[])[0]!);
   const spread = (values: number[]): number => Math.max(...values) - Math.min(...values);
   assert.ok(spread(x("action")) > 0.02, "the hand moved");
   assert.ok(spread(x("observation.state")) > 0.01, "the tool followed");
-  assert.ok(Math.min(...x("observation.contact_force")) < -0.3, "it touched the wall");
+  assert.ok(Math.min(...x("observation.wrench")) < -0.3, "it touched the wall");
+  assert.ok(Math.max(...x("tendon.hand_wrench").map(Math.abs)) > 0.1, "the hand felt it");
+  assert.ok(columns.get("tendon.sender")!.values.every((sender) => sender === 1));
   assert.throws(() => execFileSync("node", [tool, file("leader"), "--out", join(folder, "no")], { stdio: "pipe" }), /both ends of a coupling/);
 });
 
@@ -67,12 +72,12 @@ it("what a robot that is a guest did becomes a dataset", async (test) => {
   const { episodes, frames } = JSON.parse(said) as { episodes: number; frames: number };
   assert.equal(episodes, 1);
   assert.ok(frames > 80, said);
-  const columns = readParquetFile(join(out, "data/chunk-000/episode_000000.parquet"));
+  const columns = readParquetFile(join(out, "data/chunk-000/file-000.parquet"));
   const rows = (name: string, i: number): number[] => columns.get(name)!.values.map((row) => (row as number[])[i]!);
   assert.equal(rows("action", 0).length, frames);
   const [wish, place] = [rows("action", 2), rows("observation.state", 2)];
   assert.ok(Math.max(...wish) - Math.min(...wish) > 0.01, "the hand moved");
   wish.forEach((z, k) => assert.ok(Math.abs(z - place[k]!) < 0.01, "the tool follows its wish"));
-  const force = rows("observation.contact_force", 2);
+  const force = rows("observation.wrench", 2);
   place.forEach((z, k) => assert.ok(Math.abs(force[k]! - Math.max(0, -300 * z)) < 1e-3, "they are of one moment"));
 });

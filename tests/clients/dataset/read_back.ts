@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reads a dataset with parquet-wasm (Apache Arrow's Rust implementation), which shares no code with the writer.
+// Two readers of Parquet that share no code with the writer, or with each other: parquet-wasm (Apache Arrow, in Rust)
+// and DuckDB (C++).
 import { readFileSync } from "node:fs";
 import { createRequire } from "node:module";
 
@@ -12,23 +13,46 @@ const parquet = (await import(kReader)) as {
 };
 parquet.initSync({ module: readFileSync(load.resolve("parquet-wasm/esm/parquet_wasm_bg.wasm")) });
 
+export type Cell = number | string | readonly (number | string)[];
+
 export interface Column {
   readonly type: string;
-  readonly values: readonly (number | readonly number[])[];
+  readonly values: readonly Cell[];
 }
+
+type Raw = bigint | number | string | Iterable<Raw>;
+const plain = (value: Raw): Cell => (typeof value === "object" ? [...value].map((one) => plain(one) as number | string) : typeof value === "bigint" ? Number(value) : value);
 
 export function readParquetFile(path: string): Map<string, Column> {
   const { tableFromIPC } = load("apache-arrow") as {
     tableFromIPC: (bytes: Uint8Array) => {
       readonly schema: { readonly fields: readonly { readonly name: string; readonly type: unknown }[] };
-      getChild(name: string): Iterable<bigint | number | Iterable<number>>;
+      getChild(name: string): Iterable<Raw>;
     };
   };
   const table = tableFromIPC(parquet.readParquet(new Uint8Array(readFileSync(path))).intoIPCStream());
-  const plain = (value: bigint | number | Iterable<number>) =>
-    typeof value === "object" ? [...value] : Number(value);
   return new Map(table.schema.fields.map(({ name, type }) => [name, { type: String(type), values: [...table.getChild(name)].map(plain) }]));
 }
 
 export const readJson = (path: string): any => JSON.parse(readFileSync(path, "utf8"));
 export const readLines = (path: string): any[] => readFileSync(path, "utf8").trimEnd().split("\n").map((line) => JSON.parse(line));
+
+export type Query = (sql: string) => Promise<Map<string, Cell>[]>;
+
+/** Undefined if DuckDB has no library for this machine. */
+export async function duckdb(): Promise<Query | undefined> {
+  interface Result { columnNames(): string[]; getRows(): unknown[][] }
+  let module: { DuckDBInstance: { create(): Promise<{ connect(): Promise<{ runAndReadAll(sql: string): Promise<Result> }> }> } };
+  try {
+    module = load("@duckdb/node-api");
+  } catch (error) {
+    if (!String(error).includes("node-bindings")) throw error;
+    return undefined;
+  }
+  const connection = await (await module.DuckDBInstance.create()).connect();
+  const value = (from: any): Cell => plain(from?.items ?? from);
+  return async (sql) => {
+    const result = await connection.runAndReadAll(sql);
+    return result.getRows().map((row) => new Map(result.columnNames().map((name, i) => [name, value(row[i])])));
+  };
+}

@@ -59,3 +59,18 @@ def test_what_is_not_finite_or_not_measured_is_left_out(tmp_path: Path) -> None:
         demonstration.add(hand(2, 0.0, 0), Pose((1.0, 0.0, 0.0)), None, follow.phase)
     _, line = path.read_text().splitlines()
     assert line == '{"tick":2,"sampled_ns":20000000,"phase":"alone","position_m":[1.0,0.0,0.0],"target_m":null}'
+
+
+def test_what_a_robot_with_six_axes_and_a_gripper_adds(tmp_path: Path) -> None:
+    path = tmp_path / "press.jsonl"
+    follow = Follower(FollowerConfig(engage_by="call"))
+    pose, target = Pose((1, 0, 0), (1, 0, 0, 0), 0.5), Pose((2, 0, 0), (0, 1, 0, 0), 0.25)
+    with Demonstration(path) as demonstration:
+        demonstration.add(hand(1, 0.0, 0), pose._replace(grip=math.nan), target, follow.phase)
+        demonstration.add(hand(2, 0.0, 0), pose, target, follow.phase, ToolContact((0, 0, 1), (0, 1, 0)), "policy")
+    _, line = path.read_text().splitlines()
+    assert line == (
+        '{"tick":2,"sampled_ns":20000000,"phase":"alone","position_m":[1.0,0.0,0.0],"target_m":[2.0,0.0,0.0],'
+        '"contact_n":[0.0,0.0,1.0],"contact_nm":[0.0,1.0,0.0],"orientation":[1.0,0.0,0.0,0.0],"grip":0.5,'
+        '"target_orientation":[0.0,1.0,0.0,0.0],"target_grip":0.25,"sender":"policy"}'
+    )
