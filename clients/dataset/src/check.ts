@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Finds what is wrong with a dataset in the layout of LeRobot v3.0 (layout_v30.ts).
+// Finds errors in a dataset with the layout of LeRobot v3.0 (layout_v30.ts).
 import { existsSync, readdirSync, readFileSync } from "node:fs";
 import { join } from "node:path";
 import { dataFile, kDataPath, kEpisodes, kTasks } from "./layout_v30.js";
@@ -25,7 +25,7 @@ interface Info {
 
 const kInfo = "meta/info.json";
 const kStats = "meta/stats.json";
-/** The columns that each dataset has. */
+/** These columns are required by LeRobot. */
 const kIndices: Readonly<Record<string, string>> = {
   timestamp: "float32", frame_index: "int64", episode_index: "int64", index: "int64", task_index: "int64",
 };
@@ -121,7 +121,7 @@ class Checker {
     return this.findings.length === before;
   }
 
-  /** Returns the statistics of the episodes that are where the metadata says. */
+  /** Returns the statistics of the episodes without errors. */
   async #data(info: Info, episodes: readonly Row[], tasks: number, present: readonly string[]): Promise<Map<string, Stats>[]> {
     const files = new Map<string, Row[]>();
     for (const row of episodes) {
@@ -177,7 +177,7 @@ class Checker {
     return stats;
   }
 
-  /** Quantiles must only lie between the minimum and the maximum, because LeRobot estimates them. */
+  /** Since LeRobot estimates the quantiles, this only checks that they are between the minimum and the maximum. */
   #areNear(file: string, name: string, got: (stat: string) => unknown, expected: Stats, where = ""): void {
     for (const stat of kStatNames) {
       const values = got(stat);
@@ -193,7 +193,7 @@ class Checker {
   }
 }
 
-/** Returns what is wrong with the dataset in `folder`. Later rules need what earlier rules have checked. */
+/** Returns all errors that were found in the dataset in `folder`. If the metadata is not usable, the data is not checked. */
 export async function check(folder: string): Promise<readonly Finding[]> {
   const checker = new Checker(folder);
   await checker.run();

@@ -11,13 +11,13 @@ export interface Moment {
   readonly t: number;
   /** "engaged", "clutched" … */
   readonly phase: string;
-  /** Of the tool, in the frame of the robot. */
+  /** The pose of the tool in the frame of the robot. */
   readonly pose: Pose;
-  /** Of the tool. Undefined if the pose is held. */
+  /** The requested pose. It is undefined if the pose is held. */
   readonly target?: Pose | undefined;
-  /** Who requested the target. */
+  /** The name of the sender of the target. */
   readonly sender: string;
-  /** On the tool. Undefined if it was not measured. */
+  /** The contact force on the tool. It is undefined if it was not measured. */
   readonly contact?: Wrench | undefined;
 }
 

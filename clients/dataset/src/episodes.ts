@@ -8,7 +8,7 @@ import type { Act, CouplingSink, End, Port, PoseMap, Step } from "./recording.js
 export interface Pose {
   readonly position: Vec3;
   readonly orientation?: Quat | undefined;
-  /** The opening of the gripper: m at the fingers, or as the robot's program defines it. */
+  /** The opening of the gripper at the fingers, m. A robot's program can use another unit. */
   readonly grip?: number | undefined;
 }
 
@@ -28,13 +28,13 @@ export interface Frame {
   readonly hand?: Wrench | undefined;
   /** The requested pose. */
   readonly action: Pose;
-  /** Who requested it, for example "operator". Undefined if the last request is held. */
+  /** The name of the sender of the action, for example "operator". Undefined if the action is held. */
   readonly sender?: string | undefined;
 }
 
 export interface Episode {
   readonly frames: readonly Frame[];
-  /** s: the times of hand and tool agree within ± this value. Undefined if it is not known. */
+  /** The error of the clock of the follower relative to the leader is at most this value, s. Undefined if not known. */
   readonly clockError?: number | undefined;
 }
 
@@ -66,7 +66,7 @@ class Latest<T> {
 const kEngaged = 4;
 /** A gap of this time (s) between two states ends an episode. */
 const kSilence = 0.5;
-/** s: messages of different ends and kinds may be out of order by this time. More does not wait for a stopped end. */
+/** Messages of different ends and kinds may be out of order by this time, s. */
 const kDisorder = 1;
 
 /** A time interval in which the follower was engaged. */
@@ -131,7 +131,7 @@ export class CouplingEpisodes implements CouplingSink {
     return this.#episodes.map((episode) => ({ ...episode, clockError: this.#clockError }));
   }
 
-  /** Takes all frames before `settled`; no record before this time is expected any more. */
+  /** Makes all frames before the time `settled`. No older record may arrive after this call. */
   #advance(settled: number): void {
     for (let interval = this.#intervals[0]; interval; interval = this.#intervals[0]) {
       const timeOf = (frame: number): number => interval!.from + frame / this.#fps;

@@ -1,20 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
-// The columns of a dataset. Names do not contain "/", which LeRobot does not accept.
+// Defines the columns of a dataset. Their names must not contain "/", because LeRobot does not accept it.
 import type { Episode, Frame, Pose, Wrench } from "./episodes.js";
 
 export type Layout = "v3.0" | "v2.1";
 
 export interface Feature {
   readonly dtype: "float32" | "int64";
-  /** Of the components of a list, or null for a number. */
+  /** The names of the components of a list. It is null for a single number. */
   readonly names: readonly string[] | null;
   readonly of: (frame: Frame, at: Index) => readonly number[];
-  /** What a reader must know in addition. LeRobot keeps it. */
+  /** Additional information for users of the dataset, which LeRobot ignores. */
   readonly info?: Readonly<Record<string, unknown>>;
 }
 
 export type Features = ReadonlyMap<string, Feature>;
-/** The rows of one episode by feature. The values are those of the file: float32, or integers. */
+/** Contains the rows of an episode for each feature. The values are already rounded to float32 or integers. */
 export type Rows = ReadonlyMap<string, readonly (readonly number[])[]>;
 
 /** Position of a frame in the dataset. */
@@ -34,7 +34,7 @@ function sendersOf(episodes: readonly Episode[]): string[] {
   return ["held", ...named];
 }
 
-/** Features by name. What was not measured in every frame is left out. */
+/** Returns the features by name. A feature is omitted if it was not measured in all frames. */
 export function featuresOf(episodes: readonly Episode[], layout: Layout): Features {
   const every = (has: (frame: Frame) => unknown): boolean => episodes.every(({ frames }) => frames.every((frame) => has(frame) !== undefined));
   const one = (dtype: Feature["dtype"], of: (at: Index) => number): Feature => ({ dtype, names: null, of: (_, at) => [of(at)] });
@@ -81,7 +81,7 @@ export function rowsOf(features: Features, { frames }: Episode, first: Omit<Inde
   }));
 }
 
-/** The features as meta/info.json describes them. */
+/** Returns the features in the format of meta/info.json. */
 export function described(features: Features): Record<string, object> {
   return Object.fromEntries([...features].map(([name, { dtype, names, info }]) =>
     [name, { dtype, shape: [names?.length ?? 1], names, ...(info && { info }) }]));

@@ -16,7 +16,7 @@ export function product([a, b, c, d]: Quat, [w, x, y, z]: Quat): Quat {
 
 export const inverse = ([w, x, y, z]: Quat): Quat => [w, -x, -y, -z];
 
-/** q or −q, which is the same rotation: the one that is closer to `other`. */
+/** Returns q or −q, which is the same rotation. The result is closer to `other`. */
 export function closer(q: Quat, other: Quat): Quat {
   const same = q.reduce((sum, value, i) => sum + value * other[i]!, 0) >= 0;
   return same ? q : [-q[0], -q[1], -q[2], -q[3]];

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The layout of LeRobot v2.1, which is kept for one release:
+// Writes the layout of LeRobot v2.1, which is supported for one more release:
 //
 //     meta/info.json, tasks.jsonl, episodes.jsonl, episodes_stats.jsonl
 //     data/chunk-000/episode_000000.parquet

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The layout of LeRobot v3.0:
+// Writes the layout of LeRobot v3.0:
 //
 //     meta/info.json, stats.json, tasks.parquet
 //     meta/episodes/chunk-000/file-000.parquet     a row for each episode, with its place and statistics

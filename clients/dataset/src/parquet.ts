@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tables in Parquet files: columns of numbers, texts, or lists of them.
+// Reads and writes tables in Parquet files. Each column contains either numbers or texts, or lists.
 import { asyncBufferFromFile, parquetMetadataAsync, parquetReadObjects } from "hyparquet";
 import { fileWriter, ParquetWriter } from "hyparquet-writer";
 import { mkdirSync } from "node:fs";

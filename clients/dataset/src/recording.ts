@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reads the output of `tendon-replay --merge`: both ends of a coupling, with times on the clock of the leader. One hour
-// has about 15 million messages, so messages are passed on one at a time and decoded only if they are needed.
+// Reads the output of `tendon-replay --merge`, which contains both ends of a coupling. The times are those of the clock of
+// the leader. A recording of one hour has about 15 million messages, so a message is only decoded if it is needed.
 import { createFileRegistry, fromBinary, type DescMessage, type FileRegistry } from "@bufbuild/protobuf";
 import { FileDescriptorSetSchema } from "@bufbuild/protobuf/wkt";
 import { BinaryReader } from "@bufbuild/protobuf/wire";
@@ -22,7 +22,7 @@ export interface Step {
   readonly torque: Vec3;
 }
 
-/** The phase of a coupling, and the number of the act that it belongs to. */
+/** The phase of a coupling and the number of its act. */
 export interface Act {
   /** 4: engaged, 5: clutched. */
   readonly phase: number;
@@ -33,11 +33,11 @@ export interface Act {
 export interface Port extends Act {
   /** The position relative to the offset, in its own frame and scale, m. */
   readonly displacement: Vec3;
-  /** The rotation since the offset was set, in its base axes. It is undefined if orientations are not coupled. */
+  /** The rotation relative to the offset, in its base axes. It is undefined if orientations are not coupled. */
   readonly turn?: Quat | undefined;
-  /** The opening of the gripper, m; for a leader, the requested one. It is undefined if grippers are not coupled. */
+  /** The opening of the gripper, which a leader requests, m. It is undefined if grippers are not coupled. */
   readonly opening?: number | undefined;
-  /** The scale of the leader since this state. It is 0 if it is that of the scene. */
+  /** The scale that the leader uses from this state on. If it is 0, the scale of the scene is used. */
   readonly positionScale: number;
 }
 
@@ -50,10 +50,10 @@ export interface PoseMap {
 
 export type End = "leader" | "follower";
 
-/** Receives a coupling. The messages of each end and kind arrive sorted by `t` (s, clock of the leader). */
+/** Receives the messages of a coupling. For each end and kind, they are sorted by `t` (s, clock of the leader). */
 export interface CouplingSink {
   map(map: PoseMap): void;
-  /** s: the times of the follower are true within ± this value. */
+  /** `bound` is the maximum error of the times of the follower, s. */
   clockError(bound: number): void;
   step(end: End, t: number, read: () => Step): void;
   port(end: End, t: number, act: Act, read: () => Port): void;

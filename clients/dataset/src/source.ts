@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the layouts of a dataset have in common.
+// The functions and types that are used by all layouts of a dataset.
 import { mkdirSync, writeFileSync } from "node:fs";
 import { dirname, join } from "node:path";
 import { described, type Features, type Layout, type Rows } from "./features.js";
@@ -27,7 +27,7 @@ export interface Source {
   readonly columns: Columns;
 }
 
-/** The part of meta/info.json that all layouts have. */
+/** Returns the part of meta/info.json that is the same in all layouts. */
 export function infoOf({ config, features, episodes, frames }: Source): Record<string, unknown> {
   return {
     codebase_version: config.layout, robot_type: config.robot, total_episodes: episodes.length, total_frames: frames, total_tasks: 1,

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// Statistics of features, as LeRobot's datasets/compute_stats.py defines them. Its quantiles of an episode are
-// estimates from a histogram; ours are exact.
+// Computes the statistics that are defined in LeRobot's datasets/compute_stats.py. LeRobot estimates the quantiles of an
+// episode by using a histogram, but here they are exact.
 
-/** Lists with a value for each component; `count` has one value. */
+/** Each list contains a value for each component, except that `count` contains a single value. */
 export type Stats = Record<string, number[]>;
 
 const kQuantiles: Readonly<Record<string, number>> = { q01: 0.01, q10: 0.1, q50: 0.5, q90: 0.9, q99: 0.99 };
 export const kStatNames = ["min", "max", "mean", "std", "count", ...Object.keys(kQuantiles)];
 
-/** Minimum, maximum, mean, standard deviation of the population and, if wanted, quantiles of each component. */
+/** Computes the values of each component. The standard deviation is that of the population. */
 export function statsOf(rows: readonly (readonly number[])[], { quantiles = true } = {}): Stats {
   const stats: Stats = { min: [], max: [], mean: [], std: [], count: [rows.length] };
   rows[0]!.forEach((_, i) => {
@@ -32,8 +32,8 @@ function quantile(sorted: Float64Array, q: number): number {
 }
 
 /**
- * Statistics of all episodes, from those of each. As in LeRobot, quantiles are bounds: the lowest up to the median, and
- * the highest above.
+ * Computes the statistics of all episodes from the statistics of each episode. As in LeRobot, a quantile is the minimum
+ * of the episodes if it is at most the median, and the maximum otherwise.
  */
 export function aggregate(parts: readonly Stats[]): Stats {
   const counts = parts.map(({ count }) => count![0]!);

@@ -47,7 +47,7 @@ const table = (file: string, how: Rewrite) => (out: string): Promise<void> => re
 const set = (row: number, name: string, value: Cell) => ({ change: (rows: Rows): unknown => (rows[row]![name] = value) });
 const component = (row: number, name: string, value: number) => ({ change: (rows: Rows): unknown => ((rows[row]![name] as number[])[0] = value) });
 
-/** The fault, how it is planted, and what the checker says of it. */
+/** Each entry contains the name of a fault, a function that causes it, and the expected message. */
 const kFaults: readonly (readonly [string, (out: string) => unknown, RegExp])[] = [
   ["the version is another", json("meta/info.json", (info) => (info.codebase_version = "v2.1")), /^meta\/info\.json: codebase_version: expected "v3\.0", got "v2\.1"/],
   ["a total is wrong", json("meta/info.json", (info) => (info.total_frames += 1)), /^meta\/info\.json: total_frames: expected \d+, got \d+/],

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The layout of LeRobot v3.0, as two other readers of Parquet see it. LeRobot itself is not run.
+// Reads datasets of the layout v3.0 with two other implementations of Parquet. LeRobot itself is not run.
 import assert from "node:assert/strict";
 import { existsSync, readdirSync } from "node:fs";
 import { join } from "node:path";
@@ -95,7 +95,7 @@ describe("layout v3.0", () => {
     assert.deepEqual([...(await query(`select * from '${file}'`))[0]!], [["task_index", 0], ["task", config.task]]);
   });
 
-  it("splits large data between episodes, into files that the checker accepts", async (test) => {
+  it("splits large data between episodes, as the checker expects", async (test) => {
     const made = Array.from({ length: 6 }, () => episodes({ fps: 100 })).flat();
     const out = written(test, made, { fps: 100, fileSizeMib: 0.04 });
     const files = readdirSync(join(out, "data/chunk-000"));

@@ -28,17 +28,17 @@ export interface Situation {
   readonly positionScale?: number;
   /** Orientations and grippers are coupled. */
   readonly whole?: boolean;
-  /** ms by which the messages of the leader arrive too late in the file. */
+  /** The number of steps by which the messages of the leader are delayed in the file. */
   readonly late?: number;
-  /** Time in which the recording of the follower has a gap, s. */
+  /** The recording of the follower has no messages in this interval, s. */
   readonly gap?: readonly [number, number];
   /** The recording of the leader ends at this time, s. */
   readonly leaderEnds?: number;
 }
 
 /**
- * Six seconds at 1 kHz, engaged from 1 s to 3 s and from 4 s to 6 s. The leader moves along its x axis and turns about
- * its z axis, and the follower remains a little behind.
+ * Simulates a recording of six seconds with 1000 steps per second. The follower is engaged from 1 s to 3 s and from 4 s to
+ * 6 s. The leader moves along its x axis and rotates about its z axis, and the follower is slower.
  */
 export function episodes(situation: Situation = {}): Episode[] {
   const { fps = 50, contact = true, map = "", positionScale = 0, whole = false, late = 0, gap = [9, 9], leaderEnds = 9 } = situation;
