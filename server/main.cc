@@ -456,6 +456,7 @@ int main(int argc, char** argv) {
   double duration_s = 0;
   bool without_limiter = false;
   bool json = false;
+  std::optional<std::uint32_t> cpu;
   bool profiles = false;
   std::string table;
   auto* scene_option = app.add_option("SCENE", scene_files, "Scene files (TOML), one for each device");
@@ -531,6 +532,11 @@ int main(int argc, char** argv) {
                          "Measure the wake-up latency of a haptic thread on this machine, and recommend changes. This "
                          "takes two seconds and does not change any settings: `tendond doctor`");
   doctor->footer("\nExample: tendond doctor\n\nExit: 0 success; 2 wrong usage.");
+  doctor
+      ->add_option("--cpu", cpu,
+                   "Number of the processor of the haptic thread, as [loop] cpu of the scene. Default: the isolated "
+                   "processors")
+      ->type_name("N");
   doctor->add_flag("--json", json, "Print JSON on stdout, one object");
   app.set_help_flag("-h,--help", "Print this help")->group(kAbout);
   app.set_version_flag("--version", version_text(), "Print the version and the commit")->group(kAbout);
@@ -567,7 +573,7 @@ int main(int argc, char** argv) {
     if (*explainer) return explain_each(scene_files, json);
     if (*devices) return list_devices(firmware_file, accept_unknown_firmware, json);
     if (*doctor) {
-      const Diagnosis diagnosis = diagnose({.now = clock::now, .sleep_until = clock::sleep_until});
+      const Diagnosis diagnosis = diagnose({.now = clock::now, .sleep_until = clock::sleep_until}, cpu);
       std::cout << (json ? in_json(diagnosis) + "\n" : in_words(diagnosis));
       return 0;
     }

@@ -4,10 +4,7 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <cctype>
-#include <charconv>
 #include <cstdint>
-#include <fstream>
 #include <iomanip>
 #include <iterator>
 #include <nlohmann/json.hpp>
@@ -16,8 +13,11 @@
 #include <sstream>
 #include <system_error>
 #include <thread>
+#include <utility>
 
 #include "protocol/secrets/suites.h"
+#include "server/commands/doctor_network.h"
+#include "server/commands/kernel_files.h"
 #include "server/machine/realtime.h"
 
 namespace tendon {
@@ -29,32 +29,9 @@ namespace fs = std::filesystem;
 constexpr Duration kPeriod = std::chrono::milliseconds(1);
 constexpr std::size_t kWakeUps = 1000;
 
-std::string text_of(const fs::path& file) {
-  std::ifstream stream(file);
-  std::string text(std::istreambuf_iterator<char>(stream), {});
-  while (!text.empty() && std::isspace(static_cast<unsigned char>(text.back())) != 0) text.pop_back();
-  return text;
-}
-
-std::optional<std::int64_t> number_of(const std::string& text) {
-  std::int64_t number = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
-  if (error != std::errc{} || end != text.data() + text.size()) return std::nullopt;
-  return number;
-}
-
-std::string value_after(const std::string& text, std::string_view start) {
-  std::istringstream lines(text);
-  for (std::string line; std::getline(lines, line);) {
-    if (!line.starts_with(start)) continue;
-    std::istringstream rest(line.substr(start.size()));
-    std::string value;
-    rest >> value;
-    return value;
-  }
-  return {};
-}
-
+using kernel_files::number_of;
+using kernel_files::text_of;
+using kernel_files::value_after;
 using Finding = Diagnosis::Finding;
 
 Finding kernel(const fs::path& root) {
@@ -189,29 +166,15 @@ Finding aes(const fs::path& root) {
           "the host"};
 }
 
-/// Returns 5 for "0-3,5".
-std::optional<std::int64_t> count_of(const std::string& list) {
-  std::int64_t count = 0;
-  std::istringstream ranges(list);
-  for (std::string range; std::getline(ranges, range, ',');) {
-    const auto dash = range.find('-');
-    const auto first = number_of(range.substr(0, dash));
-    const auto last = dash == std::string::npos ? first : number_of(range.substr(dash + 1));
-    if (!first || !last) return {};
-    count += *last - *first + 1;
-  }
-  return count > 0 ? std::optional(count) : std::nullopt;
-}
-
 Finding processors(const fs::path& root) {
-  const auto count = count_of(text_of(root / "sys/devices/system/cpu/online"));
-  if (!count) return {"processors", "unknown", ""};
-  if (*count == 1) {
+  const std::size_t count = kernel_files::processors_of(text_of(root / "sys/devices/system/cpu/online")).size();
+  if (count == 0) return {"processors", "unknown", ""};
+  if (count == 1) {
     return {"processors", "1",
             "use a machine with 2 or more processors, for the network thread and the engines; `[network] busy = true` "
             "is refused"};
   }
-  return {"processors", std::to_string(*count) + " (`[network] busy = true` uses a whole one)", ""};
+  return {"processors", std::to_string(count) + " (`[network] busy = true` uses a whole one)", ""};
 }
 
 double us(Duration time) { return seconds(time) * 1e6; }
@@ -248,12 +211,16 @@ std::vector<Diagnosis::Finding> look_around(const fs::path& root) {
           throttling(root),     slack(root),        aes(root)};
 }
 
-Diagnosis diagnose(const WakeUpClock& clock) {
+Diagnosis diagnose(const WakeUpClock& clock, std::optional<std::uint32_t> cpu) {
   Diagnosis diagnosis;
   diagnosis.findings = look_around("/");
+  for (auto& finding : look_at_network("/", {.cpu = cpu, .card = ask_network_card})) {
+    diagnosis.findings.push_back(std::move(finding));
+  }
   std::thread([&] { diagnosis.ordinary = measure_wake_ups(clock, kPeriod, kWakeUps); }).join();
   std::thread([&] {
     diagnosis.refused = enter_realtime(kHapticPriority);
+    if (auto refused = cpu ? stay_on(*cpu) : std::nullopt) diagnosis.refused.push_back(std::move(*refused));
     diagnosis.realtime = measure_wake_ups(clock, kPeriod, kWakeUps);
   }).join();
   return diagnosis;

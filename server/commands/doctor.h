@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -42,8 +44,9 @@ Diagnosis::WakeUps measure_wake_ups(const WakeUpClock& clock, Duration period, s
 /// Checks the kernel settings in proc, sys and boot below `root`. If a file is missing, the result is "unknown".
 std::vector<Diagnosis::Finding> look_around(const std::filesystem::path& root);
 
-/// Runs all checks. This takes about two seconds and uses additional threads.
-Diagnosis diagnose(const WakeUpClock& clock);
+/// Runs all checks, including look_at_network. This takes about two seconds and uses additional threads. `cpu` is the
+/// processor of the haptic thread; if empty, the kernel chooses it.
+Diagnosis diagnose(const WakeUpClock& clock, std::optional<std::uint32_t> cpu = std::nullopt);
 
 std::string in_words(const Diagnosis& diagnosis);
 std::string in_json(const Diagnosis& diagnosis);

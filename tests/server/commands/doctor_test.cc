@@ -4,37 +4,16 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <filesystem>
-#include <fstream>
-#include <functional>
-#include <map>
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "tests/server/scratch_folder.h"
+#include "tests/server/commands/planted_machine.h"
 
 namespace tendon::doctor_test {
 namespace {
 
 using namespace std::chrono_literals;
-using testing::ScratchFolder;
-
-class Machine {
- public:
-  void say(const std::string& file, const std::string& text) {
-    const auto path = folder_.path() / file;
-    std::filesystem::create_directories(path.parent_path());
-    std::ofstream(path) << text << '\n';
-  }
-  std::map<std::string, Diagnosis::Finding, std::less<>> look() const {
-    std::map<std::string, Diagnosis::Finding, std::less<>> findings;
-    for (const auto& finding : look_around(folder_.path())) findings.emplace(finding.key, finding);
-    return findings;
-  }
-
- private:
-  ScratchFolder folder_;
-};
+using Machine = testing::PlantedMachine;
 
 constexpr const char* kLimits =
     "Limit                     Soft Limit           Hard Limit           Units     \n"
