@@ -140,9 +140,9 @@ Server::NetworkThreads Server::network_threads_of(const std::vector<Scene>& scen
   const std::uint32_t count = network_threads_for(scenes);
   std::vector<std::unique_ptr<UdpLink>> links;
   if (count == 1) {
-    links.push_back(std::make_unique<UdpLink>(network.listen, reach, network.unix_path));
+    links.push_back(std::make_unique<UdpLink>(network.listen, reach, network.unix_path, network.dscp));
   } else {
-    links = UdpLink::several(network.listen, reach, count);
+    links = UdpLink::several(network.listen, reach, count, network.dscp);
   }
   NetworkThreads threads;
   for (auto& link : links) {

@@ -95,6 +95,11 @@ CommandLine::CommandLine(std::string purpose, Options& options)
   app.add_flag(
       "--busy", options.busy,
       "Poll instead of sleeping. Answers are sent about 10 to 50 µs earlier, but a whole processor is always used");
+  app.add_option_function<std::string>(
+         "--dscp", [&](const std::string&) { options.dscp = Dscp::kExpedited; },
+         "Mark all datagrams with EF (46), for routers and switches that are configured to forward them first")
+      ->type_name("ef")
+      ->check(CLI::IsMember({"ef"}));
   app.add_flag("--json", options.json, "Print JSON on stdout, one object per line");
 }
 

@@ -43,7 +43,7 @@ class RunningClient {
       : options_(options),
         device_(device),
         who_(options.client.name + (device.empty() ? "" : " at " + device)),
-        transport_(options.server, options.client.key.has_value()),
+        transport_(options.server, options.client.key.has_value(), options.dscp),
         client_(options.busy ? static_cast<Link&>(busy_) : transport_, transport_.server(), config(options, device),
                 marking(std::move(callback)), start) {
     if (options.field) client_.use(*options.field);

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "clients/cpp/dscp.h"
 #include "clients/cpp/field/field.h"
 #include "clients/cpp/force_client.h"
 #include "clients/cpp/server_name.h"
@@ -21,7 +22,8 @@ struct Options {
   Duration duration{};                    ///< 0: run until SIGINT or SIGTERM
   /// Polls without sleeping: answers are 10 to 50 µs faster, for a fully loaded processor. Warns if there is only one.
   bool busy = false;
-  bool json = false;  ///< print the final summary to stdout as one JSON object instead of to stderr as text
+  std::optional<Dscp> dscp{};  ///< empty: datagrams are not marked
+  bool json = false;           ///< print the final summary to stdout as one JSON object instead of to stderr as text
   /// Called with the time of read_clock() (machine.h) when no state has arrived for `silence` (at least 1 ms), also
   /// before the first state. Stop anything here that must not continue without an operator. Only for one device.
   std::function<void(LocalTime now)> on_silence{};

@@ -59,7 +59,8 @@ void UdpTransport::connect_to_file() {
   }
 }
 
-UdpTransport::UdpTransport(const ServerName& server, bool has_key) : name_(server), has_key_(has_key) {
+UdpTransport::UdpTransport(const ServerName& server, bool has_key, std::optional<Dscp> dscp)
+    : name_(server), has_key_(has_key), dscp_(dscp) {
   ServerName::Place place = name_.look_up(has_key_);
   connect(place.addresses, 0);
   device_ = std::move(place.device);
@@ -80,6 +81,7 @@ void UdpTransport::connect(const std::vector<Address>& addresses, std::size_t fi
       asio::io_context context;
       const udp::endpoint endpoint = to_endpoint(address);
       udp::socket socket(context, endpoint.protocol());
+      if (dscp_ && !mark(socket.native_handle(), *dscp_)) throw std::system_error(errno, std::system_category());
       socket.connect(endpoint);
       socket.non_blocking(true);
       use(socket.release());

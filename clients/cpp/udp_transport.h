@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <optional>
 #include <span>
 #include <vector>
 
+#include "clients/cpp/dscp.h"
 #include "clients/cpp/server_name.h"
 #include "protocol/link.h"
 #include "protocol/messages.h"
@@ -17,8 +19,9 @@ class UdpTransport : public Link {
  public:
   /// Resolves the name (ServerName::look_up, which may block) and uses the first reachable address. Throws
   /// std::runtime_error if there is none, "cannot find haptics.lab: Name or service not known" or "cannot reach
-  /// 192.0.2.1:47100: Network is unreachable", or if `server` is a DNS-SD name and `has_key` is false.
-  explicit UdpTransport(const ServerName& server, bool has_key = false);
+  /// 192.0.2.1:47100: Network is unreachable", or if `server` is a DNS-SD name and `has_key` is false. With `dscp`, all
+  /// datagrams are marked.
+  explicit UdpTransport(const ServerName& server, bool has_key = false, std::optional<Dscp> dscp = std::nullopt);
   ~UdpTransport() override;
   UdpTransport(const UdpTransport&) = delete;
   UdpTransport& operator=(const UdpTransport&) = delete;
@@ -54,6 +57,7 @@ class UdpTransport : public Link {
 
   ServerName name_;
   bool has_key_;
+  std::optional<Dscp> dscp_;
   Address server_;
   std::string device_;
   int fd_ = -1;

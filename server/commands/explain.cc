@@ -348,6 +348,10 @@ std::string in_words(const Scene& scene, const Explanation& explanation) {
        << (scene.discovery && scene.discovery->announce ? ", announced on the network" : "") << '\n';
   if (scene.network.busy)
     text << "network.busy: the network thread polls instead of sleeping, and always uses a whole processor\n";
+  if (scene.network.dscp)
+    text
+        << "network.dscp: datagrams are marked with EF (46), for routers and switches that are configured for it. Over "
+           "Wi-Fi, many kernels send them like video, unless the access point maps EF to voice\n";
   return text.str();
 }
 
@@ -362,6 +366,7 @@ std::string in_json(const Scene& scene, const Explanation& explanation) {
               {"resolution_ns", explanation.resolution_ns},
               {"sealed_by", scene.network.keys ? Json(spoken_here(scene.network.suites)) : Json(nullptr)},
               {"network_busy", scene.network.busy},
+              {"network_dscp", scene.network.dscp ? Json(static_cast<int>(*scene.network.dscp)) : Json(nullptr)},
               {"parts", Json::array()}};
   for (const auto& part : explanation.parts) {
     out["parts"].push_back({{"key", part.key},

@@ -129,7 +129,7 @@ void steer_by_connection(int fd, std::uint32_t count) {
 }
 
 /// Avoids Asio's epoll instance, which would be notified for each datagram. Throws std::system_error.
-int socket_on(const udp::endpoint& endpoint, bool shares_address) {
+int socket_on(const udp::endpoint& endpoint, std::optional<Dscp> dscp, bool shares_address) {
   asio::io_context context;
   udp::socket socket(context, endpoint.protocol());
   const bool all = endpoint.address().is_unspecified();
@@ -140,6 +140,7 @@ int socket_on(const udp::endpoint& endpoint, bool shares_address) {
   socket.set_option(asio::socket_base::receive_buffer_size(kReceiveBufferBytes));
   socket.non_blocking(true);
   if (shares_address) share_address(socket.native_handle());
+  if (dscp && !mark(socket.native_handle(), *dscp)) throw std::system_error(errno, std::generic_category());
   socket.bind(endpoint);
   return socket.release();
 }
@@ -152,7 +153,8 @@ std::runtime_error cannot_listen(const Address& listen, const std::system_error&
 
 }  // namespace
 
-UdpLink::UdpLink(const Address& listen, Reach reach, const std::optional<std::filesystem::path>& file) {
+UdpLink::UdpLink(const Address& listen, Reach reach, const std::optional<std::filesystem::path>& file,
+                 std::optional<Dscp> dscp) {
   if (reach == Reach::kThisMachine && !is_loopback(listen)) {
     throw std::invalid_argument(
         "cannot listen on " + to_string(listen) +
@@ -163,22 +165,24 @@ UdpLink::UdpLink(const Address& listen, Reach reach, const std::optional<std::fi
   if (to_endpoint(listen).address().is_unspecified()) own_asked_at_ = std::make_unique<AskedAt>();
   asked_at_ = own_asked_at_.get();
   try {
-    fd_ = socket_on(to_endpoint(listen), false);
+    fd_ = socket_on(to_endpoint(listen), dscp, false);
   } catch (const std::system_error& error) {
     throw cannot_listen(listen, error);
   }
 }
 
-UdpLink::UdpLink(const UdpLink& first, Further)
-    : fd_(socket_on(to_endpoint(first.local_address()), true)), asked_at_(first.asked_at_) {}
+UdpLink::UdpLink(const UdpLink& first, std::optional<Dscp> dscp, Further)
+    : fd_(socket_on(to_endpoint(first.local_address()), dscp, true)), asked_at_(first.asked_at_) {}
 
-std::vector<std::unique_ptr<UdpLink>> UdpLink::several(const Address& listen, Reach reach, std::uint32_t count) {
+std::vector<std::unique_ptr<UdpLink>> UdpLink::several(const Address& listen, Reach reach, std::uint32_t count,
+                                                       std::optional<Dscp> dscp) {
   std::vector<std::unique_ptr<UdpLink>> links;
-  links.push_back(std::make_unique<UdpLink>(listen, reach));  // fails if the address is in use
+  links.push_back(std::make_unique<UdpLink>(listen, reach, std::nullopt, dscp));  // fails if the address is in use
   if (count == 1) return links;
   try {
     share_address(links.front()->fd_);
-    while (links.size() < count) links.push_back(std::unique_ptr<UdpLink>(new UdpLink(*links.front(), Further{})));
+    while (links.size() < count)
+      links.push_back(std::unique_ptr<UdpLink>(new UdpLink(*links.front(), dscp, Further{})));
     steer_by_connection(links.front()->fd_, count);
   } catch (const std::system_error& error) {
     throw cannot_listen(listen, error);

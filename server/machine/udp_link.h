@@ -7,6 +7,7 @@
 #include <optional>
 #include <vector>
 
+#include "clients/cpp/dscp.h"
 #include "core/base/time.h"
 #include "core/exchange/counter.h"
 #include "protocol/link.h"
@@ -29,14 +30,17 @@ class UdpLink : public Link {
  public:
   /// The system chooses a port if it is 0. Throws std::invalid_argument if `listen` is not a loopback address and
   /// `reach` does not allow this. Throws std::runtime_error if the system refuses, for example "cannot listen on
-  /// 127.0.0.1:47100: Address already in use". With `file`, also creates a UnixSocket, and throws its errors.
+  /// 127.0.0.1:47100: Address already in use". With `file`, also creates a UnixSocket, and throws its errors. With
+  /// `dscp`, all datagrams are marked.
   explicit UdpLink(const Address& listen, Reach reach = Reach::kThisMachine,
-                   const std::optional<std::filesystem::path>& file = std::nullopt);
+                   const std::optional<std::filesystem::path>& file = std::nullopt,
+                   std::optional<Dscp> dscp = std::nullopt);
 
   /// Creates links that share an address, each for a separate thread. `count` must be a power of two. The kernel
   /// distributes Data datagrams based on the connection id modulo `count`, and sends all others to the first link
   /// (SO_REUSEPORT with a filter, socket(7)). Throws the same errors as the constructor.
-  static std::vector<std::unique_ptr<UdpLink>> several(const Address& listen, Reach reach, std::uint32_t count);
+  static std::vector<std::unique_ptr<UdpLink>> several(const Address& listen, Reach reach, std::uint32_t count,
+                                                       std::optional<Dscp> dscp = std::nullopt);
 
   ~UdpLink() override;
   UdpLink(const UdpLink&) = delete;
@@ -63,7 +67,7 @@ class UdpLink : public Link {
 
  private:
   struct Further {};
-  UdpLink(const UdpLink& first, Further);
+  UdpLink(const UdpLink& first, std::optional<Dscp> dscp, Further);
   std::size_t receive_from_network(Address& from, std::span<std::byte> buffer);
   bool send_to_network(const Address& to, std::span<const std::byte> datagram) const;
 

@@ -38,6 +38,8 @@ Names<Suite> suite_names() {
   return names;
 }
 
+Names<std::optional<Dscp>> dscp_names() { return {{{"none", std::nullopt}, {"ef", Dscp::kExpedited}}}; }
+
 std::string preset_meanings() {
   std::string text;
   for (const PresetInfo& preset : presets()) {
@@ -487,6 +489,9 @@ void declare_scene(Table& scene, Draft& draft) {
     keys.key("busy", network.busy, YesNo{},
              "Poll instead of sleeping. Datagrams are read about 10 to 50 µs earlier, but the network thread always "
              "uses a whole processor. Refused if there is only one processor");
+    keys.key("dscp", network.dscp, dscp_names(),
+             "Mark all datagrams of the server, so that routers and switches that are configured for it forward them "
+             "first. ef: expedited forwarding (46)");
     keys.key("threads", network.threads, kNetworkThreads,
              "Number of network threads, which share the devices in banks of 16. A power of two; 1 with busy, with "
              "unix, or if a scene has teleoperation.dial",

@@ -13,6 +13,7 @@
 #include <variant>
 #include <vector>
 
+#include "clients/cpp/dscp.h"
 #include "core/base/time.h"
 #include "devices/driver.h"
 #include "devices/falcon/falcon_device.h"
@@ -43,6 +44,7 @@ struct Scene {
     bool adapt_state_rate = NetworkLoop::Config{}.adapt_state_rate;
     std::vector<std::string> takeover{};
     bool busy = false;                       ///< the network thread does not sleep (BusyLink)
+    std::optional<Dscp> dscp{};              ///< if empty, datagrams are not marked
     std::optional<std::uint32_t> threads{};  ///< see Shard; empty for the default
   };
   struct Channel {

@@ -14,6 +14,8 @@
 #include <string>
 #include <vector>
 
+#include "tests/support/traffic_class_reader.h"
+
 namespace tendon::udp_transport_test {
 namespace {
 
@@ -108,6 +110,21 @@ TEST(UdpTransport, WhatItHasReceivedWasHereByNowAndNotBeforeTheTurn) {
   const LocalTime long_ago{};
   EXPECT_GT(link.present(long_ago), long_ago);
   EXPECT_EQ(link.present(LocalTime::max()), LocalTime::max());
+}
+
+TEST(UdpTransport, MarksEachDatagramOfBothFamiliesIfItIsTold) {
+  for (const int family : {AF_INET, AF_INET6}) {
+    TrafficClassReader reader(family);
+    UdpTransport marked(reader.text(), false, Dscp::kExpedited);
+    marked.send(reader.address(), kWords);
+    EXPECT_EQ(reader.next(), TrafficClassReader::kExpedited);
+    marked.look_up_again(true);
+    marked.send(reader.address(), kWords);
+    EXPECT_EQ(reader.next(), TrafficClassReader::kExpedited);
+    UdpTransport plain(reader.text());
+    plain.send(reader.address(), kWords);
+    EXPECT_EQ(reader.next(), 0);
+  }
 }
 
 TEST(UdpTransport, TellsTheFullSizeOfADatagramItHadToCut) {

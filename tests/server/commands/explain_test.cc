@@ -171,6 +171,16 @@ TEST(Explain, SaysThatABusyNetworkThreadTakesAProcessor) {
   EXPECT_EQ(nlohmann::json::parse(in_json(scene, explanation)).at("network_busy"), true);
 }
 
+TEST(Explain, SaysHowDatagramsAreMarkedAndWhatWiFiMakesOfIt) {
+  Scene scene = shipped("demo.toml");
+  EXPECT_EQ(in_words(scene, {}).find("network.dscp"), std::string::npos);
+  EXPECT_TRUE(nlohmann::json::parse(in_json(scene, {})).at("network_dscp").is_null());
+  scene.network.dscp = Dscp::kExpedited;
+  EXPECT_NE(in_words(scene, {}).find("network.dscp: datagrams are marked with EF (46), "), std::string::npos);
+  EXPECT_NE(in_words(scene, {}).find("send them like video, unless the access point"), std::string::npos);
+  EXPECT_EQ(nlohmann::json::parse(in_json(scene, {})).at("network_dscp"), 46);
+}
+
 TEST(Explain, SaysWhatCountedDevicesTakeTogether) {
   Scene scene = shipped("demo.toml");
   Explanation explanation;

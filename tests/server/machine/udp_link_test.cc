@@ -14,6 +14,7 @@
 
 #include "protocol/wire/header.h"
 #include "tests/support/refusal.h"
+#include "tests/support/traffic_class_reader.h"
 #include "tests/support/wire.h"
 
 namespace tendon::udp_link_test {
@@ -231,6 +232,52 @@ TEST_P(UdpLinkTest, OfSeveralEachAnswersFromTheirAddress) {
 
 INSTANTIATE_TEST_SUITE_P(Ipv4AndIpv6, UdpLinkTest, ::testing::Values(kAnyPort4, kAnyPort6),
                          [](const auto& test) { return test.param == kAnyPort4 ? "Ipv4" : "Ipv6"; });
+
+/// Returns the traffic classes of the datagrams that `link` sends to a reader of each family that it can reach: the
+/// first one, and then the answer to one of the reader, from the address that it has used.
+std::vector<int> classes_from(UdpLink& link) {
+  std::vector<int> classes;
+  Bytes buffer(kMaxDatagram);
+  Address from;
+  const Address own = link.local_address();
+  const bool any6 = !is_ipv4(own) && own.ip[15] == 0;
+  for (const int family : {AF_INET, AF_INET6}) {
+    if (is_ipv4(own) != (family == AF_INET) && !any6) continue;
+    TrafficClassReader reader(family);
+    link.send(reader.address(), bytes(3, 1));
+    classes.push_back(reader.next());
+    reader.send(own.port, bytes(5, 1));
+    link.wait(kForever);
+    EXPECT_EQ(link.receive(from, buffer), 5U);
+    link.send(from, bytes(kMaxDatagram, 1));
+    classes.push_back(reader.next());
+  }
+  return classes;
+}
+
+TEST(UdpLink, MarksEachDatagramOfBothFamiliesIfItIsTold) {
+  constexpr int kEf = TrafficClassReader::kExpedited;
+  for (const char* const listen : {"127.0.0.1:0", "[::1]:0", "0.0.0.0:0", "[::]:0"}) {
+    const std::size_t count = std::string(listen) == "[::]:0" ? 4 : 2;
+    UdpLink marked(parse_address(listen), Reach::kAnywhere, std::nullopt, Dscp::kExpedited);
+    EXPECT_EQ(classes_from(marked), std::vector<int>(count, kEf)) << listen;
+    UdpLink plain(parse_address(listen), Reach::kAnywhere);
+    EXPECT_EQ(classes_from(plain), std::vector<int>(count, 0)) << listen;
+    int priority = 0;
+    socklen_t size = sizeof priority;
+    EXPECT_EQ(::getsockopt(marked.fd(), SOL_SOCKET, SO_PRIORITY, &priority, &size), 0);
+    EXPECT_EQ(priority, 6) << listen;
+  }
+}
+
+TEST(UdpLink, SeveralMarkTheirDatagramsToo) {
+  const auto links = UdpLink::several(kAnyPort6, Reach::kThisMachine, 4, Dscp::kExpedited);
+  TrafficClassReader reader(AF_INET6);
+  for (const auto& link : links) {
+    link->send(reader.address(), bytes(3, 1));
+    EXPECT_EQ(reader.next(), TrafficClassReader::kExpedited);
+  }
+}
 
 TEST(UdpLink, RefusesAnAddressThatOthersCanReachAndSaysWhy) {
   for (const char* const text : {"0.0.0.0:47100", "[::]:47100", "192.168.1.20:47100"}) {

@@ -84,6 +84,7 @@ TEST(Scene, TakesWhatItDoesNotSayFromTheProfileAndTheStructs) {
   EXPECT_EQ(scene.network.controller_timeout, NetworkLoop::Config{}.controller_timeout);
   EXPECT_EQ(scene.network.observer_timeout, NetworkLoop::Config{}.observer_timeout);
   EXPECT_FALSE(scene.network.busy);
+  EXPECT_EQ(scene.network.dscp, std::nullopt);
   EXPECT_FALSE(scene.recording);
   EXPECT_FALSE(scene.discovery);
   EXPECT_EQ(scene.text, kMinimal);
@@ -136,6 +137,7 @@ TEST(Scene, ReadsEveryKey) {
       {"network.observer_timeout_ms=2500", 2.5, [](S s) { return seconds(s.network.observer_timeout); }},
       {"network.adapt_state_rate=true", 1, [](S s) -> double { return s.network.adapt_state_rate; }},
       {"network.busy=true", 1, [](S s) -> double { return s.network.busy; }},
+      {"network.dscp=ef", 1, [](S s) -> double { return s.network.dscp == Dscp::kExpedited; }},
       {"discovery.announce=true", 1, [](S s) -> double { return s.discovery->announce; }},
       {"discovery.name=\"falcon at bench 3\"", 1,
        [](S s) -> double { return s.discovery->name == "falcon at bench 3"; }},
