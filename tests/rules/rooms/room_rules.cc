@@ -44,8 +44,8 @@ const Names kAtTheRoot = {".ci",          ".dockerignore", ".clang-format",  ".c
                           "LICENSE",      "README.md"};
 
 /// Every room may use these headers: control the floating point unit, pass the newest value between threads, find
-/// misspelled words, format the errors of a command line, print without waiting for a reader, mark datagrams, and declare
-/// the keys of a scene.
+/// misspelled words, format the errors of a command line, print without waiting for a reader, mark datagrams, and
+/// declare the keys of a scene.
 const Names kForAllRooms = {"core/base/arithmetic.h", "core/base/nearest_word.h", "core/exchange/latest.h",
                             "clients/cpp/dscp.h",     "clients/cpp/usage.h",      "server/machine/output.h",
                             "server/scene/reader.h",  "server/scene/reference.h", "server/scene/scene_error.h",
