@@ -351,7 +351,7 @@ bool ForceClient::call(LocalTime now) {
   if (next_call_ <= now) next_call_ = now + period_;
   try {
     if (watch_) {
-      watch_(state, stats().link);
+      watch_(state, connection_.link_stats());
       return false;
     }
     const Touch touch = physics_(state);

@@ -33,6 +33,14 @@ udp::endpoint to_endpoint(const Address& address) {
   return {v6, address.port};
 }
 
+/// Returns whether one of the descriptors is readable.
+bool poll_until_readable(std::span<pollfd> descriptors, Duration timeout) noexcept {
+  const Duration left = std::max(timeout, Duration::zero());
+  const auto whole = std::chrono::duration_cast<std::chrono::seconds>(left);
+  const timespec time{static_cast<time_t>(whole.count()), static_cast<long>((left - whole).count())};
+  return ::ppoll(descriptors.data(), descriptors.size(), &time, nullptr) > 0;
+}
+
 }  // namespace
 
 /// Replaces the socket, released from Asio, whose epoll instance every datagram would signal without need.
@@ -121,8 +129,8 @@ std::size_t UdpTransport::receive(Address& from, std::span<std::byte> buffer) {
 LocalTime UdpTransport::present(LocalTime now) const { return std::max(now, read_clock()); }
 
 void UdpTransport::wait(Duration timeout) {
-  UdpTransport* const alone = this;
-  wait_for_any({&alone, 1}, timeout);
+  pollfd alone{fd_, POLLIN, 0};
+  poll_until_readable({&alone, 1}, timeout);
 }
 
 bool UdpTransport::wait_for_any(std::span<UdpTransport* const> transports, Duration timeout, int also) {
@@ -131,10 +139,7 @@ bool UdpTransport::wait_for_any(std::span<UdpTransport* const> transports, Durat
   for (UdpTransport* const transport : transports) {
     readable.push_back({transport->descriptor(), POLLIN, 0});
   }
-  const Duration left = std::max(timeout, Duration::zero());
-  const auto whole = std::chrono::duration_cast<std::chrono::seconds>(left);
-  const timespec time{static_cast<time_t>(whole.count()), static_cast<long>((left - whole).count())};
-  return ::ppoll(readable.data(), readable.size(), &time, nullptr) > 0;
+  return poll_until_readable(readable, timeout);
 }
 
 }  // namespace tendon

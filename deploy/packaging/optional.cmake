@@ -252,6 +252,8 @@ tendon_package(emscripten DEBIAN emscripten PROGRAM em++ RUN --version VERSION 3
 # These packages are only used by tests. In Fast DDS 3, the library is called libfastdds.
 tendon_package(fastdds DEBIAN libfastrtps-dev HEADERS fastdds/dds/domain/DomainParticipantFactory.hpp fastcdr/Cdr.h
   LIBRARIES fastrtps fastcdr)
+tendon_package(go DEBIAN golang-go PROGRAM go RUN version VERSION 1.18)
+tendon_package(mkoctfile DEBIAN octave-dev PROGRAM mkoctfile RUN --version VERSION 6)
 tendon_package(zeromq DEBIAN libzmq3-dev PKG_CONFIG libzmq>=4.3 HEADERS zmq.h)
 tendon_package(grpc DEBIAN libgrpc++-dev HEADERS grpcpp/grpcpp.h LIBRARIES grpc++ grpc gpr absl_synchronization)
 tendon_package(grpc_plugin DEBIAN protobuf-compiler-grpc PROGRAM grpc_cpp_plugin)

@@ -3,7 +3,8 @@
 #   tendon             the server and the tools, including sweeps and the upload of recordings. Its image can also run
 #                      the job of a sweep
 #   tendon-bridge      bridges for existing programs, which do not need any other package
-#   libtendon-dev      the C++ library: find_package(tendon), tendon::client
+#   libtendon1         libtendon.so.1, the C library
+#   libtendon-dev      its header, and the C++ library: find_package(tendon), tendon::client
 #   tendon-fem-worker  the only package that depends on PETSc and MPI, if the build has found them
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
@@ -79,6 +80,12 @@ if(TARGET tendon-fem-worker)
 endif()
 add_custom_target(man ALL DEPENDS ${pages})
 
+# The C library.
+install(TARGETS tendon_c LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT c NAMELINK_COMPONENT c_development)
+install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/libtendon1 COMPONENT c)
+install(FILES clients/c/tendon.h DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT c_development)
+install(DIRECTORY clients/c/examples DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/libtendon-dev COMPONENT c_development)
+
 # The client library. The installed headers have the same paths as in this repository: #include "clients/cpp/run.h".
 set(libraries tendon_client tendon_output tendon_server_name tendon_usage tendon_protocol tendon_address tendon_proto tendon_core tendon_core_design)
 foreach(library ${libraries})
@@ -114,7 +121,7 @@ set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
 set(CPACK_PACKAGE_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR}/packages)
 set(CPACK_STRIP_FILES ON)
 set(CPACK_DEB_COMPONENT_INSTALL ON)
-set(CPACK_COMPONENTS_ALL programs machine injector conformance bridge development)
+set(CPACK_COMPONENTS_ALL programs machine injector conformance bridge c c_development development)
 if(TARGET tendon-fem-worker)
   list(APPEND CPACK_COMPONENTS_ALL worker)
 endif()
@@ -123,6 +130,8 @@ set(CPACK_COMPONENT_MACHINE_GROUP run)
 set(CPACK_COMPONENT_INJECTOR_GROUP run)
 set(CPACK_COMPONENT_CONFORMANCE_GROUP run)
 set(CPACK_COMPONENT_BRIDGE_GROUP bridge)
+set(CPACK_COMPONENT_C_GROUP c)
+set(CPACK_COMPONENT_C_DEVELOPMENT_GROUP dev)
 set(CPACK_COMPONENT_DEVELOPMENT_GROUP dev)
 set(CPACK_COMPONENT_WORKER_GROUP worker)
 set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
@@ -154,9 +163,16 @@ set(CPACK_DEBIAN_WORKER_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_WORKER_PACKAGE_DEPENDS openmpi-bin)
 set(CPACK_DEBIAN_WORKER_DESCRIPTION "Large soft bodies for the Tendon haptics server, with PETSc and MPI
  The workers of tendon-fem, which distribute the finite elements of a soft body over many cores and machines.")
+set(CPACK_DEBIAN_C_PACKAGE_NAME libtendon1)
+set(CPACK_DEBIAN_C_PACKAGE_SECTION libs)
+set(CPACK_DEBIAN_C_PACKAGE_SHLIBDEPS ON)
+set(CPACK_DEBIAN_C_PACKAGE_GENERATE_SHLIBS ON)  # and lets ldconfig run
+set(CPACK_DEBIAN_C_DESCRIPTION "C library for clients of the Tendon haptics server
+ Nine functions for physics engines in C and in languages that can call C: wait for the position of the hand, and send
+ a force.")
 set(CPACK_DEBIAN_DEV_PACKAGE_NAME libtendon-dev)
 set(CPACK_DEBIAN_DEV_PACKAGE_SECTION libdevel)
-set(CPACK_DEBIAN_DEV_PACKAGE_DEPENDS "libeigen3-dev, libprotobuf-dev, libsodium-dev, libsystemd-dev")
+set(CPACK_DEBIAN_DEV_PACKAGE_DEPENDS "libtendon1 (= ${PROJECT_VERSION}), libeigen3-dev, libprotobuf-dev, libsodium-dev, libsystemd-dev")
 set(CPACK_DEBIAN_DEV_DESCRIPTION "Library for physics engines of the Tendon haptics server
  Opens a session over UDP, and calls a function that computes the force for the latest position.")
 include(CPack)

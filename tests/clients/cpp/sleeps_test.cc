@@ -3,54 +3,18 @@
 #include <sys/prctl.h>
 #include <sys/resource.h>
 
-#include <algorithm>
-#include <atomic>
 #include <chrono>
 #include <cstdint>
-#include <thread>
 
 #include "clients/cpp/machine.h"
 #include "clients/cpp/run.h"
-#include "server/machine/udp_link.h"
-#include "tests/clients/cpp/a_and_z.h"
+#include "tests/clients/cpp/server_thread.h"
 
 namespace tendon::sleeps_test {
 namespace {
 
 using std::chrono::milliseconds;
-
-/// Z on a real socket and its own thread. It sends states at 1 kHz.
-class Server {
- public:
-  Server()
-      : thread_([this] {
-          while (!stop_) {
-            const LocalTime next = z_.turn(link_.present({}));
-            link_.wait(std::min<Duration>(next - link_.present({}), milliseconds(10)));
-          }
-        }) {}
-  ~Server() { end(); }
-  Server(const Server&) = delete;
-  Server& operator=(const Server&) = delete;
-
-  Address address() const { return link_.local_address(); }
-  /// Stops the thread and returns the number of received datagrams.
-  std::uint64_t forces() {
-    end();
-    return z_.forces.size();
-  }
-
- private:
-  void end() {
-    stop_ = true;
-    if (thread_.joinable()) thread_.join();
-  }
-
-  UdpLink link_{parse_address("127.0.0.1:0")};
-  a_and_z::Server z_{link_, std::uint8_t{1}};
-  std::atomic<bool> stop_{false};
-  std::thread thread_;
-};
+using Server = a_and_z::ServerThread;
 
 /// Returns the number of voluntary context switches of this thread, which does not include preemption.
 std::uint64_t sleeps() {

@@ -63,6 +63,8 @@ const std::vector<Door>& front_doors() {
       {"Asio", {"asio.hpp", "asio/"}, {"server/machine/udp_link.cc", "clients/cpp/udp_transport.cc"}},
       // HTTP and WebSockets may only be used by processes without a haptic thread.
       {"Boost.Beast and Boost.Asio", {"boost/"}, {"clients/cpp/web/http_server.cc"}},
+      // For programs in C and in other languages.
+      {"C", {"stddef.h", "stdint.h"}, {"clients/c/tendon.h"}},
       {"CHOLMOD", {"cholmod.h", "Eigen/CholmodSupport"}, {"clients/softbody/fem/sparse.cc"}},
       {"CLI11",
        {"CLI/"},
