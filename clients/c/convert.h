@@ -12,7 +12,7 @@ namespace tendon {
 tendon_state to_c(const DeviceState& hand) noexcept;
 /// `handle` is NULL if the server does not describe it. Texts are truncated.
 tendon_description to_c(const DeviceDescription& device, const HandleDescription* handle) noexcept;
-/// Members without their bit in `has` are ignored. Unknown bits must have been refused.
+/// Ignores the members whose bits in `has` are not set. Call check_bits() first.
 Touch to_touch(const tendon_force& force) noexcept;
 
 }  // namespace tendon

@@ -15,7 +15,7 @@
 
 namespace tendon {
 
-/// A ForceClient without callbacks and with a socket: the caller pulls states and pushes forces. All functions that
+/// Combines a ForceClient with a socket, and replaces its callback by the functions wait() and send(). All functions that
 /// return an int return a result of tendon.h, and serve the session while they wait. Negative timeouts do not end.
 ///
 /// Thread-safe: no. Realtime-safe: no, but wait() and send() do not use the heap while a session is open, except for
@@ -78,8 +78,8 @@ class PullClient {
 
   ForceClient::Phase phase_ = ForceClient::Phase::kGreeting;
   std::uint64_t session_ = 0;  ///< number of the newest one
-  std::string trouble_;        ///< why the newest session or attempt has ended
-  bool lost_ = false;          ///< a session has ended, and the caller does not know yet
+  std::string trouble_;        ///< the reason for the end of the newest session or attempt
+  bool lost_ = false;          ///< a session has ended, and this was not returned yet
   bool ended_ = false;         ///< permanently
 
   DeviceState newest_{};

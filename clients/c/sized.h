@@ -42,7 +42,7 @@ inline void check_bits(std::uint32_t bits, std::uint32_t known, const std::strin
                               " are not known by this library (TENDON_ABI " + std::to_string(TENDON_ABI) + ")");
 }
 
-/// Members that the program does not know are 0. Throws as check_sized().
+/// Sets the members that the program does not have to 0. Throws the exceptions of check_sized().
 template <class Struct>
 Struct copy_in(const Struct* given, const std::string& name) {
   check_sized(given, name);
@@ -51,7 +51,7 @@ Struct copy_in(const Struct* given, const std::string& name) {
   return copy;
 }
 
-/// Writes the members that both know. `to` must have passed check_sized().
+/// Writes the members that the program has. Call check_sized() first.
 template <class Struct>
 void copy_out(Struct full, Struct* to) noexcept {
   full.size = static_cast<std::uint32_t>(std::min<std::size_t>(to->size, sizeof full));

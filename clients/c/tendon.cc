@@ -21,7 +21,7 @@ struct tendon_client : tendon::PullClient {  // NOLINT(readability-identifier-na
 namespace tendon {
 namespace {
 
-// The bits that this version knows.
+// All bits of this version.
 constexpr std::uint32_t kFlags = TENDON_TAKE_LEASE | TENDON_OBSERVE | TENDON_POLL;
 constexpr std::uint32_t kForceBits = TENDON_FORCE_STIFFNESS | TENDON_FORCE_RADIUS | TENDON_FORCE_CONTACT |
                                      TENDON_FORCE_TORQUE | TENDON_FORCE_ANGULAR_STIFFNESS | TENDON_FORCE_GRIP |
@@ -49,7 +49,7 @@ PullClient::Config to_config(const tendon_config& config) {
   return result;
 }
 
-/// Calls `call`, and returns what it throws as a result.
+/// Calls `call`, and converts exceptions to results.
 template <class Call>
 int guarded(tendon_client* client, Call call) noexcept {
   if (client == nullptr) return TENDON_BAD;

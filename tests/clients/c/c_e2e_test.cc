@@ -104,7 +104,7 @@ TEST(CHeap, WaitAndSendDoNotUseTheHeap) {
   Process counted(kPrograms + "/heap", {pressing.server.address(), "4000", "0"}, pressing.folder.path());
   ASSERT_EQ(counted.wait(), 0) << counted.err();
   EXPECT_EQ(number_in(counted.out(), "turns"), 3000) << counted.out();
-  // A machine that pauses makes forces late, and each report of the server on them is a text.
+  // If the machine pauses, forces are late, and the reports of the server contain a text.
   EXPECT_LE(number_in(counted.out(), "heap_calls"), 8) << counted.out();
   std::printf("%s", counted.out().c_str());
 }
@@ -134,7 +134,7 @@ TEST(CHeap, ASealedSessionDoesNotUseTheHeapEither) {
   std::printf("%s", counted.out().c_str());
 }
 
-/// A wall in C whose force is felt, and an observer.
+/// Starts the example in C and an observer, and waits until the force is applied.
 struct Felt : Pressing {
   Felt() {
     watch_force(echo, [](double force) { return force < 0.8 * kWallForce; });
@@ -157,7 +157,7 @@ TEST(CBadPeer, AProgramThatIsStoppedIsLetGoAndFeltAgainWhenItGoesOn) {
   watch_force(felt.echo, [](double force) { return force < 0.8 * kWallForce; });
 }
 
-TEST(CBadPeer, AProgramThatFloodsTheServerAndNeverWaitsIsLetGoAndHoldsNobodyUp) {
+TEST(CBadPeer, AProgramThatFloodsAndNeverWaitsIsLetGoAndHoldsNobodyUp) {
   Felt felt;
   felt.wall.signal(SIGKILL);
   watch_force(felt.echo, [](double force) { return force == 0; });

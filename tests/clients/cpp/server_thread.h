@@ -22,7 +22,7 @@ class ServerThread {
   ServerThread& operator=(const ServerThread&) = delete;
 
   Address address() const { return link_.local_address(); }
-  /// Calls `change` with the server and the present time, between two of its turns.
+  /// Calls `change` with the server and the present time while the thread waits.
   void with(auto change) {
     const std::lock_guard lock(mutex_);
     change(z_, link_.present({}));

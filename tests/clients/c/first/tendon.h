@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The first version of clients/c/tendon.h without its comments. Never change it: programs were built with it.
+// The first version of clients/c/tendon.h without comments. It must not be changed, because the test of
+// compatibility uses it.
 #pragma once
 
 #include <stddef.h>
