@@ -3,9 +3,10 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
-#include <cstdlib>
+#include <algorithm>
+#include <cstdio>
 #include <filesystem>
-#include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -26,6 +27,21 @@ constexpr double kWallDepth = 300 * 15 / 2300.0;           // mm
 struct Pressing {
   ScratchFolder folder;
   Server server{folder.path(), write(folder.path() / "hand.toml", kPressingHand), {"--without-limiter"}};
+};
+
+/// A server that requires a key.
+struct Sealed {
+  Sealed() {
+    std::filesystem::create_directory(folder.path() / "keys");
+    Process keygen(program("tendond"), {"keygen", "wall", "--out", key}, folder.path());
+    EXPECT_EQ(keygen.wait(), 0) << keygen.err();
+    server.emplace(folder.path(),
+                   write(folder.path() / "lab.toml",
+                         "[device]\nkind = \"simulated\"\nprofile = \"falcon\"\n[network]\nkeys = \"keys\"\n"));
+  }
+  ScratchFolder folder;
+  std::string key = (folder.path() / "keys/wall.key").string();
+  std::optional<Server> server;
 };
 
 /// Checks "x 1.96 mm, -3.91 N on the hand", the last line of the examples.
@@ -69,6 +85,9 @@ TEST(CExample, WithoutAServerTheWallSaysSo) {
   EXPECT_EQ(wall.err(), "wall: no answer from 127.0.0.1:9; is tendond running there?\n");
 }
 
+/// The texts of the reports on late forces in 3 to 4 s, which the machine may cause. Less than one in 100 turns.
+constexpr double kCallsOfReports = 24;
+
 struct Version {
   int number;
   double state_size;
@@ -104,33 +123,25 @@ TEST(CHeap, WaitAndSendDoNotUseTheHeap) {
   Process counted(kPrograms + "/heap", {pressing.server.address(), "4000", "0"}, pressing.folder.path());
   ASSERT_EQ(counted.wait(), 0) << counted.err();
   EXPECT_EQ(number_in(counted.out(), "turns"), 3000) << counted.out();
-  // If the machine pauses, forces are late, and the reports of the server contain a text.
-  EXPECT_LE(number_in(counted.out(), "heap_calls"), 8) << counted.out();
+  EXPECT_LE(number_in(counted.out(), "heap_calls"), kCallsOfReports) << counted.out();
   std::printf("%s", counted.out().c_str());
 }
 
-TEST(CHeap, LateForcesCostOneTextPerSecond) {
+TEST(CHeap, ASlowProgramDoesNotUseItEither) {
   Pressing pressing;
   Process counted(kPrograms + "/heap", {pressing.server.address(), "40", "100000"}, pressing.folder.path());
   ASSERT_EQ(counted.wait(), 0) << counted.err();
   EXPECT_EQ(number_in(counted.out(), "turns"), 30) << counted.out();
-  EXPECT_LE(number_in(counted.out(), "heap_calls"), 4 * 6) << "3 s, " << counted.out();
+  EXPECT_LE(number_in(counted.out(), "heap_calls"), kCallsOfReports) << counted.out();
   std::printf("%s", counted.out().c_str());
 }
 
-TEST(CHeap, ASealedSessionDoesNotUseTheHeapEither) {
-  const ScratchFolder folder;
-  std::filesystem::create_directory(folder.path() / "keys");
-  Process keygen(program("tendond"), {"keygen", "wall", "--out", "keys/wall.key"}, folder.path());
-  ASSERT_EQ(keygen.wait(), 0) << keygen.err();
-  const std::string scene = write(folder.path() / "lab.toml",
-                                  "[device]\nkind = \"simulated\"\nprofile = \"falcon\"\n[network]\nkeys = \"keys\"\n");
-  Server server(folder.path(), scene);
-  Process counted(kPrograms + "/heap", {server.address(), "4000", "0", (folder.path() / "keys/wall.key").string()},
-                  folder.path());
+TEST(CHeap, ASealedSessionDoesNotUseItEither) {
+  Sealed lab;
+  Process counted(kPrograms + "/heap", {lab.server->address(), "4000", "0", lab.key}, lab.folder.path());
   ASSERT_EQ(counted.wait(), 0) << counted.err();
   EXPECT_EQ(number_in(counted.out(), "turns"), 3000) << counted.out();
-  EXPECT_LE(number_in(counted.out(), "heap_calls"), 8) << counted.out();
+  EXPECT_LE(number_in(counted.out(), "heap_calls"), kCallsOfReports) << counted.out();
   std::printf("%s", counted.out().c_str());
 }
 
@@ -173,17 +184,10 @@ TEST(CBadPeer, AProgramThatFloodsAndNeverWaitsIsLetGoAndHoldsNobodyUp) {
 }
 
 TEST(CBadPeer, AProgramWithTheSameKeyReplacesTheFirstWhichEnds) {
-  const ScratchFolder folder;
-  std::filesystem::create_directory(folder.path() / "keys");
-  Process keygen(program("tendond"), {"keygen", "wall", "--out", "keys/wall.key"}, folder.path());
-  ASSERT_EQ(keygen.wait(), 0) << keygen.err();
-  const std::string scene = write(folder.path() / "lab.toml",
-                                  "[device]\nkind = \"simulated\"\nprofile = \"falcon\"\n[network]\nkeys = \"keys\"\n");
-  Server server(folder.path(), scene);
-  const std::string key = (folder.path() / "keys/wall.key").string();
-  Process first(kPrograms + "/heap", {server.address(), "1000000", "0", key}, folder.path());
+  Sealed lab;
+  Process first(kPrograms + "/heap", {lab.server->address(), "1000000", "0", lab.key}, lab.folder.path());
   ::usleep(500'000);
-  Process second(kPrograms + "/heap", {server.address(), "500", "0", key}, folder.path());
+  Process second(kPrograms + "/heap", {lab.server->address(), "500", "0", lab.key}, lab.folder.path());
   EXPECT_EQ(second.wait(), 0) << second.err();
   EXPECT_EQ(first.wait(), 0);
   EXPECT_NE(text_in(first.out(), "why").find(" has ended the session: "), std::string::npos) << first.out();

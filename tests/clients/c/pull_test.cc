@@ -373,7 +373,9 @@ TEST(CAbi, RequestsWaitForTheirAnswers) {
   order.what = TENDON_GIVE;
   EXPECT_EQ(tendon_request(client.get(), &order, kPatience), TENDON_OK) << tendon_why(client.get());
   auto state = sized<tendon_state>();
-  EXPECT_EQ(tendon_wait(client.get(), &state, 20 * kMillisecond), TENDON_BUSY);
+  int result = TENDON_OK;  // for the states that have arrived before
+  while (result == TENDON_OK) result = tendon_wait(client.get(), &state, 20 * kMillisecond);
+  EXPECT_EQ(result, TENDON_BUSY);
   order.what = TENDON_TAKE;
   EXPECT_EQ(tendon_request(client.get(), &order, 100 * kMillisecond), TENDON_BUSY) << tendon_why(client.get());
   EXPECT_EQ(tendon_request(client.get(), &order, kPatience), TENDON_OK) << tendon_why(client.get());
