@@ -14,6 +14,7 @@
 
 #include "clients/c/sized.h"
 #include "clients/c/tendon.h"
+#include "clients/cpp/machine.h"
 #include "tests/clients/cpp/server_thread.h"
 
 namespace tendon::pull_test {
@@ -175,9 +176,9 @@ TEST(CAbi, AWaitEndsAtItsTimeout) {
   wait(client);
   auto state = sized<tendon_state>();
   EXPECT_EQ(tendon_wait(client.get(), &state, 0), TENDON_TIMEOUT);
-  const auto before = std::chrono::steady_clock::now();
+  const LocalTime before = read_clock();
   EXPECT_EQ(tendon_wait(client.get(), &state, 30 * kMillisecond), TENDON_TIMEOUT);
-  const auto took = std::chrono::steady_clock::now() - before;
+  const Duration took = read_clock() - before;
   EXPECT_GE(took, std::chrono::milliseconds(30));
   EXPECT_LT(took, std::chrono::milliseconds(400)) << "at 2 Hz, the next state would be due after 500 ms";
   EXPECT_STREQ(tendon_why(client.get()), "nothing has happened within the timeout");
