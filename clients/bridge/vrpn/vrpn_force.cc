@@ -2,17 +2,11 @@
 #include "clients/bridge/vrpn/vrpn_force.h"
 
 #include <algorithm>
-#include <chrono>
 #include <utility>
 
 namespace tendon::bridge::vrpn {
 namespace {
 
-constexpr Duration kOneBurst = std::chrono::milliseconds(10);
-constexpr Duration kLeastStale = std::chrono::milliseconds(100);
-constexpr Duration kMostStale = std::chrono::seconds(2);
-constexpr std::size_t kLeastGaps = 2;  // between three
-constexpr int kStaleGaps = 10;
 constexpr double kRounding = 1e-9;  ///< the hand can slip while it does not move
 
 }  // namespace
@@ -105,24 +99,6 @@ Touch in_base_frame(Touch touch, const View& view) {
   if (touch.stiffness) touch.stiffness = view.base_stiffness(*touch.stiffness);
   if (touch.contact) touch.contact->normal = view.base_force(touch.contact->normal);
   return touch;
-}
-
-void Freshness::heard(LocalTime now) {
-  newest_ = now;
-  if (any_ && now - counted_ < kOneBurst) return;
-  if (any_) gaps_[count_++ % kGaps] = now - counted_;
-  counted_ = now;
-  any_ = true;
-}
-
-LocalTime Freshness::until() const {
-  if (count_ < kLeastGaps) return LocalTime::max();
-  std::array<Duration, kGaps> sorted = gaps_;
-  const std::size_t known = std::min(count_, kGaps);
-  const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(known / 2);
-  std::nth_element(sorted.begin(), middle, sorted.begin() + static_cast<std::ptrdiff_t>(known));
-  if (*middle > kMostStale) return LocalTime::max();
-  return newest_ + std::clamp(kStaleGaps * *middle, kLeastStale, kMostStale);
 }
 
 }  // namespace tendon::bridge::vrpn

@@ -13,17 +13,15 @@
 #include <utility>
 #include <vector>
 
+#include "clients/bridge/bridge_loop.h"
+#include "clients/bridge/stream_freshness.h"
 #include "clients/bridge/vrpn/vrpn_force.h"
 #include "clients/bridge/vrpn/vrpn_message.h"
 #include "clients/bridge/vrpn/vrpn_station.h"
 
 namespace tendon::bridge::vrpn {
 
-/// One instant in both clocks: for intervals and for message time stamps.
-struct Moment {
-  LocalTime at{};
-  Duration since_1970{};
-};
+using bridge::Moment;
 
 /// The connection to one VRPN program (VRPN.md) as a state machine: bytes and times in; bytes, messages and the
 /// program's requests out. This class does not use sockets or clocks.
@@ -78,7 +76,7 @@ class Peer {
 
   /// The requests of the program for a station, and whether they have changed since the last call.
   Drawing& drawing(std::size_t station) { return wishes_[station].drawing; }
-  const Freshness& freshness(std::size_t station) const { return wishes_[station].freshness; }
+  const StreamFreshness& freshness(std::size_t station) const { return wishes_[station].freshness; }
   bool take_change(std::size_t station) { return std::exchange(wishes_[station].changed, false); }
 
   bool is_above_its_share() const { return allowance_ < 1; }  ///< above its message rate; reading may be delayed
@@ -95,7 +93,7 @@ class Peer {
   };
   struct Wish {
     Drawing drawing;
-    Freshness freshness;
+    StreamFreshness freshness;
     bool changed = false;
   };
   struct Told {

@@ -1,23 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "clients/bridge/vrpn/vrpn_server.h"
 
-#include <arpa/inet.h>
-#include <fcntl.h>
-#include <netinet/in.h>
-#include <netinet/tcp.h>
 #include <sys/socket.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
 #include <chrono>
 #include <stdexcept>
-#include <system_error>
 
 namespace tendon::bridge::vrpn {
 namespace {
 
-constexpr int kBacklog = 16;
 constexpr int kMaxAccepted = 16;             ///< per turn
 constexpr int kMaxHellos = 64;               ///< per turn
 constexpr int kMaxDatagrams = 256;           ///< per client and turn
@@ -26,62 +19,13 @@ constexpr int kPortTries = 16;
 /// Delay before reading a program that exceeds its rate, so that its messages are handled in batches.
 constexpr Duration kRest = std::chrono::microseconds(500);
 constexpr std::size_t kEach = 2;  ///< sockets per client
-constexpr int kKeepAliveS = 2;    ///< s, keep-alive, which detects a machine that disappeared
-constexpr int kKeepAlives = 3;    ///< number of attempts
-
-std::string words_of(int error) { return std::generic_category().message(error); }
-
-sockaddr_in socket_address(const Address& address) {
-  sockaddr_in result{};
-  result.sin_family = AF_INET;
-  result.sin_port = htons(address.port);
-  std::copy_n(address.ip.begin() + 12, 4, reinterpret_cast<std::uint8_t*>(&result.sin_addr));
-  return result;
-}
-
-Address address_of(const sockaddr_in& address) {
-  Address result;
-  result.ip[10] = result.ip[11] = 0xff;
-  std::copy_n(reinterpret_cast<const std::uint8_t*>(&address.sin_addr), 4, result.ip.begin() + 12);
-  result.port = ntohs(address.sin_port);
-  return result;
-}
 
 std::string host_of(const Address& address) {
   const std::string text = to_string(address);
   return text.substr(0, text.rfind(':'));
 }
 
-Address local_address(int socket) {
-  sockaddr_in name{};
-  socklen_t size = sizeof name;
-  ::getsockname(socket, reinterpret_cast<sockaddr*>(&name), &size);
-  return address_of(name);
-}
-
-Descriptor new_socket(int kind) { return Descriptor(::socket(AF_INET, kind | SOCK_NONBLOCK | SOCK_CLOEXEC, 0)); }
-
-bool bind_to(int socket, const Address& address) {
-  const sockaddr_in name = socket_address(address);
-  return ::bind(socket, reinterpret_cast<const sockaddr*>(&name), sizeof name) == 0;
-}
-
-void set(int socket, int level, int option, int value) { ::setsockopt(socket, level, option, &value, sizeof value); }
-
-void set_up_stream(int socket) {
-  set(socket, IPPROTO_TCP, TCP_NODELAY, 1);
-  set(socket, SOL_SOCKET, SO_SNDBUF, static_cast<int>(Peer::kMaxUnread));
-  set(socket, SOL_SOCKET, SO_KEEPALIVE, 1);
-  set(socket, IPPROTO_TCP, TCP_KEEPIDLE, kKeepAliveS);
-  set(socket, IPPROTO_TCP, TCP_KEEPINTVL, kKeepAliveS);
-  set(socket, IPPROTO_TCP, TCP_KEEPCNT, kKeepAlives);
-}
-
 }  // namespace
-
-Descriptor::~Descriptor() {
-  if (number_ >= 0) ::close(number_);
-}
 
 struct Server::Client {
   Client(std::span<const Station> stations, const Moment& now, Descriptor socket, const Address& from,
@@ -118,9 +62,8 @@ Server::Server(BridgeHost& host, Config config, LocalTime now)
   buffer_.resize(kMaxRead);
   int error = 0;
   for (int i = 0; i < kPortTries && !udp_; ++i) {  // the port may be in use for UDP even if it is free for TCP
-    tcp_ = new_socket(SOCK_STREAM);
-    set(tcp_.number(), SOL_SOCKET, SO_REUSEADDR, 1);
-    if (!bind_to(tcp_.number(), config_.listen) || ::listen(tcp_.number(), kBacklog) != 0) {
+    tcp_ = new_listener(config_.listen);
+    if (!tcp_) {
       error = errno;
       break;
     }
@@ -217,7 +160,7 @@ void Server::dial(const Moment& now, const Address& to) {
   dials_ -= 1;
   Descriptor socket = new_socket(SOCK_STREAM);
   const sockaddr_in name = socket_address(to);
-  set_up_stream(socket.number());
+  set_up_stream(socket.number(), Peer::kMaxUnread);
   if (::connect(socket.number(), reinterpret_cast<const sockaddr*>(&name), sizeof name) != 0 && errno != EINPROGRESS) {
     return;
   }
@@ -226,14 +169,11 @@ void Server::dial(const Moment& now, const Address& to) {
 
 void Server::take_connections(const Moment& now) {
   for (int i = 0; i < kMaxAccepted; ++i) {
-    sockaddr_in from{};
-    socklen_t size = sizeof from;
-    Descriptor socket(
-        ::accept4(tcp_.number(), reinterpret_cast<sockaddr*>(&from), &size, SOCK_NONBLOCK | SOCK_CLOEXEC));
+    Address address;
+    Descriptor socket = accept_next(tcp_.number(), address);
     if (!socket) return;
-    const Address address = address_of(from);
     if (!has_place("a program at " + to_string(address))) continue;
-    set_up_stream(socket.number());
+    set_up_stream(socket.number(), Peer::kMaxUnread);
     clients_.push_back(std::make_unique<Client>(stations_, now, std::move(socket), address, ++last_number_, false));
   }
 }

@@ -12,28 +12,12 @@
 #include <utility>
 #include <vector>
 
+#include "clients/bridge/alias.h"
 #include "clients/bridge/bridge_host.h"
+#include "clients/bridge/sockets.h"
 #include "clients/bridge/vrpn/vrpn_peer.h"
 
 namespace tendon::bridge::vrpn {
-
-/// An owned file descriptor.
-class Descriptor {
- public:
-  Descriptor() = default;
-  explicit Descriptor(int number) : number_(number) {}
-  Descriptor(Descriptor&& other) noexcept : number_(std::exchange(other.number_, -1)) {}
-  Descriptor& operator=(Descriptor&& other) noexcept {
-    std::swap(number_, other.number_);
-    return *this;
-  }
-  ~Descriptor();
-  int number() const noexcept { return number_; }
-  explicit operator bool() const noexcept { return number_ >= 0; }
-
- private:
-  int number_ = -1;
-};
 
 /// The sockets of a VRPN server: one port for TCP and UDP.
 ///
@@ -56,10 +40,6 @@ class Server {
   static constexpr int kDialsPerSecond = 20;
   static constexpr Duration kPatience = std::chrono::seconds(3);
 
-  struct Alias {
-    std::string name;
-    std::size_t index;  ///< index of the device at the BridgeHost
-  };
   struct Config {
     Address listen;  ///< IPv4; port 0: any
     std::vector<Alias> names;

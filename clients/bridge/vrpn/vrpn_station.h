@@ -34,9 +34,9 @@ struct Station {
 class Peer;
 
 /// Requests from a BridgedDevice what a program has drawn at its station: after each change, at most 4000 times per
-/// second, and twice per second while it is fresh (Freshness) to keep the ownership. When the drawing is removed, it
-/// requests a zero force, after which the BridgedDevice releases the program. If another program owns the device, the
-/// program is informed that its force is not applied. Thread-safe: no. Realtime-safe: no.
+/// second, and twice per second while it is fresh (StreamFreshness) to keep the ownership. When the drawing is removed,
+/// it requests a zero force, after which the BridgedDevice releases the program. If another program owns the device,
+/// the program is informed that its force is not applied. Thread-safe: no. Realtime-safe: no.
 class Asker {
  public:
   /// `number` identifies the program for each BridgedDevice, and `who` in messages. `i` is the index of the station.

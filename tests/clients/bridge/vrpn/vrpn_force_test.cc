@@ -3,13 +3,10 @@
 
 #include <gtest/gtest.h>
 
-#include <chrono>
 #include <limits>
 
 namespace tendon::bridge::vrpn::vrpn_force_test {
 namespace {
-
-using std::chrono::milliseconds;
 
 constexpr double kStiffest = 2000;
 
@@ -135,43 +132,6 @@ TEST(VrpnForce, IsTurnedIntoTheDevicesOwnFrame) {
   EXPECT_TRUE(touch.force.isApprox(Vec3(2, 0, 0), 1e-9)) << "up";
   EXPECT_TRUE(touch.stiffness.value().isApprox(Mat3(Vec3(2000, 0, 0).asDiagonal()), 1e-9));
   EXPECT_TRUE(touch.contact->normal.isApprox(Vec3::UnitX(), 1e-12));
-}
-
-constexpr LocalTime kStart{std::chrono::seconds(100)};
-
-TEST(VrpnFreshness, AFieldThatIsSentOnceOrTwiceLivesAsLongAsItsConnection) {
-  Freshness freshness;
-  freshness.heard(kStart);
-  freshness.heard(kStart + milliseconds(500));
-  EXPECT_EQ(freshness.until(), LocalTime::max());
-}
-
-TEST(VrpnFreshness, AStreamIsStaleAfterTenOfItsMedianGaps) {
-  for (const auto& [gap_ms, stale_ms] :
-       {std::pair{1, 100}, {5, 100}, {16, 160}, {33, 330}, {200, 2000}, {1000, 2000}}) {
-    Freshness freshness;
-    LocalTime now = kStart;
-    for (int i = 0; i < 100; ++i) freshness.heard(now += milliseconds(gap_ms));
-    EXPECT_NEAR(static_cast<double>((freshness.until() - now) / milliseconds(1)), stale_ms, gap_ms < 10 ? 20 : 0)
-        << gap_ms;
-  }
-}
-
-TEST(VrpnFreshness, ABurstOfSettingsIsNoStream) {
-  Freshness freshness;
-  for (int i = 0; i < 50; ++i) freshness.heard(kStart + std::chrono::microseconds(100 * i));
-  EXPECT_EQ(freshness.until(), LocalTime::max());
-}
-
-TEST(VrpnFreshness, OnePauseIsForgivenAndAProgramOfRareChangesIsNoStream) {
-  Freshness freshness;
-  LocalTime now = kStart;
-  for (int i = 0; i < 20; ++i) freshness.heard(now += milliseconds(20));
-  freshness.heard(now += milliseconds(1500));
-  EXPECT_EQ(freshness.until() - now, milliseconds(200)) << "the median";
-  freshness.forget();
-  for (int i = 0; i < 5; ++i) freshness.heard(now += milliseconds(3000));
-  EXPECT_EQ(freshness.until(), LocalTime::max()) << "it would end before the next could come";
 }
 
 }  // namespace
