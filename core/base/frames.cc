@@ -84,12 +84,14 @@ Quat quaternion_of(const Mat3& rotation) {
 Mat3 matrix_of(const Quat& q) { return Eigen::Quaterniond(q.w, q.x, q.y, q.z).normalized().toRotationMatrix(); }
 
 std::span<const Frame> frames() {
-  static const std::array<Frame, 7> kFrames = {{
+  static const std::array<Frame, 8> kFrames = {{
       {"operator", "x right, y up, z to the user", "OpenXR 1.0, section 2.16; WebXR", of_rows(kX, kY, kZ), 1},
       {"openhaptics", "x right, y up, z to the user", "VRPN's Phantom server, OpenHaptics", of_rows(kX, kY, kZ), 1},
       {"chai3d", "x to the user, y right, z up", "CHAI3D", of_rows(kZ, kX, kY), 1},
       {"inverse", "x right, y forward, z up", "Haply Inverse, basis XYZ", of_rows(kX, -kZ, kY), 1},
       {"ros", "x forward, y left, z up", "ROS REP 103", of_rows(-kZ, -kX, kY), 1},
+      {"ras", "x left, y to the user, z up; mm", "3D Slicer: right, anterior, superior; the patient faces the user",
+       of_rows(-kX, kZ, kY), 1000},
       {"unity", "x right, y up, z forward; left-handed", "Unity", of_rows(kX, kY, -kZ), 1},
       {"unreal", "x forward, y right, z up; left-handed; cm", "Unreal Engine", of_rows(-kZ, kX, kY), 100},
   }};

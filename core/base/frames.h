@@ -40,7 +40,7 @@ struct Frame {
   std::string_view axes;    ///< description, such as "x forward, y left, z up"
   std::string_view source;  ///< document that defines the frame
   Mat3 from_operator;       ///< M
-  double per_metre = 1;     ///< 100 for centimetres
+  double per_metre = 1;     ///< 100 for centimetres, 1000 for millimetres
 
   bool is_right_handed() const { return from_operator.determinant() > 0; }
 
@@ -57,7 +57,7 @@ struct Frame {
   Mat3 operator_orientation(const Mat3& here) const { return from_operator.transpose() * here * from_operator; }
 };
 
-/// The known frames: operator, VRPN and OpenHaptics, CHAI3D, Inverse, ROS, Unity, Unreal.
+/// The known frames: operator, VRPN and OpenHaptics, CHAI3D, Inverse, ROS, RAS, Unity, Unreal.
 std::span<const Frame> frames();
 
 /// Returns null if no frame has this name.

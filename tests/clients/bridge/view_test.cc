@@ -99,6 +99,7 @@ TEST(View, ThePageForNewcomersTellsTheFramesAsTheyAre) {
                                                                     {"openhaptics", "| right, up, to the user |"},
                                                                     {"inverse", "| right, forward, up |"},
                                                                     {"ros", "| forward, left, up |"},
+                                                                    {"ras", "| right, anterior, superior |"},
                                                                     {"unity", "| right, up, forward |"},
                                                                     {"unreal", "| forward, right, up |"}}) {
     ASSERT_NE(find_frame(name), nullptr) << name;

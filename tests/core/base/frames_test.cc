@@ -126,6 +126,7 @@ TEST(Frames, EachMatrixIsWhatItsWordsSay) {
     EXPECT_EQ(frame.from_operator, expected) << frame.name;
     EXPECT_EQ(frame.is_right_handed(), frame.axes.find("left-handed") == std::string_view::npos) << frame.name;
     EXPECT_EQ(frame.per_metre == 100, frame.axes.ends_with("cm")) << frame.name;
+    EXPECT_EQ(frame.per_metre == 1000, frame.axes.ends_with("mm")) << frame.name;
   }
 }
 
