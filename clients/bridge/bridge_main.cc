@@ -52,6 +52,7 @@ int run(int argc, char** argv) {
   app.require_subcommand(1);
   Chosen chosen;
   add_chai3d(app, chosen);
+  add_igtl(app, chosen);
   add_inverse(app, chosen);
   add_ros2(app, chosen);
   add_vrpn(app, chosen);

@@ -20,6 +20,7 @@ void add_common(CLI::App& app, BridgeConfig& config);
 
 // Each adds a subcommand, defined in FOLDER/…_main.cc, which sets `chosen` when it is selected.
 void add_chai3d(CLI::App& app, Chosen& chosen);
+void add_igtl(CLI::App& app, Chosen& chosen);
 void add_inverse(CLI::App& app, Chosen& chosen);
 void add_ros2(CLI::App& app, Chosen& chosen);
 void add_vrpn(CLI::App& app, Chosen& chosen);
