@@ -254,6 +254,10 @@ tendon_package(fastdds DEBIAN libfastrtps-dev HEADERS fastdds/dds/domain/DomainP
   LIBRARIES fastrtps fastcdr)
 tendon_package(go DEBIAN golang-go PROGRAM go RUN version VERSION 1.18)
 tendon_package(mkoctfile DEBIAN octave-dev PROGRAM mkoctfile RUN --version VERSION 6)
+tendon_package(openigtlink DEBIAN libopenigtlink-dev HEADERS openigtlink/igtlTransformMessage.h LIBRARIES OpenIGTLink
+  PROBE "#include <openigtlink/igtlTransformMessage.h>\nint main() { return igtl::TransformMessage::New()->GetPackSize() < 0; }")
+tendon_package(openigtlink_examples DEBIAN openigtlink-examples FILES Receiver/ReceiveClient.cxx
+  PATHS /usr/share/doc/openigtlink-examples/examples)
 tendon_package(zeromq DEBIAN libzmq3-dev PKG_CONFIG libzmq>=4.3 HEADERS zmq.h)
 tendon_package(grpc DEBIAN libgrpc++-dev HEADERS grpcpp/grpcpp.h LIBRARIES grpc++ grpc gpr absl_synchronization)
 tendon_package(grpc_plugin DEBIAN protobuf-compiler-grpc PROGRAM grpc_cpp_plugin)

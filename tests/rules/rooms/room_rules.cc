@@ -82,6 +82,7 @@ const std::vector<Door>& front_doors() {
         "clients/cpp/run.cc", "clients/dashboard/page_json.cc", "clients/dashboard/foxglove_text.cc",
         "clients/bridge/bridge_host.cc", "clients/bridge/inverse/inverse_json.cc",
         "clients/softbody/cluster/estimate.cc", "clients/softbody/explain.cc", "*_main.cc"}},
+      {"the library of OpenIGTLink", {"openigtlink/"}, {"tests/clients/bridge/igtl/igtl_library_test.cc"}},
       {"PETSc", {"petscksp.h"}, {"clients/softbody/mpi/spread_solver.cc"}},
       {"preCICE", {"precice/"}, {"clients/precice/precice_engine.cc", "tests/clients/precice/"}},
       {"prometheus-cpp", {"prometheus/"}, {"clients/dashboard/metrics.cc"}},
