@@ -16,8 +16,8 @@ struct Alias {
 
 /// Reads the options --name: "Phantom0=right", or "Phantom0" for the first device. Adds the devices to `devices`
 /// (BridgeConfig). Without options, each device has its own name, and `fallback` is the name of the server's first
-/// device if none is given. A name has 1 to `longest` characters without @, :, / and spaces. Throws std::runtime_error
-/// "--name …: expected …" if a name is different or not unique.
+/// device if none is given. Names must be unique, and must not be longer than `longest` or
+/// contain any of @, :, / and spaces. Throws std::runtime_error with the option and the expected form.
 std::vector<Alias> read_aliases(std::span<const std::string> names, std::vector<std::string>& devices,
                                 std::size_t longest, const std::string& fallback);
 

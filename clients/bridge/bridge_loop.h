@@ -10,16 +10,16 @@
 
 namespace tendon::bridge {
 
-/// One instant in both clocks: for intervals and for message time stamps.
+/// The current time of both clocks. The second one is used for the time stamps of messages.
 struct Moment {
   LocalTime at{};
   Duration since_1970{};
 };
 
-/// The main loop of a bridge with sockets of its own, until a signal is caught or until `end`. `server` serves its
-/// programs in turn(Moment), which returns the time of the next turn, or `at` if a requested force should be sent
-/// immediately; polled() are its sockets, and counts() are for the JSON lines. `since_1970` reads the system clock, at
-/// most once per second, because it may be adjusted. Returns the exit code. Thread-safe: no. Realtime-safe: no.
+/// Runs the main loop of a bridge until a signal is caught or until `end`, and returns the exit code. The server must
+/// implement turn(Moment), which returns the time of the next turn, or `at` if a force should be sent immediately. It
+/// must also implement polled() for its sockets, and counts() for the JSON lines. `since_1970` is called once per second
+/// because the system clock may be adjusted. Thread-safe: no. Realtime-safe: no.
 template <class Server>
 int run_bridge(BridgeHost& host, Server& server, const StopSignals& signals, LocalTime end, Duration (*since_1970)()) {
   constexpr int kTurnsAtOnce = 4;

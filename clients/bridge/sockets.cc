@@ -12,8 +12,8 @@ namespace tendon::bridge {
 namespace {
 
 constexpr int kBacklog = 16;
-constexpr int kKeepAliveS = 2;  ///< s, keep-alive, which detects a machine that disappeared
-constexpr int kKeepAlives = 3;  ///< number of attempts
+constexpr int kKeepAliveS = 2;  ///< s, the interval of keep-alive packets
+constexpr int kKeepAlives = 3;  ///< the number of packets before the connection is closed
 
 void set(int socket, int level, int option, int value) { ::setsockopt(socket, level, option, &value, sizeof value); }
 

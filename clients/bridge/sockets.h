@@ -43,8 +43,8 @@ bool bind_to(int socket, const Address& address);
 Descriptor new_listener(const Address& address);
 /// Accepts the next connection. Returns an empty Descriptor if none is waiting.
 Descriptor accept_next(int listener, Address& from);
-/// For the TCP connection to a program: no delay, at most `unread` bytes in the kernel that the program has not read,
-/// and an error within 8 s if its machine disappears.
+/// Sets the options of a TCP connection to a program. The size of the send buffer is set to `unread`. If the machine of
+/// the program disappears, the connection is closed after 8 s.
 void set_up_stream(int socket, std::size_t unread);
 
 }  // namespace tendon::bridge

@@ -18,11 +18,11 @@ constexpr std::size_t kForceSize = 2 + sizeof(std::uint64_t) + 3 * sizeof(double
 constexpr std::uint16_t kAscii = 3;  ///< MIBenum
 constexpr double kPerSecond = 0x1p32;
 
-// A unit has 4 bits of prefix, and six times 6 bits of unit and 4 bits of exponent.
+// The prefix of a unit has 4 bits. It is followed by six pairs of a unit (6 bits) and an exponent (4 bits).
 constexpr unsigned kPrefixAt = 60;
 constexpr std::uint64_t kNewton = std::uint64_t{0x0b} << 54U | std::uint64_t{1} << 50U;
 constexpr std::uint64_t kNewtonWithoutExponent = std::uint64_t{0x0b} << 54U;
-/// Powers of ten of the prefixes, in the order of their numbers; number 8 is not assigned.
+/// The exponents of ten for each prefix. The prefix 8 is not defined.
 constexpr std::array<int, 16> kPrefixes = {0, 1, 2, 3, 6, 9, 12, 15, 0, -1, -2, -3, -6, -9, -12, -15};
 
 constexpr std::array<std::uint64_t, 256> crc_table() {

@@ -47,18 +47,18 @@ struct Header {
   std::uint64_t body_size = 0;  ///< may be a lie
   std::uint64_t crc = 0;
 };
-/// `bytes` has at least kHeaderSize bytes. Returns nullopt if they are not a header of OpenIGTLink: another version, or
-/// a type or name that is not printable ASCII padded with zeros, or an empty type.
+/// Returns nullopt if the version is not supported, if the type is empty, or if a text is not printable ASCII. `bytes`
+/// must contain at least kHeaderSize bytes.
 std::optional<Header> read_header(Bytes bytes);
 
-/// The position of a TRANSFORM, mm. At most kFarthest in each axis, because a larger one is an error of units.
+/// Returns the position of a TRANSFORM, in mm. If a component is larger than kFarthest, the units are probably wrong.
 inline constexpr double kFarthest = 10'000;
 std::optional<Vec3> read_position(Bytes body);
 
-/// The three values of a SENSOR, converted to N. The unit must be newton, with any prefix, or not specified.
+/// Returns the three values of a SENSOR, in N. The unit must be newton with any prefix, or it must be 0.
 std::optional<Vec3> read_force(Bytes body);
 
-/// The name and the time of a message that is sent.
+/// The name and the time stamp of a message.
 struct Label {
   std::string_view name;  ///< at most kLongestName bytes
   Duration since_1970;

@@ -104,7 +104,7 @@ LocalTime Server::turn(const Moment& now) {
   }
   bool asked = false;
   LocalTime next = LocalTime::max();
-  for (std::size_t c = 0; c < clients_.size(); ++c) {  // polled_ covers these clients, in this order
+  for (std::size_t c = 0; c < clients_.size(); ++c) {  // polled_ has the same order
     Client& client = *clients_[c];
     if (polled_[1 + c].revents != 0) read(now.at, client);
     for (std::size_t i = 0; i < stations_.size(); ++i) {

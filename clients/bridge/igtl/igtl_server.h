@@ -18,11 +18,11 @@
 
 namespace tendon::bridge::igtl {
 
-/// The sockets of an OpenIGTLink server, for run_bridge(). Each program that connects has a Session.
+/// An OpenIGTLink server for run_bridge(). It creates a Session for each program that connects.
 ///
-/// * **Limits.** At most kMaxClients. Further connections are closed, and a message is printed for the first of them.
-///   At most kMaxRead bytes of a program are read in kRest, so that a flood or an image delays nobody.
-/// * **Ends.** At the end of a connection, its devices are released, and the server fades the last force.
+/// * **Limits.** The server accepts kMaxClients programs, and closes all other connections. It reads at most kMaxRead
+///   bytes from a program per kRest, so that a flood or an image does not delay the other programs.
+/// * **Ends.** If a connection ends, the server releases the devices of the program, and the last force is faded.
 ///
 /// Thread-safe: no. Realtime-safe: no (system calls).
 class Server {
@@ -37,7 +37,7 @@ class Server {
     Station::Config station;  ///< for all names; `name` is replaced
   };
 
-  Server(BridgeHost& host, Config config);  ///< throws std::runtime_error "cannot listen at …: …"
+  Server(BridgeHost& host, Config config);  ///< throws std::runtime_error if the address cannot be used
   ~Server();
 
   const Address& address() const noexcept { return address_; }

@@ -130,7 +130,7 @@ bool Session::ask(const Moment& now, std::size_t i, BridgedDevice& bridged) {
   if (wish.pulls && !pulls) sentences_.push_back(who + " has stopped sending " + station.target() + ", which ends");
   wish.pulls = pulls;
   wish.pushes = pushes;
-  if (!pulls && !pushes) return false;  // the last request has expired, and the server fades its force
+  if (!pulls && !pushes) return false;  // the server fades the force of the last request
   wish.asked = now.at;
   LocalTime until = now.at + kAskedFor;
   if (pulls) until = std::min(until, target_until);

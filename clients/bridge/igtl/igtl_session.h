@@ -16,7 +16,7 @@
 
 namespace tendon::bridge::igtl {
 
-/// The connection to one OpenIGTLink program, without its socket: bytes in, bytes and requested forces out.
+/// The state of the connection to one OpenIGTLink program. This class does not use sockets or clocks.
 ///
 ///     session.take(now, bytes);                             for everything received, then
 ///     for each station: session.ask(moment, i, device);     also at due()
@@ -27,18 +27,20 @@ namespace tendon::bridge::igtl {
 ///
 ///     F = stiffness (target − p) + command       the spring follows the hand at the rate of the device
 ///
-/// * **Freshness.** A target is valid as long as StreamFreshness says, so one that was sent once is valid until the
-///   program disconnects. A command is valid for kCommandFor. If neither is valid, the server fades the force.
-/// * **Newest wins.** Of the messages that arrive between two requests, kShortest apart, the newest is used.
-/// * **Bounded.** Bodies longer than kLongestBody, and those of unused messages, are skipped without a copy. The
-///   connection ends (`end()`) after a header that is not OpenIGTLink, an announced size above kLongestSkipped, or more
-///   than kMaxUnread unread bytes. Other invalid input is counted, and a message tells the first one of each name.
+/// * **Freshness.** StreamFreshness determines how long a target is valid. If the program only sends it once, it is
+///   valid until the program disconnects. A command is valid for kCommandFor. When both have expired, the server fades
+///   the force.
+/// * **Newest wins.** The session requests a force at most once per kShortest, and uses the newest messages.
+/// * **Bounded.** The session does not store bodies that it does not use or that are longer than kLongestBody. It ends
+///   the connection (`end()`) if a header is not valid, if a size is larger than kLongestSkipped, or if the program has
+///   more than kMaxUnread unread bytes. It counts all other invalid messages, and reports the first one of each name.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class Session {
  public:
   static constexpr std::size_t kLongestBody = 4096;
-  static constexpr std::uint64_t kLongestSkipped = std::uint64_t{1} << 30U;  ///< a volume of 512³ voxels of 64 bit
+  static constexpr std::uint64_t kLongestSkipped = std::uint64_t{1}
+                                                   << 30U;  ///< the size of an image with 512³ voxels of 64 bits
   static constexpr std::size_t kMaxUnread = 64 * 1024;
   static constexpr Duration kCommandFor = std::chrono::milliseconds(200);  ///< two intervals at 10 Hz
   static constexpr Duration kShortest = std::chrono::microseconds(250);
@@ -56,7 +58,7 @@ class Session {
   void take(LocalTime now, Bytes bytes);
   /// Requests the force for station `i`, if it is due. Returns true if it should be sent immediately.
   bool ask(const Moment& now, std::size_t i, BridgedDevice& bridged);
-  LocalTime due() const noexcept;  ///< time at which an input becomes invalid
+  LocalTime due() const noexcept;  ///< the next time when ask() must be called
 
   void send(Bytes messages);
   bool take_status_request() { return std::exchange(wants_status_, false); }  ///< it has sent GET_STATUS
@@ -92,7 +94,7 @@ class Session {
   std::span<const Station> stations_;
   std::vector<Wish> wishes_;
   Buffer in_;
-  std::uint64_t skip_ = 0;  ///< bytes that follow and are not used
+  std::uint64_t skip_ = 0;  ///< the number of bytes that are skipped
   Buffer out_;
   std::size_t sent_ = 0;
   bool wants_status_ = true;

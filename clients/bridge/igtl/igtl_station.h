@@ -22,7 +22,7 @@ namespace tendon::bridge::igtl {
 ///     NAMETarget   TRANSFORM   (input) position to which a spring pulls the hand
 ///     NAMECommand  SENSOR      (input) force on the hand
 ///
-/// The times of the messages are those at which the state was measured. Thread-safe: no. Realtime-safe: no.
+/// The time stamp of a pose or a force is the time when the device measured it. Thread-safe: no. Realtime-safe: no.
 class Station {
  public:
   static constexpr std::size_t kLongestName = igtl::kLongestName - 1 - std::string_view("Command").size();
@@ -44,7 +44,7 @@ class Station {
     return {config_.frame, bridged.handle() ? bridged.handle()->operator_from_device : std::nullopt};
   }
 
-  /// Must be called after each turn of the BridgedDevice. Returns the messages that are due, for all programs.
+  /// Returns the messages that are due. Call this after each turn of the BridgedDevice.
   Bytes turn(const Moment& now, const BridgedDevice& bridged);
   /// The newest STATUS and STRING, for a program that has connected or sent GET_STATUS.
   Bytes greeting() const noexcept { return greeting_; }

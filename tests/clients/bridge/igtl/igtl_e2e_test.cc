@@ -56,7 +56,7 @@ frequency_hz = 1
 kind = "none"
 )";
 
-/// A program with a socket and nothing else.
+/// This program only uses a socket.
 class Guest {
  public:
   explicit Guest(const std::string& address, int receive_buffer = 0)

@@ -376,7 +376,7 @@ TEST(IgtlSession, AHundredThousandMutatedMessagesAreReadOnlyIfWhole) {
     invalid += session.counts().invalid;
     ignored += session.counts().ignored;
     ended += session.end().empty() ? 0 : 1;
-    // Each used message is a copy of an original from its size on.
+    // A message must only be used if its size, CRC and body have not changed.
     std::uint64_t whole = 0;
     for (auto at = bytes.begin(); at != bytes.end(); ++at) {
       at = std::search(at, bytes.end(), original.begin() + kSizeAt, original.end());

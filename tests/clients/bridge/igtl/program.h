@@ -11,7 +11,7 @@
 
 #include "clients/bridge/igtl/igtl_message.h"
 
-// The bytes that an OpenIGTLink program sends, and what it reads.
+// These functions are used to test the bridge with the messages of a program.
 
 namespace tendon::bridge::igtl {
 
@@ -34,7 +34,7 @@ void put(Buffer& message, std::size_t at, Whole value) {
     message.at(at + i) = static_cast<std::byte>(std::uint64_t{value} >> (8 * (sizeof(Whole) - 1 - i)) & 0xffU);
   }
 }
-inline constexpr std::size_t kSizeAt = 42;  ///< of the body, in the header
+inline constexpr std::size_t kSizeAt = 42;  ///< the position of the size in the header
 inline constexpr std::size_t kCrcAt = 50;
 
 /// Corrects the CRC after a change of the body.
@@ -68,7 +68,7 @@ struct Said {
     return static_cast<double>(std::bit_cast<float>(static_cast<std::uint32_t>(whole(4 * i, 4))));
   }
   Vec3 position() const { return {f32(9), f32(10), f32(11)}; }
-  std::string text(std::size_t at) const {  ///< from byte `at` to the end, without the zero
+  std::string text(std::size_t at) const {  ///< the text that starts at this byte
     std::string words(reinterpret_cast<const char*>(body.data()) + at, body.size() - at);
     return words.substr(0, words.find('\0'));
   }
