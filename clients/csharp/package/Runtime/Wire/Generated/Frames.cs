@@ -1012,6 +1012,65 @@ namespace Tendon {
     }
   }
 
+  /// <summary>This table is added to the force of the springs of a material. The correction is zero at the surface, and
+  /// is interpolated linearly between the entries. The last entry is also used for all greater depths. The slope of the
+  /// table must be at least −0.9 times the stiffness of the material. The sum of the slope and the stiffnesses must not
+  /// exceed the maximum stiffness of the server.</summary>
+  public sealed class FieldDepthTable {
+    /// <summary>The number of the material</summary>
+    public uint Material;
+    /// <summary>M, the spacing of the entries</summary>
+    public double Step;
+    /// <summary>N, entry i is for the depth (i + 1) · Step</summary>
+    public readonly Reals Force = new Reals(16);
+
+    public void Clear() {
+      Material = 0;
+      Step = 0;
+      Force.Clear();
+    }
+
+    public void CopyFrom(FieldDepthTable other) {
+      Material = other.Material;
+      Step = other.Step;
+      Force.CopyFrom(other.Force);
+    }
+
+    /// <summary>The name of the first field that is out of bounds, or null.</summary>
+    internal string Objection() {
+      if (Material > 7) return "material";
+      if (!(Step >= 0.0001 && Step <= 0.1)) return "step_m";
+      if (!Bounds.AreNumbers(Force, 1, 16, -1e12, 1e12)) return "force_n";
+      return null;
+    }
+
+    internal void Read(ref ProtoReader r) {
+      while (r.Next()) {
+        switch (r.Tag) {
+          case 8:
+            Material = r.UInt32();
+            break;
+          case 17:
+            Step = r.Double();
+            break;
+          case 26:
+          case 25:
+            r.Read(Force);
+            break;
+          default:
+            r.Skip();
+            break;
+        }
+      }
+    }
+
+    internal void Write(ref ProtoWriter w) {
+      w.UInt32(8, Material);
+      w.Double(17, Step);
+      w.Write(26, Force);
+    }
+  }
+
   /// <summary>The end of the session. Either way, sent three times.</summary>
   public sealed class Bye {
     /// <summary>Reason for the end</summary>
