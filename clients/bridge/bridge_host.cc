@@ -19,7 +19,10 @@ constexpr Duration kLongestWait = std::chrono::milliseconds(100);  ///< signals 
 constexpr Duration kLineEvery = std::chrono::seconds(1);
 
 BridgedDevice::Config config_of(const BridgeConfig& config, const std::string& device, const std::string& found) {
-  BridgedDevice::Config of_bridged{.client = config.client, .new_seed = seed_from_system, .observe = config.observe};
+  BridgedDevice::Config of_bridged{.client = config.client,
+                                   .new_seed = seed_from_system,
+                                   .observe = config.observe,
+                                   .always_observe = config.always_observe};
   of_bridged.client.device = device.empty() ? found : device;
   return of_bridged;
 }

@@ -23,7 +23,8 @@ struct BridgeConfig {
   ForceClient::Config client{};        ///< `device` and `seed` are set for each BridgedDevice
   std::vector<std::string> devices{};  ///< device names; empty: the first device of the server, named "device"
   bool observe = false;
-  bool json = false;  ///< print one line per second to stdout
+  bool always_observe = false;  ///< see BridgedDevice::Config
+  bool json = false;            ///< print one line per second to stdout
 };
 
 /// All devices of a bridge with their sockets, for use in the main loop of the bridge.

@@ -15,6 +15,7 @@ using Phase = ForceClient::Phase;
 constexpr std::uint64_t kReordered = 1000;
 
 constexpr std::size_t kMaxSentences = 16;
+constexpr Duration kDisarmPatience = std::chrono::seconds(5);  ///< two attempts to open a session
 
 bool is_open(const std::unique_ptr<ForceClient>& client) { return client && client->phase() == Phase::kOpen; }
 
@@ -92,8 +93,8 @@ LocalTime BridgedDevice::turn(LocalTime now) {
   now_ = now;
   LocalTime next = LocalTime::max();
   if (controller_ || owner_ != 0) {
-    const LocalTime end = asked_ + config_.idle;
-    if (now >= end) {
+    const LocalTime end = disarm_until_.value_or(asked_ + config_.idle);
+    if (now >= end && !disarm_until_) {
       owner_ = 0;
       physics_ = nullptr;
       if (controller_) end_controller(now);
@@ -105,8 +106,9 @@ LocalTime BridgedDevice::turn(LocalTime now) {
     next = std::min(next, controller_->turn(now));
     learn_from(*controller_);
     note_changes();
+    if (turn_disarm(now)) next = now;
   }
-  if (pushes()) {
+  if (pushes() && !config_.always_observe) {
     if (watcher_ && controller_->stats().states > 0) {
       watcher_->stop(now);
       watcher_.reset();
@@ -152,6 +154,41 @@ BridgedDevice::Answer BridgedDevice::ask(Program program, LocalTime now, LocalTi
   return Answer::kTaken;
 }
 
+bool BridgedDevice::disarm(LocalTime now) {
+  if (config_.observe || stopped_) return false;
+  if (disarm_until_) return true;
+  disarm_until_ = now + kDisarmPatience;
+  disarm_session_.reset();
+  if (!controller_) controller_ = new_client(now, true);
+  return true;
+}
+
+/// Returns true if a request is waiting to be sent.
+bool BridgedDevice::turn_disarm(LocalTime now) {
+  if (!disarm_until_) return false;
+  const ForceClient::Stats stats = controller_->stats();
+  if (now >= *disarm_until_) {
+    say("could not be disarmed: " + (stats.reason.empty() ? "no answer" : stats.reason));
+    disarm_until_.reset();
+    return false;
+  }
+  if (stats.phase != Phase::kOpen) return false;
+  if (disarm_session_ != stats.sessions) {
+    if (!controller_->disarm()) return false;
+    disarm_session_ = stats.sessions;
+    return true;
+  }
+  const auto& answer = controller_->order_answer();
+  if (!answer) return false;
+  if (answer->code == Code::kBusy) {
+    disarm_session_.reset();
+    return false;
+  }
+  say(answer->code == Code::kOk ? "was disarmed for a program" : "could not be disarmed: " + answer->detail);
+  disarm_until_.reset();
+  return false;
+}
+
 void BridgedDevice::release(Program program) {
   if (owner_ != program) return;
   owner_ = 0;
@@ -191,7 +228,7 @@ std::string BridgedDevice::connection_in_words() const {
 }
 
 std::string BridgedDevice::force_in_words() const {
-  if (pushes()) return "uses the forces of a program";
+  if (pushes()) return owner_ != 0 ? "uses the forces of a program" : "";
   if (!controller_) return said_of_force_.empty() ? "" : "uses no forces any more: no program requests one";
   const ForceClient::Stats stats = controller_->stats();
   if (is_between_attempts(stats.phase)) return "uses no forces: " + stats.reason;
@@ -203,6 +240,10 @@ std::string BridgedDevice::force_in_words() const {
 void BridgedDevice::note(std::string& said, std::string words) {
   if (words.empty() || words == said) return;
   said = words;
+  say(std::move(words));
+}
+
+void BridgedDevice::say(std::string words) {
   sentences_.push_back(std::move(words));
   if (sentences_.size() > kMaxSentences) sentences_.pop_front();
 }

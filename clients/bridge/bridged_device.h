@@ -37,6 +37,9 @@ class BridgedDevice {
     std::function<Seed()> new_seed{};
     bool observe = false;                     ///< drop the forces of all programs
     Duration idle = std::chrono::seconds(1);  ///< the owner and the channel are released after this time
+    /// Keeps the session of the observer while a force is requested, because it receives the device_report(). During
+    /// this time, each state is received twice.
+    bool always_observe = false;
   };
 
   struct Route {  // each of the two sessions has its own socket
@@ -74,6 +77,10 @@ class BridgedDevice {
   /// Requests a force field that answers each state until `until`. push() and ask() replace the program's last request.
   Answer ask(Program program, LocalTime now, LocalTime until, Physics physics);
   void release(Program program);  ///< does nothing if the program is not the owner
+  /// Asks the server to disarm the device. This does not require the channel, but a session as a controller, which is
+  /// opened if necessary. If the session is lost, the request is repeated in the next one for up to 5 s. The result is
+  /// a message. Returns false if Config::observe is set, and after stop().
+  bool disarm(LocalTime now);
   Program owner() const noexcept { return owner_; }
 
   bool pushes() const noexcept { return controller_ && controller_->holds(); }  ///< the server accepts forces from here
@@ -82,7 +89,8 @@ class BridgedDevice {
   std::uint64_t forces_unusable() const noexcept;
   LinkStats link() const;  ///< statistics of the session that receives the states
   /// Newest reports of the server in the current sessions: on the forces, while a channel is held; and on the loop of
-  /// the device, with ForceClient::Config::diagnostics and only while no force is requested.
+  /// the device, with ForceClient::Config::diagnostics. While a force is requested, the latter requires
+  /// Config::always_observe.
   std::optional<LinkReport> report() const { return controller_ ? controller_->report() : std::nullopt; }
   std::optional<DeviceReport> device_report() const { return watcher_ ? watcher_->device_report() : std::nullopt; }
 
@@ -104,9 +112,11 @@ class BridgedDevice {
   void learn_from(const ForceClient& client);
   Touch answer(const DeviceState& state);
   void end_controller(LocalTime now);
+  bool turn_disarm(LocalTime now);
   const ForceClient& speaker() const noexcept { return watcher_ ? *watcher_ : *controller_; }
   std::string connection_in_words() const;
   std::string force_in_words() const;
+  void say(std::string words);
   void note(std::string& said, std::string words);
   void note_changes();
 
@@ -130,6 +140,8 @@ class BridgedDevice {
   bool once_ = false;  ///< physics_ is a single force
   LocalTime asked_{};
   LocalTime until_{};
+  std::optional<LocalTime> disarm_until_;        ///< there is no answer yet
+  std::optional<std::uint64_t> disarm_session_;  ///< the session in which the request was sent
   std::uint64_t dropped_ = 0;
   std::uint64_t forces_before_ = 0;  ///< sent by previous controllers
   std::uint64_t unusable_before_ = 0;
