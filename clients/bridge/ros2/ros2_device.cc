@@ -126,6 +126,9 @@ bool RosDevice::clutch_held() const { return clutch_ && (bridged_.state()->butto
 RosDevice::Messages RosDevice::messages(LocalTime now, Duration since_1970) {
   Messages due;
   learn();
+  if (crtk_) {
+    due.operating_state = crtk_->message(now, {ros_time(now.time_since_epoch() + since_1970), config_.name + "_base"});
+  }
   if (!bridged_.state()) {
     if (config_.servo) config_.servo->lose();
     return due;
@@ -140,60 +143,89 @@ RosDevice::Messages RosDevice::messages(LocalTime now, Duration since_1970) {
   due.pose = view.pose(state, stamp);
   due.twist = view.twist(state, stamp);
   due.wrench = view.wrench(state, stamp);
+  if (crtk_) {
+    due.measured_cf = due.wrench;
+    if (config_.negate_measured) {
+      due.measured_cf->force *= -1;
+      due.measured_cf->torque *= -1;
+    }
+  }
   due.joints = joints_of(state, handle, {stamp, view.base_id()});
   if (config_.servo) due.servo = config_.servo->take(*due.pose, *due.twist, clutch_held());
   return due;
 }
 
-RosDevice::Program* RosDevice::program_of(std::uint64_t writer, std::string_view called) {
-  const auto found = programs_.find(writer);
+RosDevice::Program* RosDevice::program_of(const RosInput& input) {
+  const auto found = programs_.find(input.writer);
   if (found != programs_.end()) return &found->second;
   if (programs_.size() == kMostPrograms) return nullptr;
-  return &programs_.emplace(writer, Program{.number = ++numbers_, .called = printable(called)}).first->second;
+  const Program program{.number = ++numbers_, .called = printable(input.called), .topic = input.topic};
+  return &programs_.emplace(input.writer, program).first->second;
 }
 
 void RosDevice::drop(Program& program, const std::string& why, LocalTime now) {
-  const std::string sentence = "a wrench_command of " + program.called + " was dropped: " + why;
-  refusal_ = sentence;
+  refusal_ = "a " + std::string(topic_name(program.topic)) + " of " + program.called + " was dropped: " + why;
+  say_of(program, refusal_, now);
+}
+
+/// Each message once, and at most one per second and program.
+void RosDevice::say_of(Program& program, const std::string& sentence, LocalTime now) {
   if (sentence == program.said || (!program.said.empty() && now < program.said_at + kSayEvery)) return;
   program.said = sentence;
   program.said_at = now;
   say(sentence);
 }
 
-void RosDevice::take(std::uint64_t writer, std::string_view called, const RosWrench& command, LocalTime now) {
-  Program* program = program_of(writer, called);
+void RosDevice::take(const RosInput& input, LocalTime now) {
+  Program* program = program_of(input);
+  if (crtk_ && input.topic == RosInput::Topic::kStateCommand) {  // anybody can disarm the device
+    const std::string sentence = crtk_->take(printable(input.called), input.text, now);
+    if (program != nullptr) say_of(*program, sentence, now);
+    return;
+  }
   if (program == nullptr) {
     ++refused_;
-    refusal_ = "a wrench_command was dropped: " + std::to_string(kMostPrograms) + " programs already publish it";
+    refusal_ = "a " + std::string(topic_name(input.topic)) + " was dropped: " + std::to_string(kMostPrograms) +
+               " publishers already send commands";
     return;
   }
+  if (input.topic == RosInput::Topic::kServoCp) {
+    ++refused_;
+    drop(*program, "the device has no position control; expected a force, servo_cf", now);
+    return;
+  }
+  take_wrench(*program, input, now);
+}
+
+void RosDevice::take_wrench(Program& program, const RosInput& input, LocalTime now) {
   const auto& handle = bridged_.handle();
   const RosView view(config_.name, handle ? handle->operator_from_device : std::nullopt);
-  const auto wish = view.wish(command, config_.negate);
+  const bool negate = config_.negate && input.topic == RosInput::Topic::kWrenchCommand;
+  const auto wish = view.wish(input.wrench, negate);
   if (const auto* why = std::get_if<std::string>(&wish)) {
     ++refused_;
-    drop(*program, *why, now);
+    drop(program, *why, now);
     return;
   }
-  program->freshness.came(now);
+  program.freshness.came(now);
   Touch touch(std::get<RosView::Wish>(wish).force);
   if (handle && handle->max_torque > 0) touch.torque = std::get<RosView::Wish>(wish).torque;
-  touch.valid_for = program->freshness.good_for();
-  const auto answer = bridged_.push(program->number, now, now + *touch.valid_for, touch);
+  touch.valid_for = program.freshness.good_for();
+  const auto answer = bridged_.push(program.number, now, now + *touch.valid_for, touch);
   switch (answer) {
     case BridgedDevice::Answer::kTaken: {
-      const std::string sentence = program->called + " controls the device: the hand feels its wrench_command";
-      if (program->said != sentence) say(sentence);
-      program->said = sentence;
-      program->said_at = now;
+      const std::string sentence =
+          program.called + " controls the device: the hand feels its " + std::string(topic_name(program.topic));
+      if (program.said != sentence) say(sentence);
+      program.said = sentence;
+      program.said_at = now;
       break;
     }
     case BridgedDevice::Answer::kOwned:
-      drop(*program, "another program controls the device until it leaves or is silent for 1 s", now);
+      drop(program, "another program controls the device until it leaves or is silent for 1 s", now);
       break;
     case BridgedDevice::Answer::kObserving:
-      drop(*program, "--observe", now);
+      drop(program, "--observe", now);
       break;
   }
 }
@@ -203,6 +235,7 @@ void RosDevice::keep(std::span<const std::uint64_t> writers) {
     const auto& [writer, program] = entry;
     if (std::ranges::find(writers, writer) != writers.end()) return false;
     bridged_.release(program.number);
+    if (crtk_) crtk_->leave(program.called);
     say(program.called + " has left");
     return true;
   });
@@ -251,6 +284,7 @@ RosDiagnosis RosDevice::diagnosis() {
       if (!report->words.empty()) complain(Level::kWarn, report->words);
     }
   }
+  if (crtk_ && !crtk_->warning().empty()) complain(Level::kWarn, crtk_->warning());
   if (!refusal_.empty()) complain(Level::kWarn, std::exchange(refusal_, {}));
   if (d.message.empty()) d.message = bridged_.pushes() ? "the hand feels a program's force" : "ready";
   return d;

@@ -12,6 +12,7 @@
 #include <string_view>
 
 #include "clients/bridge/bridged_device.h"
+#include "clients/bridge/ros2/crtk.h"
 #include "clients/bridge/ros2/ros2_messages.h"
 #include "clients/bridge/ros2/ros2_servo.h"
 
@@ -31,13 +32,14 @@ class Freshness {
   std::optional<LocalTime> newest_;
 };
 
-/// The ROS 2 interface of one device without DDS: determines which messages are due and handles `wrench_command`s.
+/// The ROS 2 interface of one device without DDS: determines which messages are due and handles received messages.
 ///
 /// * Each new state results in pose, twist, wrench and joint state messages and, with the clutch, a servo message; at
 ///   most Config::rate_hz per second. Joy is published immediately when a button changes, otherwise at 50 Hz.
 /// * Commands of programs other than the owner are dropped. Each command is sent once with the validity
 ///   Freshness::good_for(). Torques are forwarded if the device has actuators for them.
-/// * At most 16 programs can publish commands; those of further programs are dropped.
+/// * `servo_cf` of CRTK is always the force on the hand, even if Config::negate is set. `servo_cp` is refused.
+/// * At most 16 publishers can send forces. The commands of other publishers are dropped.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class RosDevice {
@@ -47,12 +49,16 @@ class RosDevice {
     double rate_hz = 0;  ///< 0: publish every state
     bool negate = false;
     std::optional<RosServo> servo{};
-    std::string clutch{};  ///< name or number of the clutch button for the servo messages
+    std::string clutch{};          ///< name or number of the clutch button for the servo messages
+    bool crtk = false;             ///< with the messages of CRTK
+    bool negate_measured = false;  ///< `measured_cf` is the force of the hand on the device
   };
   static constexpr std::size_t kMostPrograms = 16;
 
   /// `bridged` must outlive this object.
-  RosDevice(BridgedDevice& bridged, Config config) : bridged_(bridged), config_(std::move(config)) {}
+  RosDevice(BridgedDevice& bridged, Config config) : bridged_(bridged), config_(std::move(config)) {
+    if (config_.crtk) crtk_.emplace(bridged);
+  }
 
   struct Messages {
     std::optional<RosPose> pose{};
@@ -61,12 +67,13 @@ class RosDevice {
     std::optional<RosJointState> joints{};
     std::optional<RosJoy> joy{};
     RosServo::Output servo{};
+    std::optional<RosWrench> measured_cf{};  ///< CRTK; `measured_cp` and `measured_cv` are the pose and the twist
+    std::optional<RosOperatingState> operating_state{};
   };
   /// Must be called after each turn of the BridgedDevice. `since_1970` is the system time at LocalTime 0.
   Messages messages(LocalTime now, Duration since_1970);
 
-  /// Handles a `wrench_command`. `writer` identifies the program in DDS, and `called` is its name in messages.
-  void take(std::uint64_t writer, std::string_view called, const RosWrench& command, LocalTime now);
+  void take(const RosInput& input, LocalTime now);    ///< handles the message of a program
   void keep(std::span<const std::uint64_t> writers);  ///< releases the device from all but these publishers
 
   RosDiagnosis diagnosis();  ///< status for /diagnostics since the previous call
@@ -79,6 +86,7 @@ class RosDevice {
   struct Program {
     BridgedDevice::Program number = 0;
     std::string called;
+    RosInput::Topic topic = RosInput::Topic::kWrenchCommand;
     Freshness freshness{};
     std::string said{};
     LocalTime said_at{};
@@ -88,7 +96,9 @@ class RosDevice {
   bool joy_is_due(LocalTime now);
   void learn();
   bool clutch_held() const;
-  Program* program_of(std::uint64_t writer, std::string_view called);
+  Program* program_of(const RosInput& input);
+  void take_wrench(Program& program, const RosInput& input, LocalTime now);
+  void say_of(Program& program, const std::string& sentence, LocalTime now);
   void drop(Program& program, const std::string& why, LocalTime now);
   void say(std::string sentence);
 
@@ -100,6 +110,7 @@ class RosDevice {
   std::uint32_t buttons_ = 0;
   bool knows_ = false;  ///< the handle of the current session is known
   std::optional<std::size_t> clutch_;
+  std::optional<CrtkState> crtk_;
   std::map<std::uint64_t, Program> programs_;
   BridgedDevice::Program numbers_ = 0;
   std::uint64_t refused_ = 0;

@@ -32,6 +32,8 @@ struct Ros2Options {
   std::vector<std::string> peers;
   double rate_hz = 0;
   bool negate = false;
+  bool crtk = false;
+  bool negate_measured = false;
   std::optional<RosServo::Kind> servo;
   std::string clutch;
   double servo_scale = 1;
@@ -67,7 +69,9 @@ class Ros2Bridge {
       RosDevice::Config of_device{.name = ros_name(host_.name(i)),
                                   .rate_hz = options.rate_hz,
                                   .negate = options.negate,
-                                  .clutch = options.clutch};
+                                  .clutch = options.clutch,
+                                  .crtk = options.crtk,
+                                  .negate_measured = options.negate_measured};
       if (options.servo) {
         const std::string frame = options.servo_frame.empty() ? of_device.name + "_servo" : options.servo_frame;
         of_device.servo.emplace(*options.servo, options.servo_scale, frame);
@@ -120,7 +124,8 @@ class Ros2Bridge {
                             .interface = options.interface,
                             .peers = options.peers,
                             .devices = {},
-                            .servo = options.servo};
+                            .servo = options.servo,
+                            .crtk = options.crtk};
     std::map<std::string, std::string> taken;
     for (std::size_t i = 0; i < host.size(); ++i) {
       const std::string name = ros_name(host.name(i));
@@ -140,6 +145,10 @@ class Ros2Bridge {
       sentence = "--negate: wrench_command is the force on a robot or of the hand, and its opposite acts on the hand";
     }
     host_.say(sentence + "; the topic wrench is always the force of the device on the hand");
+    if (options_.crtk) {
+      host_.say(std::string("--crtk: servo_cf is the force on the hand; measured_cf is the force of the ") +
+                (options_.negate_measured ? "hand on the device" : "device on the hand"));
+    }
     if (!options_.interface.empty()) {
       host_.say("--interface " + options_.interface + ": anyone who can reach DDS domain " +
                 std::to_string(options_.domain) + " on this interface can move the motors");
@@ -156,8 +165,8 @@ class Ros2Bridge {
     bool asked = false;
     for (std::size_t i = 0; i < devices_.size(); ++i) {
       if (const auto writers = node_.writers_if_changed(i)) devices_[i].keep(*writers);
-      if (const auto command = node_.take(i)) {
-        devices_[i].take(command->writer, command->called, command->wrench, now);
+      for (const RosInput& input : node_.take(i)) {
+        devices_[i].take(input, now);
         asked = true;
       }
       while (const auto sentence = devices_[i].next_sentence()) host_.say(host_.name(i) + ": " + *sentence);
@@ -195,7 +204,8 @@ void add_ros2(CLI::App& app, Chosen& chosen) {
   CLI::App& ros2 = *app.add_subcommand("ros2", "Publish a device as ROS 2 topics with DDS: /tendon/NAME/pose, …");
   ros2.footer(
       "Example: tendon-bridge ros2 --server lab:47100 --device right\n"
-      "Example: tendon-bridge ros2 --server lab:47100 --device right --servo twist --clutch 0");
+      "Example: tendon-bridge ros2 --server lab:47100 --device right --servo twist --clutch 0\n"
+      "Example: tendon-bridge ros2 --server lab:47100 --device right --crtk");
   o.bridge.client.joints = true;
   o.bridge.client.diagnostics = true;
   add_common(ros2, o.bridge);
@@ -215,6 +225,9 @@ void add_ros2(CLI::App& app, Chosen& chosen) {
       ->type_name("HZ")
       ->check(CLI::Range(0.0, 10000.0));
   ros2.add_flag("--negate", o.negate, "Negate wrench_command, if it is the force on a robot or the force of the hand");
+  ros2.add_flag("--negate-measured", o.negate_measured,
+                "With --crtk: measured_cf is the force of the hand on the device")
+      ->needs(ros2.add_flag("--crtk", o.crtk, "Also publish the topics of CRTK: /NAME/measured_cp, …"));
   const std::map<std::string, RosServo::Kind> kinds = {{"twist", RosServo::Kind::kTwist},
                                                        {"pose", RosServo::Kind::kPose}};
   ros2.add_option("--servo", o.servo, "Also send the motion of the hand to a robot arm while the clutch is held")
@@ -226,7 +239,10 @@ void add_ros2(CLI::App& app, Chosen& chosen) {
   ros2.add_option("--servo-frame", o.servo_frame, "frame_id of the messages to the arm. Default: NAME_servo")
       ->type_name("FRAME");
   ros2.add_option("--duration-s", o.duration_s, "End after this time")->check(CLI::PositiveNumber);
-  ros2.callback([&chosen] { chosen = [] { return Ros2Bridge(o).run(); }; });
+  ros2.callback([&chosen] {
+    o.bridge.always_observe = o.crtk;
+    chosen = [] { return Ros2Bridge(o).run(); };
+  });
 }
 
 }  // namespace tendon::bridge

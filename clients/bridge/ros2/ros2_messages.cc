@@ -16,6 +16,20 @@ bool is_word(char c) { return is_digit(c) || (c >= 'a' && c <= 'z') || (c >= 'A'
 
 }  // namespace
 
+std::string_view topic_name(RosInput::Topic topic) {
+  switch (topic) {
+    case RosInput::Topic::kWrenchCommand:
+      return "wrench_command";
+    case RosInput::Topic::kServoCf:
+      return "servo_cf";
+    case RosInput::Topic::kServoCp:
+      return "servo_cp";
+    case RosInput::Topic::kStateCommand:
+      return "state_command";
+  }
+  return "?";
+}
+
 RosTime ros_time(Duration since_1970) {
   return {.sec = static_cast<std::int32_t>(since_1970.count() / kNanoseconds),
           .nanosec = static_cast<std::uint32_t>(since_1970.count() % kNanoseconds)};

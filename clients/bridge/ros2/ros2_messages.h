@@ -61,6 +61,24 @@ struct RosDiagnosis {  // diagnostic_msgs/DiagnosticStatus
   std::vector<std::pair<std::string, std::string>> values;
 };
 
+struct RosOperatingState {  // crtk_msgs/OperatingState
+  RosHeader header;
+  std::string state;  ///< DISABLED, ENABLED or FAULT
+  bool is_homed = false;
+  bool is_busy = false;
+};
+
+/// A message from a program.
+struct RosInput {
+  enum class Topic : std::uint8_t { kWrenchCommand, kServoCf, kServoCp, kStateCommand };
+  Topic topic = Topic::kWrenchCommand;
+  std::uint64_t writer = 0;  ///< identifies the publisher in DDS
+  std::string called;        ///< name of the publisher in messages
+  RosWrench wrench{};        ///< of kWrenchCommand and kServoCf
+  std::string text{};        ///< of kStateCommand
+};
+std::string_view topic_name(RosInput::Topic topic);  ///< "wrench_command"
+
 RosTime ros_time(Duration since_1970);  ///< requires `since_1970` ≥ 0
 
 /// Converts a device name for use in topics and frames: replaces all characters except ASCII letters, digits and "_"

@@ -3,6 +3,7 @@
 
 #include <dds/dds.h>
 #include <ros2_types.h>
+#include <ros2_types_text.h>
 #include <sys/eventfd.h>
 #include <unistd.h>
 
@@ -19,11 +20,17 @@
 #include <system_error>
 #include <utility>
 
+#include "clients/bridge/ros2/type_hash.h"
+
 namespace tendon::bridge {
 namespace {
 
+using Topic = RosInput::Topic;
+
 /// The participants of a machine use the first free index. ROS 2 creates a participant for each process.
 constexpr int kMostParticipants = 100;
+
+constexpr int kMostStateCommands = 10;  ///< the depth of the queue of crtk_python_client
 
 std::string configuration(const Ros2Node::Config& config) {
   std::string interface = "address=\"127.0.0.1\"";
@@ -52,10 +59,12 @@ dds_entity_t made(dds_entity_t entity, const std::string& what) {
 
 class Qos {
  public:
-  explicit Qos(dds_reliability_kind_t reliability) : qos_(dds_create_qos()) {
+  Qos(const dds_topic_descriptor_t& type, dds_reliability_kind_t reliability, int depth) : qos_(dds_create_qos()) {
     static constexpr dds_data_representation_id_t kXcdr1 = DDS_DATA_REPRESENTATION_XCDR1;
+    const std::string hash = "typehash=" + type_hash(kRos2Types, type.m_typename) + ";";
+    dds_qset_userdata(qos_, hash.data(), hash.size());
     dds_qset_reliability(qos_, reliability, 0);
-    dds_qset_history(qos_, DDS_HISTORY_KEEP_LAST, 1);
+    dds_qset_history(qos_, DDS_HISTORY_KEEP_LAST, depth);
     dds_qset_durability(qos_, DDS_DURABILITY_VOLATILE);
     dds_qset_data_representation(qos_, 1, &kXcdr1);
   }
@@ -104,7 +113,28 @@ sensor_msgs_msg_dds__Joy_ dds_of(const RosJoy& joy) {
   return dds;
 }
 
+crtk_msgs_msg_dds__OperatingState_ dds_of(const RosOperatingState& state) {
+  return {dds_of(state.header), text_of(state.state), state.is_homed, state.is_busy};
+}
+
+std::string string_of(const char* text) { return text == nullptr ? "" : text; }
+
 Vec3 vector_of(const geometry_msgs_msg_dds__Vector3_& v) { return {v.x, v.y, v.z}; }
+
+RosInput input_of(Topic topic, const void* sample) {
+  RosInput input;
+  input.topic = topic;
+  if (topic == Topic::kStateCommand) {
+    input.text = string_of(static_cast<const crtk_msgs_msg_dds__StringStamped_*>(sample)->string);
+  } else if (topic != Topic::kServoCp) {
+    const auto& message = *static_cast<const geometry_msgs_msg_dds__WrenchStamped_*>(sample);
+    input.wrench = {
+        .header = {{message.header.stamp.sec, message.header.stamp.nanosec}, string_of(message.header.frame_id)},
+        .force = vector_of(message.wrench.force),
+        .torque = vector_of(message.wrench.torque)};
+  }
+  return input;
+}
 
 /// Returns "publisher" and the beginning of the GUID, which is unique for each program.
 std::string name_of(const dds_guid_t& guid) {
@@ -113,6 +143,14 @@ std::string name_of(const dds_guid_t& guid) {
                 guid.v[1], guid.v[2], guid.v[3], guid.v[4], guid.v[5], guid.v[6], guid.v[7], guid.v[8], guid.v[9],
                 guid.v[10], guid.v[11]);
   return text.data();
+}
+
+std::string called(dds_entity_t reader, dds_instance_handle_t writer) {
+  dds_builtintopic_endpoint_t* about = dds_get_matched_publication_data(reader, writer);
+  if (about == nullptr) return "a publisher";
+  std::string name = name_of(about->participant_key);
+  dds_builtintopic_free_endpoint(about);
+  return name;
 }
 
 // ---- Shared with the threads of DDS ----------------------------------------------------------------------
@@ -165,8 +203,12 @@ struct Ros2Node::State {
     dds_entity_t wrench = 0;
     dds_entity_t joy = 0;
     dds_entity_t joints = 0;
-    dds_entity_t servo = 0;  ///< 0: none
-    dds_entity_t commands = 0;
+    dds_entity_t servo = 0;        ///< 0: none
+    dds_entity_t measured_cp = 0;  ///< like the next three, 0 without CRTK
+    dds_entity_t measured_cv = 0;
+    dds_entity_t measured_cf = 0;
+    dds_entity_t operating_state = 0;
+    std::vector<std::pair<Topic, dds_entity_t>> readers;
     Ears ears;
     std::uint64_t taken = 0;
   };
@@ -175,17 +217,19 @@ struct Ros2Node::State {
     return made(dds_create_topic(participant, &type, ("rt/" + name).c_str(), nullptr, nullptr), "topic " + name);
   }
   dds_entity_t writer(const std::string& name, const dds_topic_descriptor_t& type) const {
-    const Qos qos(DDS_RELIABILITY_RELIABLE);
+    const Qos qos(type, DDS_RELIABILITY_RELIABLE, 1);
     return made(dds_create_writer(participant, topic(name, type), qos.get(), nullptr), "writer of " + name);
   }
-  dds_entity_t reader(const std::string& name, const dds_topic_descriptor_t& type, Ears& ears) const {
-    const Qos qos(DDS_RELIABILITY_BEST_EFFORT);
+  void read(Device& device, Topic topic_read, const std::string& under, const dds_topic_descriptor_t& type) const {
+    const bool each = topic_read == Topic::kStateCommand;
+    const Qos qos(type, each ? DDS_RELIABILITY_RELIABLE : DDS_RELIABILITY_BEST_EFFORT, each ? kMostStateCommands : 1);
+    const std::string name = under + std::string(topic_name(topic_read));
     dds_listener_t* listener = dds_create_listener(nullptr);
-    dds_lset_data_available_arg(listener, on_data, &ears, true);
-    dds_lset_subscription_matched_arg(listener, on_match, &ears, true);
+    dds_lset_data_available_arg(listener, on_data, &device.ears, true);
+    dds_lset_subscription_matched_arg(listener, on_match, &device.ears, true);
     const dds_entity_t entity = dds_create_reader(participant, topic(name, type), qos.get(), listener);
     dds_delete_listener(listener);
-    return made(entity, "reader of " + name);
+    device.readers.emplace_back(topic_read, made(entity, "reader of " + name));
   }
   template <class Message>
   void write(dds_entity_t writer, const Message& message) {
@@ -221,8 +265,16 @@ Ros2Node::Ros2Node(const Config& config) : state_(std::make_unique<State>()) {
       } else if (config.servo == RosServo::Kind::kPose) {
         device.servo = state_->writer(under + "servo_pose", geometry_msgs_msg_dds__PoseStamped__desc);
       }
-      device.commands =
-          state_->reader(under + "wrench_command", geometry_msgs_msg_dds__WrenchStamped__desc, device.ears);
+      state_->read(device, Topic::kWrenchCommand, under, geometry_msgs_msg_dds__WrenchStamped__desc);
+      if (!config.crtk) continue;
+      const std::string of_crtk = name + "/";
+      device.measured_cp = state_->writer(of_crtk + "measured_cp", geometry_msgs_msg_dds__PoseStamped__desc);
+      device.measured_cv = state_->writer(of_crtk + "measured_cv", geometry_msgs_msg_dds__TwistStamped__desc);
+      device.measured_cf = state_->writer(of_crtk + "measured_cf", geometry_msgs_msg_dds__WrenchStamped__desc);
+      device.operating_state = state_->writer(of_crtk + "operating_state", crtk_msgs_msg_dds__OperatingState__desc);
+      state_->read(device, Topic::kServoCf, of_crtk, geometry_msgs_msg_dds__WrenchStamped__desc);
+      state_->read(device, Topic::kServoCp, of_crtk, geometry_msgs_msg_dds__PoseStamped__desc);
+      state_->read(device, Topic::kStateCommand, of_crtk, crtk_msgs_msg_dds__StringStamped__desc);
     }
   } catch (...) {
     dds_delete(state_->domain);
@@ -235,44 +287,45 @@ Ros2Node::~Ros2Node() { dds_delete(state_->domain); }
 int Ros2Node::descriptor() const noexcept { return state_->bell.descriptor(); }
 void Ros2Node::clear() { state_->bell.clear(); }
 
-std::optional<Ros2Node::Command> Ros2Node::take(std::size_t i) {
+std::vector<RosInput> Ros2Node::take(std::size_t i) {
   State::Device& device = state_->devices[i];
-  std::optional<Command> newest;
-  for (;;) {
-    std::array<void*, 1> samples{};
-    std::array<dds_sample_info_t, 1> infos{};
-    if (dds_take(device.commands, samples.data(), infos.data(), 1, 1) != 1) return newest;
-    if (infos[0].valid_data) {
-      ++device.taken;
-      const auto& message = *static_cast<const geometry_msgs_msg_dds__WrenchStamped_*>(samples[0]);
-      newest = Command{.writer = infos[0].publication_handle,
-                       .called = {},
-                       .wrench = {.header = {{message.header.stamp.sec, message.header.stamp.nanosec},
-                                             message.header.frame_id == nullptr ? "" : message.header.frame_id},
-                                  .force = vector_of(message.wrench.force),
-                                  .torque = vector_of(message.wrench.torque)}};
-      newest->called = "a publisher";
-      if (dds_builtintopic_endpoint_t* about =
-              dds_get_matched_publication_data(device.commands, infos[0].publication_handle)) {
-        newest->called = name_of(about->participant_key);
-        dds_builtintopic_free_endpoint(about);
+  std::vector<RosInput> inputs;
+  for (const auto& [topic, reader] : device.readers) {
+    for (int reads = 0; reads < kMostStateCommands; ++reads) {
+      std::array<void*, 1> samples{};
+      std::array<dds_sample_info_t, 1> infos{};
+      if (dds_take(reader, samples.data(), infos.data(), 1, 1) != 1) break;
+      if (infos[0].valid_data) {
+        ++device.taken;
+        RosInput input = input_of(topic, samples[0]);
+        input.writer = infos[0].publication_handle;
+        input.called = called(reader, infos[0].publication_handle);
+        const bool replaces = topic != Topic::kStateCommand && !inputs.empty() && inputs.back().topic == topic;
+        if (replaces) inputs.pop_back();
+        inputs.push_back(std::move(input));
       }
+      dds_return_loan(reader, samples.data(), 1);
     }
-    dds_return_loan(device.commands, samples.data(), 1);
   }
+  return inputs;
 }
 
 std::optional<std::vector<std::uint64_t>> Ros2Node::writers_if_changed(std::size_t i) {
   State::Device& device = state_->devices[i];
   if (!device.ears.matched.exchange(false, std::memory_order_acq_rel)) return {};
   std::vector<std::uint64_t> writers;
-  for (;;) {
-    const dds_return_t count = dds_get_matched_publications(device.commands, writers.data(), writers.size());
-    const auto found = static_cast<std::size_t>(std::max(count, 0));
-    const bool all = found <= writers.size();
-    writers.resize(found);
-    if (all) return writers;
+  for (const auto& [topic, reader] : device.readers) {
+    const std::size_t before = writers.size();
+    for (std::size_t room = 0;;) {
+      writers.resize(before + room);
+      const dds_return_t count = dds_get_matched_publications(reader, writers.data() + before, room);
+      const auto found = static_cast<std::size_t>(std::max(count, 0));
+      writers.resize(before + std::min(found, room));
+      if (found <= room) break;
+      room = found;
+    }
   }
+  return writers;
 }
 
 void Ros2Node::publish(std::size_t i, const RosDevice::Messages& messages) {
@@ -280,6 +333,12 @@ void Ros2Node::publish(std::size_t i, const RosDevice::Messages& messages) {
   if (messages.pose) state_->write(device.pose, dds_of(*messages.pose));
   if (messages.twist) state_->write(device.twist, dds_of(*messages.twist));
   if (messages.wrench) state_->write(device.wrench, dds_of(*messages.wrench));
+  if (device.measured_cp != 0) {
+    if (messages.pose) state_->write(device.measured_cp, dds_of(*messages.pose));
+    if (messages.twist) state_->write(device.measured_cv, dds_of(*messages.twist));
+    if (messages.measured_cf) state_->write(device.measured_cf, dds_of(*messages.measured_cf));
+    if (messages.operating_state) state_->write(device.operating_state, dds_of(*messages.operating_state));
+  }
   if (messages.joy) state_->write(device.joy, dds_of(*messages.joy));
   if (messages.servo.twist) state_->write(device.servo, dds_of(*messages.servo.twist));
   if (messages.servo.pose) state_->write(device.servo, dds_of(*messages.servo.pose));

@@ -17,7 +17,10 @@ namespace tendon::bridge {
 /// `rt/a/b`. Types have the DDS names of ROS 2 types (ros2_types.idl). Data is CDR, XCDR1, without type information.
 ///
 /// * Writers: reliable, keep last 1, volatile, max_blocking_time 0. They match all readers, and never block.
-/// * Readers of `wrench_command`: best effort, keep last 1, volatile, so the newest message wins.
+/// * Readers of forces and poses: best effort, keep last 1, volatile, so the newest message wins.
+/// * Readers of `state_command`: reliable, keep last 10, volatile. Since they are volatile, they do not receive commands
+///   that were sent before the bridge was started, even if the writer is transient local.
+/// * The USER_DATA of each endpoint contains the hash of its type, "typehash=…;" (type_hash.h).
 /// * Without Config::interface, only the loopback interface is used, with unicast discovery: participants of this
 ///   machine with the indices 0 … 99 are contacted once per second, and participants that use loopback are found
 ///   (ROS_LOCALHOST_ONLY=1). Otherwise the given interface is used with multicast, and unicast to Config::peers.
@@ -34,6 +37,7 @@ class Ros2Node {
     std::vector<std::string> peers{};    ///< host names or addresses for unicast discovery
     std::vector<std::string> devices{};  ///< see ros_name()
     std::optional<RosServo::Kind> servo{};
+    bool crtk = false;  ///< add the topics of CRTK, for example /NAME/measured_cp
   };
   static constexpr std::uint32_t kMaxDomain = 232;  ///< ports of higher domains would exceed 65535
 
@@ -42,16 +46,12 @@ class Ros2Node {
   Ros2Node(const Ros2Node&) = delete;
   Ros2Node& operator=(const Ros2Node&) = delete;
 
-  int descriptor() const noexcept;  ///< readable after a command or a change of publishers, until clear()
+  int descriptor() const noexcept;  ///< readable after a message or a change of publishers, until clear()
   void clear();
 
-  struct Command {
-    std::uint64_t writer = 0;
-    std::string called;  ///< name for messages
-    RosWrench wrench;
-  };
-  std::optional<Command> take(std::size_t device);  ///< newest command for the device, if there is a new one
-  /// Returns the publishers of commands for the device; empty: unchanged since the last call.
+  /// The new messages for the device: the newest force and pose of each topic, and all state commands.
+  std::vector<RosInput> take(std::size_t device);
+  /// Returns the publishers of these topics. If they have not changed since the last call, the result is empty.
   std::optional<std::vector<std::uint64_t>> writers_if_changed(std::size_t device);
 
   void publish(std::size_t device, const RosDevice::Messages& messages);
@@ -59,7 +59,7 @@ class Ros2Node {
 
   std::uint64_t published() const noexcept;
   std::uint64_t unsent() const noexcept;      ///< messages that DDS did not accept immediately
-  std::uint64_t superseded() const noexcept;  ///< commands that were replaced by a newer command before take()
+  std::uint64_t superseded() const noexcept;  ///< messages that were replaced by a newer one before take()
 
  private:
   struct State;

@@ -88,7 +88,8 @@ class World {
   StepRecord step;
   /// J, minimum of the energy ledger; negative if the device generates energy
   double least_energy = 0;
-  HandleDescription handle;  ///< used when the server is restarted
+  HandleDescription handle;        ///< used when the server is restarted
+  std::optional<Safety> safety{};  ///< in the reports of the server, once per second; empty: there are no reports
 
  private:
   struct Guest {
@@ -111,6 +112,7 @@ class World {
     if (!assembly_) return;
     assembly_->turn_network(0, now);
     Mailboxes& mail = assembly_->devices().front().mail;
+    if (safety) mail.health.put({.at = now, .safety = *safety});
     while (const StepRecord* record = mail.steps.front()) {
       step = *record;
       least_energy = std::min(least_energy, record->energy);

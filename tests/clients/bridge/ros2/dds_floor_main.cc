@@ -44,9 +44,9 @@ int main(int argc, char** argv) {
   LocalTime next = now;
   for (std::uint64_t n = 0; now < end; now = read_clock()) {
     node.clear();
-    if (const auto command = node.take(0)) {
+    if (const auto inputs = node.take(0); !inputs.empty()) {
       RosDevice::Messages answer;
-      answer.wrench = command->wrench;
+      answer.wrench = inputs.back().wrench;
       node.publish(0, answer);
     }
     if (now >= next) {

@@ -34,6 +34,10 @@ bool has(const std::vector<std::string>& all, const std::string& words) {
 /// The y axis of REP 103 points left, which is −x of the simulated device (oriented like a Falcon).
 RosWrench push(double left_n) { return {.header = {}, .force = {0, left_n, 0}, .torque = {0, 0.01, 0}}; }
 
+RosInput input(std::uint64_t writer, const RosWrench& wrench, RosInput::Topic topic = RosInput::Topic::kWrenchCommand) {
+  return {.topic = topic, .writer = writer, .called = "publisher " + std::to_string(writer), .wrench = wrench};
+}
+
 struct Stage {
   explicit Stage(const std::string& scene = "demo_parts.toml", RosDevice::Config config = {.name = "right"},
                  BridgedDevice::Config of_bridged = {}, int delay_ms = 0)
@@ -61,9 +65,7 @@ struct Stage {
     if (due.wrench) wrench = *due.wrench;
     if (due.joy) joy = *due.joy;
   }
-  void command(std::uint64_t writer, double left_n) {
-    device.take(writer, "publisher " + std::to_string(writer), push(left_n), world.now);
-  }
+  void command(std::uint64_t writer, double left_n) { device.take(input(writer, push(left_n)), world.now); }
 
   World world;
   BridgedDevice& bridged;
@@ -144,7 +146,7 @@ TEST(RosDevice, ATorqueIsSentWhereTheHandleHasMotorsForItOnly) {
     RosDevice device(bridged, {.name = "right"});
     world.run(200);
     ASSERT_TRUE(bridged.handle());
-    world.run(300, [&] { device.take(kWriter, "a", push(0.1), world.now); });
+    world.run(300, [&] { device.take(input(kWriter, push(0.1)), world.now); });
     ASSERT_TRUE(bridged.state()->torque_applied);
     EXPECT_NEAR(bridged.state()->torque_applied->x(), most > 0 ? -0.01 : 0, 1e-9);
     EXPECT_NEAR(bridged.state()->force_applied.x(), -0.1, 1e-9);
@@ -197,7 +199,7 @@ TEST(RosDevice, AForeignFrameIsRefusedAndSaidOnce) {
   stage.run(100);
   RosWrench foreign = push(0.5);
   foreign.header.frame_id = "tool0";
-  stage.run(500, [&] { stage.device.take(kWriter, "publisher 71", foreign, stage.world.now); });
+  stage.run(500, [&] { stage.device.take(input(kWriter, foreign), stage.world.now); });
   EXPECT_TRUE(stage.world.step.applied.isZero());
   EXPECT_EQ(stage.device.refused(), 500U);
   const auto said = sentences_of(stage.device);
