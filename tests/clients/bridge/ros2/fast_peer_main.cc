@@ -182,6 +182,7 @@ struct Options {
   bool best_effort = false;
   bool all_transports = false;
   bool localhost_only = false;
+  std::string write = "wrench_command";
   std::vector<double> wrench;
   std::string frame;
   double hz = 1000;
@@ -211,11 +212,11 @@ class Peer {
         continue;
       }
       const std::string path = path_of(topic);
-      if (topic == "pose" || topic == "servo_pose")
+      if (topic == "pose" || topic == "servo_pose" || topic == "measured_cp")
         read<PoseStamped>(topic, path);
-      else if (topic == "twist" || topic == "servo_twist")
+      else if (topic == "twist" || topic == "servo_twist" || topic == "measured_cv")
         read<TwistStamped>(topic, path);
-      else if (topic == "wrench")
+      else if (topic == "wrench" || topic == "measured_cf")
         read<WrenchStamped>(topic, path);
       else if (topic == "joy")
         read<Joy>(topic, path);
@@ -229,7 +230,7 @@ class Peer {
       qos.reliability().kind = dds::RELIABLE_RELIABILITY_QOS;  // the default of rclcpp
       qos.history().depth = 10;
       qos.publish_mode().kind = dds::SYNCHRONOUS_PUBLISH_MODE;
-      writer_ = publisher_->create_datawriter(topic_of<WrenchStamped>(path_of("wrench_command")), qos);
+      writer_ = publisher_->create_datawriter(topic_of<WrenchStamped>(path_of(options.write)), qos);
     }
   }
 
@@ -279,7 +280,10 @@ class Peer {
   Peer& operator=(const Peer&) = delete;
 
  private:
-  std::string path_of(const std::string& topic) const { return "rt/tendon/" + options_.device + "/" + topic; }
+  std::string path_of(const std::string& topic) const {
+    const bool of_crtk = topic.starts_with("measured_") || topic == "servo_cf";
+    return (of_crtk ? "rt/" : "rt/tendon/") + options_.device + "/" + topic;
+  }
 
   template <class Message>
   dds::Topic* topic_of(const std::string& path) {
@@ -326,8 +330,10 @@ int run(int argc, char** argv) {
   app.add_option("--domain", o.domain);
   app.add_option("--device", o.device);
   app.add_option("--read", o.read,
-                 "Topics: pose, twist, wrench, joy, joint_states, servo_twist, servo_pose, diagnostics")
+                 "Topics: pose, twist, wrench, joy, joint_states, servo_twist, servo_pose, diagnostics, measured_cp, "
+                 "measured_cv, measured_cf")
       ->delimiter(',');
+  app.add_option("--write", o.write, "wrench_command or servo_cf");
   app.add_flag("--best-effort", o.best_effort, "Readers that ask for no more; else reliable ones");
   app.add_flag("--all-transports", o.all_transports, "As Fast DDS is without a profile; else UDP on the loopback");
   app.add_flag("--localhost-only", o.localhost_only, "As ROS_LOCALHOST_ONLY=1 makes it: nobody is asked by unicast");

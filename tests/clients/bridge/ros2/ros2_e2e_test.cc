@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Tests a real tendond with programs that use Fast DDS (fast_peer).
-#include <arpa/inet.h>
 #include <gtest/gtest.h>
-#include <netinet/in.h>
-#include <sys/socket.h>
 #include <unistd.h>
 
 #include <chrono>
@@ -20,6 +17,7 @@
 #include <vector>
 
 #include "clients/cpp/machine.h"
+#include "tests/clients/bridge/ros2/ros2_stage.h"
 #include "tests/e2e/stage/process.h"
 #include "tests/e2e/stage/stage.h"
 #include "tests/server/scratch_folder.h"
@@ -102,50 +100,6 @@ viscous_friction_nm_s_per_rad = 1e-4
 coulomb_friction_n = 0.05
 viscous_friction_n_s_per_m = 0.25
 )";
-
-/// A DDS domain that is not used by any other test on this machine. It is reserved by binding a UDP port of the domain
-/// that participants with an index below 100 do not use.
-class Domain {
- public:
-  Domain() {
-    static int next = static_cast<int>(::getpid());
-    for (int tries = 0; tries < 99; ++tries) {
-      number_ = 1 + next++ % 99;
-      socket_ = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
-      sockaddr_in address{};
-      address.sin_family = AF_INET;
-      address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-      address.sin_port = htons(static_cast<std::uint16_t>(7400 + 250 * number_ + 249));
-      if (::bind(socket_, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0) return;
-      ::close(socket_);
-    }
-    throw std::runtime_error("all DDS domains are in use");
-  }
-  ~Domain() { ::close(socket_); }
-  Domain(const Domain&) = delete;
-  Domain& operator=(const Domain&) = delete;
-  std::string text() const { return std::to_string(number_); }
-
- private:
-  int number_ = 0;
-  int socket_ = -1;
-};
-
-std::vector<std::string> with(std::vector<std::string> all, const std::vector<std::string>& more) {
-  all.insert(all.end(), more.begin(), more.end());
-  return all;
-}
-
-class BridgeProcess : public Process {
- public:
-  BridgeProcess(const ScratchFolder& folder, const std::string& server, const Domain& domain,
-                const std::vector<std::string>& more = {})
-      : Process(program("tendon-bridge"),
-                with({"ros2", "--server", server, "--domain", domain.text(), "--json", "--duration-s", "110"}, more),
-                folder.path()) {
-    wait_for_line(R"("event":"listening")");
-  }
-};
 
 class Peer : public Process {
  public:
@@ -299,6 +253,19 @@ TEST(Ros2, AWrenchIsFeltAndItsEndLeavesTheHandToTheStages) {
       peer.until([](const std::string& line) { return line.find("let_go_us") != std::string::npos; });
   std::cout << "0 N " << number(let_go, "let_go_us") / 1000 << " ms after the last command\n";
   EXPECT_LT(number(let_go, "let_go_us"), 800'000) << "300 ms, and what a machine may stand still";
+}
+
+TEST(Ros2, TheTopicsOfCrtkAreReadAndWrittenByFastDds) {
+  Room room({"--crtk", "--negate-measured"});
+  Peer peer(room.folder, room.domain,
+            {"--read", "measured_cp,measured_cv,measured_cf,wrench", "--write", "servo_cf", "--wrench", "0,0.3,0"});
+  peer.until_pushed(0.3);
+  const std::string line = peer.until([](const std::string& all) {
+    return number(all, "measured_cp_n") > 100 && number(all, "measured_cv_n") > 100 &&
+           std::abs(number(all, "measured_cf_y") + 0.3) < 1e-6;
+  });
+  EXPECT_EQ(text_in(line, "measured_cp_frame"), "device_base");
+  EXPECT_NEAR(number(line, "measured_cp_x"), 0, 1e-3) << "the hand moves along its right alone";
 }
 
 TEST(Ros2, NegateIsNamedInTheFirstSentence) {
