@@ -71,7 +71,7 @@ using Primitives = std::vector<field::Primitive>;
 const field::Primitive kFloor{.shape = field::Plane{.at = {0.01, 0.02, 0.03}}, .material = 1};
 const field::Primitive kBall{.shape = field::Sphere{.centre = {0.01, 0.02, 0.03}, .radius = 0.04}, .hollow = true};
 const field::Primitive kRod{
-    .shape = field::Capsule{.from = {0.01, 0.02, 0.03}, .to = {0.04, 0.05, 0.06}, .radius = 0.07}, .material = 15};
+    .shape = field::Capsule{.from = {0.01, 0.02, 0.03}, .to = {0.04, 0.05, 0.06}, .radius = 0.07}, .material = 7};
 const field::Primitive kBox{.shape = field::Box{.centre = {0.01, -0.02, 0.03},
                                                 .half = {0.05, 0.03, 0.01},
                                                 .rounding = 0.005,

@@ -132,7 +132,7 @@ TEST(FieldUpload, AFieldOfPrimitivesIsReadyAfterItsManifest) {
   const std::vector<field::Primitive> sent = {
       {.shape = field::Plane{.at = {1, 2, 3}, .normal = {0.6, 0, 0.8}}, .material = 3},
       {.shape = field::Sphere{.centre = {4, 5, 6}, .radius = 7}, .hollow = true},
-      {.shape = field::Capsule{.from = {8, 9, 10}, .to = {11, 12, 13}, .radius = 14}, .material = 15},
+      {.shape = field::Capsule{.from = {8, 9, 10}, .to = {11, 12, 13}, .radius = 14}, .material = 7},
       {.shape = field::Box{
            .centre = {15, 16, 17}, .half = {18, 19, 20}, .rounding = 1, .turn = {.w = 0.6, .x = 0, .y = 0.8, .z = 0}}}};
   const std::vector<std::byte> manifest = encode_manifest({}, {}, sent);
