@@ -532,11 +532,7 @@ int main(int argc, char** argv) {
                          "Measure the wake-up latency of a haptic thread on this machine, and recommend changes. This "
                          "takes two seconds and does not change any settings: `tendond doctor`");
   doctor->footer("\nExample: tendond doctor\n\nExit: 0 success; 2 wrong usage.");
-  doctor
-      ->add_option("--cpu", cpu,
-                   "Number of the processor of the haptic thread, as [loop] cpu of the scene. Default: the isolated "
-                   "processors")
-      ->type_name("N");
+  doctor->add_option("--cpu", cpu, "Processor of the haptic thread. Default: the isolated processors")->type_name("N");
   doctor->add_flag("--json", json, "Print JSON on stdout, one object");
   app.set_help_flag("-h,--help", "Print this help")->group(kAbout);
   app.set_version_flag("--version", version_text(), "Print the version and the commit")->group(kAbout);
