@@ -57,6 +57,7 @@ bool bind_to(int socket, const Address& address) {
 
 Descriptor new_listener(const Address& address) {
   Descriptor socket = new_socket(SOCK_STREAM);
+  if (!socket) return {};
   set(socket.number(), SOL_SOCKET, SO_REUSEADDR, 1);
   if (!bind_to(socket.number(), address) || ::listen(socket.number(), kBacklog) != 0) return {};
   return socket;
@@ -77,6 +78,8 @@ void set_up_stream(int socket, std::size_t unread) {
   set(socket, IPPROTO_TCP, TCP_KEEPIDLE, kKeepAliveS);
   set(socket, IPPROTO_TCP, TCP_KEEPINTVL, kKeepAliveS);
   set(socket, IPPROTO_TCP, TCP_KEEPCNT, kKeepAlives);
+  // Keep-alives are not sent while data is not acknowledged.
+  set(socket, IPPROTO_TCP, TCP_USER_TIMEOUT, kKeepAliveS * (1 + kKeepAlives) * 1000);  // ms
 }
 
 }  // namespace tendon::bridge

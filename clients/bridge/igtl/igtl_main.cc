@@ -46,6 +46,10 @@ igtl::Server::Config config_of(IgtlOptions& options) {
   if (!config.station.target.empty() && config.names.size() > 1) {
     throw std::runtime_error("--target " + config.station.target + ": expected one device");
   }
+  if (config.station.target.size() > igtl::kLongestName) {
+    throw std::runtime_error("--target " + config.station.target + ": expected at most " +
+                             std::to_string(igtl::kLongestName) + " characters");
+  }
   config.station.frame = *find_frame(options.frame);
   config.station.frame.per_metre = kMillimetres;
   return config;

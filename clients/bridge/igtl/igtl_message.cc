@@ -95,10 +95,10 @@ std::optional<Header> read_header(Bytes bytes) {
   const auto type = text_of(bytes.subspan(2, kTypeSize));
   const auto name = text_of(bytes.subspan(2 + kTypeSize, kLongestName));
   const auto version = whole_at<std::uint16_t>(bytes, 0);
-  if (version < 1 || version > kNewestVersion || !type || type->empty() || !name) return {};
+  if (version < 1 || version > kNewestVersion || !type || type->empty()) return {};
   return Header{.version = version,
                 .type = *type,
-                .name = *name,
+                .name = name.value_or(std::string_view()),
                 .body_size = whole_at<std::uint64_t>(bytes, kHeaderSize - 16),
                 .crc = whole_at<std::uint64_t>(bytes, kHeaderSize - 8)};
 }

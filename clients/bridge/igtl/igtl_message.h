@@ -47,8 +47,8 @@ struct Header {
   std::uint64_t body_size = 0;  ///< may be a lie
   std::uint64_t crc = 0;
 };
-/// Returns nullopt if the version is not supported, if the type is empty, or if a text is not printable ASCII. `bytes`
-/// must contain at least kHeaderSize bytes.
+/// Returns nullopt if the version is not supported, or if the type is empty or not printable ASCII. A name that is not
+/// printable ASCII is empty. `bytes` must contain at least kHeaderSize bytes.
 std::optional<Header> read_header(Bytes bytes);
 
 /// Returns the position of a TRANSFORM, in mm. If a component is larger than kFarthest, the units are probably wrong.

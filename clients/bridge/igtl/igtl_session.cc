@@ -32,6 +32,10 @@ std::optional<std::string> Session::next_sentence() {
 }
 
 void Session::send(Bytes messages) {
+  if (sent_ > kMaxUnread) {
+    out_.erase(out_.begin(), out_.begin() + static_cast<std::ptrdiff_t>(sent_));
+    sent_ = 0;
+  }
   out_.insert(out_.end(), messages.begin(), messages.end());
   if (out_.size() - sent_ > kMaxUnread && end_.empty()) end_ = "it does not read its data";
 }
@@ -74,6 +78,10 @@ void Session::take(LocalTime now, Bytes bytes) {
     if (!input || size > kLongestBody) {
       if (header->type == kGetStatus) {
         wants_status_ = true;
+      } else if (input) {
+        ++counts_.invalid;
+        warn(called(*header) + "size", "its " + called(*header) + " is refused: " + std::to_string(size) +
+                                           " bytes; expected at most " + std::to_string(kLongestBody));
       } else {
         ++counts_.ignored;
         warn(called(*header), "its " + called(*header) + " is ignored; expected " + std::string(kTransform) + " " +

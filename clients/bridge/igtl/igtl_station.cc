@@ -69,6 +69,10 @@ Bytes Station::turn(const Moment& now, const BridgedDevice& bridged) {
     append_status(status_, label, status, text);
     due_ = status_;
     told_status_ = std::move(text);
+    if (status == Status::kConnectionLost) {
+      string_.clear();
+      told_state_.clear();
+    }
     changed = true;
   }
   if (bridged.state() && bridged.states() != seen_) {

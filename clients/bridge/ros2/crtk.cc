@@ -59,7 +59,7 @@ std::string CrtkState::take(std::string_view called, std::string_view command, L
   if (command == "disable") {
     warning_.clear();
     if (bridged_.state() && is_disarmed(*bridged_.state())) return asked + ": the device is disarmed already";
-    return asked + (bridged_.disarm(now) ? ": the device is disarmed until the operator arms it"
+    return asked + (bridged_.disarm(now) ? ": the server is asked to disarm the device until the operator arms it"
                                          : ": refused, because of --observe");
   }
   return asked + ": refused; expected enable or disable";

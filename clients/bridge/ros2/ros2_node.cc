@@ -315,15 +315,15 @@ std::optional<std::vector<std::uint64_t>> Ros2Node::writers_if_changed(std::size
   if (!device.ears.matched.exchange(false, std::memory_order_acq_rel)) return {};
   std::vector<std::uint64_t> writers;
   for (const auto& [topic, reader] : device.readers) {
-    const std::size_t before = writers.size();
-    for (std::size_t room = 0;;) {
-      writers.resize(before + room);
-      const dds_return_t count = dds_get_matched_publications(reader, writers.data() + before, room);
+    std::vector<std::uint64_t> of_reader;  // while it is empty, data() is null: DDS refuses a pointer with a size of 0
+    for (;;) {
+      const dds_return_t count = dds_get_matched_publications(reader, of_reader.data(), of_reader.size());
       const auto found = static_cast<std::size_t>(std::max(count, 0));
-      writers.resize(before + std::min(found, room));
-      if (found <= room) break;
-      room = found;
+      const bool all = found <= of_reader.size();
+      of_reader.resize(found);
+      if (all) break;
     }
+    writers.insert(writers.end(), of_reader.begin(), of_reader.end());
   }
   return writers;
 }

@@ -43,6 +43,10 @@ void Peer::send(const Moment& now, std::int32_t sender, std::int32_t type, bool 
     if (datagrams_.empty() || datagrams_.back().size() + size > kLongestDatagram) datagrams_.emplace_back();
     append(datagrams_.back(), message, sequence_++);
   } else {
+    if (sent_ > kMaxUnread) {
+      out_.erase(out_.begin(), out_.begin() + static_cast<std::ptrdiff_t>(sent_));
+      sent_ = 0;
+    }
     append(out_, message, sequence_++);
     if (out_.size() - sent_ > kMaxUnread && end_.empty()) end_ = "it does not read its data";
   }

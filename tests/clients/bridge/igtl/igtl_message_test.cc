@@ -116,7 +116,8 @@ TEST(IgtlMessage, HeadersAndBodiesThatAreWrongAreNotRead) {
   EXPECT_TRUE(read_header(spoiled(1, 2))) << "version 2 is a header; the Session refuses its body";
   EXPECT_FALSE(read_header(spoiled(2, 0))) << "no type";
   EXPECT_FALSE(read_header(spoiled(3, 7))) << "a type that cannot be printed";
-  EXPECT_FALSE(read_header(spoiled(15, 0xff))) << "a name that is not ASCII";
+  ASSERT_TRUE(read_header(spoiled(15, 0xff)));
+  EXPECT_EQ(read_header(spoiled(15, 0xff))->name, "") << "a name that is not ASCII is that of no station";
   EXPECT_FALSE(read_position(Bytes(good).subspan(kHeaderSize + 1)));
   EXPECT_FALSE(read_position({}));
   EXPECT_FALSE(read_force({}));
