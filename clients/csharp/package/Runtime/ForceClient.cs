@@ -53,6 +53,9 @@ namespace Tendon {
     public DeviceDescription Device { get; private set; }
     public HandleDescription Handle { get; private set; }
 
+    /// <summary>Whether the server will still describe the handle of this session.</summary>
+    public bool AwaitsHandle { get; private set; }
+
     /// <summary>Whether our forces are used: a session is open, and we hold the channel.</summary>
     public bool Holds { get; private set; }
 
@@ -121,6 +124,7 @@ namespace Tendon {
         Request(rate, null);
       }
       Describe(false);
+      AwaitsHandle = _handle;
       if (_handle) Describe(true);
     }
 
@@ -131,10 +135,12 @@ namespace Tendon {
       Request(describe, answer => {
         if (answer.HasDevice) Device = answer.Device;
         if (answer.HasHandle) Handle = answer.Handle;
+        if (handle) AwaitsHandle = false;
       });
     }
 
-    /// <summary>Sends a request reliably. `then` receives the answer and may be null. Returns false if there is no
+    /// <summary>Sends a request reliably. `then` receives the answer and may be null. It must not throw,
+    /// and it is called in the thread of the client. Returns false if there is no
     /// session, or if 16 requests are pending. Throws an ArgumentException if a value is out of bounds.</summary>
     public bool Request(Control request, Action<ControlAck> then) {
       request.Id = 1; // is within bounds; the number follows
@@ -167,7 +173,7 @@ namespace Tendon {
     }
 
     private void EndOfSession(long now) {
-      if (_session.IsOpen) return;
+      if (Phase != Phase.Open || _session.IsOpen) return;
       Holds = false;
       Reason = $"the session ended ({_session.EndCode}): {_session.EndReason}";
       if (_session.EndCode == Code.Replaced) End();

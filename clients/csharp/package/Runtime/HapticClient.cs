@@ -31,6 +31,7 @@ namespace Tendon {
     private readonly IPAddress[] _addresses;
     private readonly int _port;
     private int _address;
+    private int _moves; // to another address since the last answer
     private Socket _socket;
     private readonly byte[] _received = new byte[2048]; // more than a datagram, to notice longer ones
     private readonly byte[] _sent = new byte[Header.Largest];
@@ -38,7 +39,7 @@ namespace Tendon {
     private volatile bool _ending;
 
     /// <summary>Throws an ArgumentException with the reason if the address or a value of the config is wrong, if the
-    /// name has no address, or if a key is needed.</summary>
+    /// name has no address that can be reached, or if a key is needed.</summary>
     public HapticClient(string server, Config config) {
       int colon = server.LastIndexOf(':');
       if (colon <= 0 || !ushort.TryParse(server.Substring(colon + 1), out ushort port) || port == 0) {
@@ -52,7 +53,13 @@ namespace Tendon {
       if (config.Key == null && !Array.TrueForAll(_addresses, IPAddress.IsLoopback)) {
         throw new ArgumentException($"{server} is another machine: a key is needed (tendond keygen NAME)");
       }
-      _socket = Connected();
+      while (_socket == null) {
+        try {
+          _socket = Connected();
+        } catch (SocketException error) {
+          if (++_address == _addresses.Length) throw new ArgumentException($"cannot reach {server}: {error.Message}");
+        }
+      }
     }
 
     private static IPAddress[] AddressesOf(string name) {
@@ -89,7 +96,8 @@ namespace Tendon {
       }
     }
 
-    /// <summary>Calls a function with the client, for its other members. The client must not be kept.</summary>
+    /// <summary>Calls a function with the client, for its other members. The client must not be kept, and the function
+    /// must not call Close.</summary>
     public Result With<Result>(Func<ForceClient, Result> function) {
       lock (_lock) return function(_client);
     }
@@ -154,19 +162,29 @@ namespace Tendon {
       Socket socket;
       lock (_lock) {
         SendDue();
-        bool silent = _client.Unanswered(Now()) > NextAddressAfter * (1 + _address);
-        if (silent && _address + 1 < _addresses.Length) UseNextAddress();
+        long silence = _client.Unanswered(Now());
+        if (silence == 0) _moves = 0;
+        if (_addresses.Length > 1 && silence > NextAddressAfter * (1 + _moves)) UseNextAddress();
         socket = _socket;
       }
-      int count = socket.Receive(_received, 0, _received.Length, SocketFlags.None, out SocketError error);
+      if (socket == null) return;
+      int count;
+      SocketError error;
+      try {
+        count = socket.Receive(_received, 0, _received.Length, SocketFlags.None, out error);
+      } catch (ObjectDisposedException) {
+        return; // Close was called meanwhile
+      }
       if (error == SocketError.ConnectionRefused || error == SocketError.ConnectionReset) {
         Thread.Sleep(WaitMs); // the answer to an earlier datagram, which is treated as lost
         return;
       }
       if (error != SocketError.Success) return; // mostly TimedOut
       lock (_lock) {
+        if (_socket != socket) return;
         _client.Receive(Now(), _received, count);
-        for (int i = 1; i < MostAtOnce && error == SocketError.Success && socket.Available > 0; ++i) {
+        for (int i = 1; i < MostAtOnce && error == SocketError.Success; ++i) {
+          if (_socket != socket || socket.Available == 0) break; // the callback of a request may have closed it
           count = socket.Receive(_received, 0, _received.Length, SocketFlags.None, out error);
           if (error == SocketError.Success) _client.Receive(Now(), _received, count);
         }
@@ -175,15 +193,22 @@ namespace Tendon {
     }
 
     private void SendDue() {
+      if (_socket == null) return;
       for (int count; (count = _client.NextDatagram(Now(), _sent)) > 0;) {
         _socket.Send(_sent, 0, count, SocketFlags.None, out SocketError _);
       }
     }
 
     private void UseNextAddress() {
-      ++_address;
-      _socket.Close();
-      _socket = Connected();
+      ++_moves;
+      _address = (_address + 1) % _addresses.Length;
+      try {
+        Socket next = Connected();
+        _socket.Close();
+        _socket = next;
+      } catch (SocketException) {
+        // there is no route to this address; the next one follows after another second
+      }
     }
 
     private Socket Connected() {

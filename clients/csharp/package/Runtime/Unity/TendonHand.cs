@@ -83,6 +83,7 @@ namespace Tendon.Unity {
     private HandleDescription _handle;
     private string _status = "";
     private Func<ForceClient, HandleDescription> _handleOf; // made once, so that FixedUpdate does not allocate
+    private Func<ForceClient, bool> _awaitsHandle;
 
     /// <summary>Returns the force on the hand.</summary>
     protected abstract HandForce Touch(HandState hand);
@@ -95,8 +96,9 @@ namespace Tendon.Unity {
 
     protected virtual void OnEnable() {
       _handleOf = client => client.Handle;
+      _awaitsHandle = client => client.AwaitsHandle;
       try {
-        var config = new Config { Name = name, Device = device, Channel = channel, RateHz = statesPerSecond };
+        var config = new Config { Name = NameOf(name), Device = device, Channel = channel, RateHz = statesPerSecond };
         config.ValidForUs = (uint)(Mathf.Clamp(validForSeconds, 1e-6f, 10) * 1e6f);
         if (keyFile != "") config.Key = KeyFile.Load(keyFile);
         _client = new HapticClient(server, config);
@@ -107,6 +109,9 @@ namespace Tendon.Unity {
       }
     }
 
+    /// <summary>Returns at most 63 bytes of UTF-8, because a client's name has at most 64.</summary>
+    private static string NameOf(string name) => name.Length <= 21 ? name : name.Substring(0, 21);
+
     protected virtual void OnDisable() {
       _client?.Close("the component was disabled");
       _client = null;
@@ -116,7 +121,7 @@ namespace Tendon.Unity {
 
     protected virtual void FixedUpdate() {
       if (_client == null) return;
-      if (!_client.TryTake(_state)) {
+      if (_client.With(_awaitsHandle) || !_client.TryTake(_state)) {
         TellStatus();
         return;
       }
@@ -159,11 +164,14 @@ namespace Tendon.Unity {
       if (objection != null) Tell(objection);
     }
 
-    /// <summary>The description arrives after the first states.</summary>
+    /// <summary>The description arrives after the session opens. Until then, the axes are not known, and Touch is not
+    /// called.</summary>
     private void UseHandle(HandleDescription handle) {
       if (handle == null || handle == _handle) return;
       _handle = handle;
-      if (handle.OperatorFromDevice.HasValue) _frame = new UnityFrame(handle.OperatorFromDevice.Value);
+      _frame = handle.OperatorFromDevice.HasValue
+        ? new UnityFrame(handle.OperatorFromDevice.Value)
+        : UnityFrame.Identity;
     }
 
     private void TellStatus() {
