@@ -150,9 +150,4 @@ int tendon_count(tendon_client* client, tendon_counts* counts) {
 
 const char* tendon_why(const tendon_client* client) { return client != nullptr ? client->why() : "client = NULL"; }
 
-void tendon_close(tendon_client* client) {
-  try {
-    delete client;
-  } catch (...) {
-  }
-}
+void tendon_close(tendon_client* client) { delete client; }

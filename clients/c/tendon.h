@@ -135,8 +135,8 @@ typedef struct tendon_force {
 enum {
   TENDON_REARM = 1,   // clear a fault and undo a disarm; with a safety layer, ask the operator to arm
   TENDON_DISARM = 2,  // disable all forces from the next step until a client rearms
-  TENDON_TAKE = 3,    // request the channel; TENDON_BUSY if another controller still holds it at the timeout
-  TENDON_GIVE = 4,    // release the channel
+  TENDON_TAKE = 3,  // request the channel once (TENDON_TAKE_LEASE repeats this); TENDON_BUSY at the timeout if refused
+  TENDON_GIVE = 4,  // release the channel
   TENDON_ENGAGE = 5,  // engage or disengage the coupling of two devices
   TENDON_DISENGAGE = 6,
   TENDON_SET_SCALE = 7  // of the coupling: value[0] for positions, value[1] for forces, each 0.01 … 100

@@ -11,7 +11,7 @@ DEFUN_DLD(tendon_oct, args, , "rows = tendon_oct(server, n, f): sends f(x) = [fo
   const std::unique_ptr<tendon_client, decltype(&tendon_close)> client(tendon_open(&config, why, 200), &tendon_close);
   if (!client) error("tendon_oct: %s", why);
   tendon_state hand = {.size = sizeof hand};
-  Matrix rows(args(1).int_value(), 6);
+  Matrix rows(args(1).int_value(), 6, 0.0);
   for (int i = 0; i < rows.rows() && tendon_wait(client.get(), &hand, 1000000000) == TENDON_OK; ++i) {
     for (int j = 0; j < 6; ++j) rows(i, j) = j < 3 ? hand.position[j] : hand.force_applied[j - 3];
     const octave_value f = octave::feval(args(2), ovl(rows.extract_n(i, 0, 1, 3)), 1)(0);
