@@ -110,6 +110,7 @@ class Checker {
     episodes.forEach((row, k) => {
       this.#expect(kEpisodes, `episode_index of row ${k}`, row["episode_index"], k);
       this.#expect(kEpisodes, `dataset_from_index of episode ${k}`, row["dataset_from_index"], first);
+      if (!(Number(row["length"]) >= 1)) this.#found(kEpisodes, `length of episode ${k}: expected at least 1, got ${String(row["length"])}`);
       first += Number(row["length"]);
       this.#expect(kEpisodes, `dataset_to_index of episode ${k}`, row["dataset_to_index"], first);
       for (const task of (row["tasks"] ?? []) as string[]) {
