@@ -48,11 +48,12 @@ get_packages() {
 get_kernel() {
   local package
   package=$(apt-cache depends "$kernel" | awk '$1 == "Depends:" { print $2; exit }')
-  [ -n "$package" ] || { echo "apt-get does not find $kernel"; return 1; }
+  [ -n "$package" ] || { echo "apt-get does not find $kernel; run apt-get update"; return 1; }
   if [ "$(cat "$folder/package" 2>/dev/null)" != "$package" ]; then
     rm -rf "$folder/kernel" "$folder"/linux-image-*.deb
     mkdir "$folder/kernel"
-    (cd "$folder" && apt-get -qq download "$package")
+    (cd "$folder" && apt-get -qq download "$package") ||
+      { echo "cannot download $package; run apt-get update"; return 1; }
     dpkg-deb --fsys-tarfile "$folder"/linux-image-*.deb |
       tar -x -C "$folder/kernel" --wildcards './boot/vmlinuz-*' "${kernel_files[@]}"
     rm "$folder"/linux-image-*.deb
