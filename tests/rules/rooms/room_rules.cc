@@ -65,6 +65,7 @@ const std::vector<Door>& front_doors() {
       {"Boost.Beast and Boost.Asio", {"boost/"}, {"clients/cpp/web/http_server.cc"}},
       // For programs in C and in other languages.
       {"C", {"stddef.h", "stdint.h"}, {"clients/c/tendon.h"}},
+      {"the installed header of libtendon", {"tendon.h"}, {"clients/c/examples/"}},
       {"CHOLMOD", {"cholmod.h", "Eigen/CholmodSupport"}, {"clients/softbody/fem/sparse.cc"}},
       {"CLI11",
        {"CLI/"},
@@ -83,6 +84,7 @@ const std::vector<Door>& front_doors() {
         "clients/bridge/bridge_host.cc", "clients/bridge/inverse/inverse_json.cc",
         "clients/softbody/cluster/estimate.cc", "clients/softbody/explain.cc", "*_main.cc"}},
       {"the library of OpenIGTLink", {"openigtlink/"}, {"tests/clients/bridge/igtl/igtl_library_test.cc"}},
+      {"Octave", {"octave/"}, {"clients/c/examples/tendon_oct.cc"}},
       {"PETSc", {"petscksp.h"}, {"clients/softbody/mpi/spread_solver.cc"}},
       {"preCICE", {"precice/"}, {"clients/precice/precice_engine.cc", "tests/clients/precice/"}},
       {"prometheus-cpp", {"prometheus/"}, {"clients/dashboard/metrics.cc"}},

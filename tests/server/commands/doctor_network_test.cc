@@ -4,11 +4,11 @@
 #include <gtest/gtest.h>
 
 #include <functional>
-#include <random>
 #include <string>
 #include <vector>
 
 #include "tests/server/commands/planted_machine.h"
+#include "tests/support/dice.h"
 
 namespace tendon::doctor_network_test {
 namespace {
@@ -211,7 +211,7 @@ TEST(DoctorNetwork, DamagedFilesAreUnknown) {
 /// Draws a machine without faults, of many kinds.
 class DrawnMachine {
  public:
-  explicit DrawnMachine(unsigned seed) : random_(seed) {
+  explicit DrawnMachine(unsigned seed) : dice_(seed) {
     const int cpus = whole(2, 128);
     const bool isolated = chance(0.6);
     haptic_ = isolated || chance(0.5) ? cpus - 1 : -1;
@@ -231,8 +231,8 @@ class DrawnMachine {
   Machine machine;
 
  private:
-  int whole(int least, int most) { return std::uniform_int_distribution(least, most)(random_); }
-  bool chance(double share) { return std::bernoulli_distribution(share)(random_); }
+  int whole(int least, int most) { return static_cast<int>(dice_.within(least, most + 1)); }
+  bool chance(double share) { return dice_.chance(share); }
   std::string other_processor() { return std::to_string(haptic_ < 0 ? whole(0, 1) : whole(0, haptic_ - 1)); }
 
   void draw_clock() {
@@ -297,7 +297,7 @@ class DrawnMachine {
     machine.say_affinity(201, "0-127");
   }
 
-  std::mt19937 random_;
+  Dice dice_;
   int haptic_ = -1;
   int next_interrupt_ = 24;
 };
