@@ -521,6 +521,12 @@ def test_64_frames_are_read_and_65_are_malformed():
     assert codec.read_data(codec.write_data_head(1, None) + 65 * empty) is None
 
 
+def test_a_tag_whose_lower_32_bits_are_field_0_is_malformed():
+    head = codec.write_data_head(1, None)
+    assert codec.read_data(head + b"\x80\x80\x80\x80\x10\x00") is None
+    assert codec.read_data(head + b"\x80\x00\x00") is None
+
+
 def test_texts_are_cut_to_their_bounds_at_a_character():
     answer = codec.read_answer(codec.write_answer(Refused(Code.BUSY, 127 * "a" + "ä" + "b")))
     assert answer == Refused(Code.BUSY, 127 * "a")

@@ -170,7 +170,7 @@ def _is_whole(body: bytes) -> bool:
         if tag >= 0x80:
             tag, at = _varint(body, at - 1)
         kind = tag & 7
-        if tag < 8:  # field 0
+        if tag & 0xFFFFFFFF < 8:  # field 0, since protobuf uses the lower 32 bits
             return False
         if kind == 2:
             size = body[at]
