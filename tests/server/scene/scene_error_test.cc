@@ -189,7 +189,7 @@ TEST(SceneError, TheKeysOfOneKindOfMotionAreUnknownToAnother) {
 TEST(SceneError, ReportsTheFirstMistakeInTheFile) {
   EXPECT_EQ(error_of_minimal_and("[network]\nzzzzzz = 1\n[loop]\naaaaaa = 1\n"),
             "s.toml:5: network.zzzzzz: unknown key; expected one of listen, unix, keys, suites, max_observers, "
-            "controller_timeout_ms, observer_timeout_ms, adapt_state_rate, takeover, busy, threads");
+            "controller_timeout_ms, observer_timeout_ms, adapt_state_rate, takeover, busy, dscp, threads");
   EXPECT_EQ(error_of_minimal_and("[loop]\nperiod_us = \"x\"\n[force]\nhold_us = 1\n"),
             "s.toml:5: loop.period_us: expected a number from 100 to 4000 µs, found \"x\"");
 }

@@ -313,7 +313,7 @@ TEST(IgtlSession, WrongMessagesAreRefusedWithTheReasonAndLiesEndIt) {
             "it announced a IMAGE MR of 9223372036854775808 bytes");
   EXPECT_EQ(after(Buffer(kHeaderSize, std::byte{'G'})), "it does not use OpenIGTLink");
   EXPECT_EQ(after(announced("TRANSFORM", "rightTarget", 5000)),
-            "its TRANSFORM rightTarget is ignored; expected TRANSFORM rightTarget or SENSOR rightCommand");
+            "its TRANSFORM rightTarget is refused: 5000 bytes; expected at most 4096");
 }
 
 TEST(IgtlSession, AProgramThatDoesNotReadIsDroppedAfter64Kilobytes) {
