@@ -128,7 +128,7 @@ typedef struct tendon_force {
   double torque[3];             // N·m, on the hand
   double angular_stiffness[9];  // N·m/rad, −∂torque/∂θ; ignored without TENDON_STATE_TURNING
   double grip_force;            // N, on the fingers; positive values open them
-  int64_t valid_for_ns;         // instead of the config's
+  int64_t valid_for_ns;         // instead of the config's; clamped to 1 us … 10 s
 } tendon_force;
 
 // tendon_order.what

@@ -146,7 +146,12 @@ namespace Tendon {
       request.Id = 1; // is within bounds; the number follows
       string objection = request.Objection();
       if (objection != null) throw new ArgumentException($"{objection} is out of bounds (WIRE.md)");
-      return Phase == Phase.Open && _session.Asked.Add(request, then);
+      if (Phase != Phase.Open || !_session.Asked.Add(request, then)) return false;
+      if (request.Op == Control.OpCase.GiveLease && request.GiveLease.Device == DeviceNumber &&
+          request.GiveLease.Channel == ChannelNumber) {
+        Holds = false;
+      }
+      return true;
     }
 
     /// <summary>Asks for the lease of the channel. Holds becomes true if the server agrees. Otherwise, `refused`
