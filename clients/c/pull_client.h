@@ -79,7 +79,7 @@ class PullClient {
   ForceClient::Phase phase_ = ForceClient::Phase::kGreeting;
   std::uint64_t session_ = 0;  ///< number of the newest one
   std::string trouble_;        ///< the reason for the end of the newest session or attempt
-  bool lost_ = false;          ///< a session has ended, and this was not returned yet
+  bool lost_ = false;          ///< the caller must still be told that a session has ended
   bool ended_ = false;         ///< permanently
 
   DeviceState newest_{};

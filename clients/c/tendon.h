@@ -127,7 +127,7 @@ typedef struct tendon_force {
   double gap;                   // m, distance from the surface to the tool; negative if it is inside
   double torque[3];             // N·m, on the hand
   double angular_stiffness[9];  // N·m/rad, −∂torque/∂θ; ignored without TENDON_STATE_TURNING
-  double grip_force;            // N, on the fingers; positive values open them
+  double grip_force;            // N, on the fingers; it opens them if it is positive
   int64_t valid_for_ns;         // instead of the config's; clamped to 1 us … 10 s
 } tendon_force;
 

@@ -6,7 +6,7 @@
 
 namespace tendon::bridge {
 
-/// Returns the type hash of a ROS 2 message. ROS 2 Iron and later compare the hashes of the two ends of a topic.
+/// Returns the type hash of a ROS 2 message. ROS 2 Iron and later compare the hashes of a publisher and its subscribers.
 ///
 ///     hash = "RIHS01_" + hexadecimal digits of SHA-256({"type_description": …, "referenced_type_descriptions": […]})
 ///

@@ -16,7 +16,7 @@ namespace {
 using testing::Findings;
 using Machine = testing::PlantedMachine;
 
-/// A machine without faults: 4 processors, the last of them isolated, and two wired cards.
+/// This machine has no faults. It has 4 processors, of which the last is isolated, and two wired cards.
 void make_healthy(Machine& machine) {
   machine.say("sys/devices/system/cpu/online", "0-3");
   machine.say("sys/devices/system/cpu/isolated", "3");

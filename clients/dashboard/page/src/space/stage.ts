@@ -51,7 +51,7 @@ class Place {
   readonly still = new Group();
   readonly path = new Float32Array(3 * kPathPoints);
   readonly surface = new TouchedSurface();
-  /** Of the surface that is drawn. */
+  /** Identifies the surface that is drawn, to build it again only after a change. */
   surfaceKey = "";
   patches = 0;
   key = "";
