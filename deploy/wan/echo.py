@@ -4,8 +4,8 @@
     echo.py serve PORT
     echo.py ask ROUNDS HOST:PORT…     prints the round trip (µs) of each way, and its ratio to the first one
 
-In each round, it measures 100 round trips to each address. The result is the lowest median of all rounds, because the other rounds
-have been disturbed by other programs on the machine.
+In each round, it measures 100 round trips to each address. The result is the lowest median of all rounds, because the
+other rounds have been disturbed by other programs on the machine.
 """
 
 from __future__ import annotations

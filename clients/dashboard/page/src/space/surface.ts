@@ -27,7 +27,8 @@ export class TouchedSurface {
   /** Increases with each change. */
   version = 0;
 
-  /** Adds the steps of `track` that are newer than those of the previous call. If this is a different track, it forgets the previous one. */
+  /** Adds the steps of `track` that are newer than those of the previous call. A different track replaces the previous
+   * one. */
   follow(track: Track): void {
     if (track !== this.#track || track.last < this.#seen) {
       this.#track = track;
