@@ -49,7 +49,6 @@ function(tendon_links_headers program name)
     # function. Some of these functions call others that no library defines. The linker drops them because they are
     # never called.
     target_sources(${program} ${scope} ${functions})
-    target_link_libraries(${program} ${scope} -Wl,--gc-sections)
     add_dependencies(${program} ${name}_functions)
   endif()
 endfunction()
