@@ -10,7 +10,7 @@ bool BusyLink::look(LocalTime& now) {
   if (size_ > 0) return true;
   const LocalTime before = now;
   size_ = link_.receive(from_, ahead_);
-  now = link_.present(now);
+  now = size_ > 0 ? link_.arrived(now) : link_.present(now);
   if (size_ == 0) {
     nothing_ = before;
     return false;

@@ -30,6 +30,7 @@ class BusyLink : public Link {
   LocalTime present(LocalTime now) const override { return link_.present(now); }
   /// If the datagram was taken by look(), this is the time of that call.
   LocalTime arrived(LocalTime now) const override { return by_look_ ? std::max(now, looked_) : link_.arrived(now); }
+  LocalTime reached(LocalTime now) const override { return link_.reached(now); }
 
  private:
   /// If an empty look took longer, the thread was preempted, and more than one datagram may have arrived.

@@ -75,7 +75,7 @@ const Connection::Event* Connection::receive(LocalTime& now) {
     handshake_->receive(now, datagram);
     return settle(now);
   }
-  if (session_) session_->receive(now, datagram);
+  if (session_) session_->receive(now, datagram, link_.reached(now));
   return nullptr;
 }
 

@@ -54,6 +54,10 @@ class Link {
 
   /// Like present(), for the arrival of the last datagram. A link that knows this saves reading the clock.
   virtual LocalTime arrived(LocalTime now) const { return present(now); }
+
+  /// Returns the time at which the last datagram has reached this machine, at most `now`. If the link does not know this
+  /// time, it returns `now`. Use this only to measure delays and clocks. The age of a force must not depend on it.
+  virtual LocalTime reached(LocalTime now) const { return now; }
 };
 
 }  // namespace tendon

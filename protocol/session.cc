@@ -209,8 +209,8 @@ struct Session::State {
 
   std::optional<std::span<const std::byte>> open_body(LocalTime now, const Header& header,
                                                       std::span<const std::byte> datagram);
-  bool accept(LocalTime now, std::uint64_t number, const DataContent& content);
-  void observe(LocalTime now, PeerTime sent, const IncomingEcho& told);
+  bool accept(LocalTime now, LocalTime reached, std::uint64_t number, const DataContent& content);
+  void observe(LocalTime now, LocalTime reached, PeerTime sent, const IncomingEcho& told);
   void count_lost_outgoing(const IncomingEcho& told);
 
   // `newest` is true if this datagram is the newest so far.
@@ -290,7 +290,7 @@ Session::~Session() = default;
 Session::Session(Session&&) noexcept = default;
 Session& Session::operator=(Session&&) noexcept = default;
 
-bool Session::receive(LocalTime now, std::span<const std::byte> datagram) {
+bool Session::receive(LocalTime now, std::span<const std::byte> datagram, LocalTime reached) {
   State& my = *state_;
   my.latest = now;
   if (!my.open) return false;
@@ -318,7 +318,7 @@ bool Session::receive(LocalTime now, std::span<const std::byte> datagram) {
     ++my.stats.malformed;
     return false;
   }
-  return my.accept(now, header->packet_number, *content);
+  return my.accept(now, reached, header->packet_number, *content);
 }
 
 /// Returns the plaintext, or nullopt if the datagram is not authentic, which is counted.
@@ -338,7 +338,7 @@ std::optional<std::span<const std::byte>> Session::State::open_body(LocalTime no
   return std::nullopt;
 }
 
-bool Session::State::accept(LocalTime now, std::uint64_t number, const DataContent& content) {
+bool Session::State::accept(LocalTime now, LocalTime reached, std::uint64_t number, const DataContent& content) {
   ++stats.datagrams_received;
   stats.invalid += content.invalid;
   stats.refused_forces.not_finite += content.forces_not_finite;
@@ -349,9 +349,10 @@ bool Session::State::accept(LocalTime now, std::uint64_t number, const DataConte
   seen.insert(number);
   stats.lost = seen.missing();
   if (newest) {
-    echo = {.sent = content.sent, .received = now, .packet_number = number, .received_mask = 0};
+    echo = {.sent = content.sent, .received = reached, .packet_number = number, .received_mask = 0};
   }
-  if (content.echo) observe(now, content.sent, *content.echo);
+  exchange.reset();
+  if (content.echo) observe(now, reached, content.sent, *content.echo);
   untold |= !content.frames.empty();
   for (const Frame& frame : content.frames) {
     std::visit([&](const auto& body) { take(body, newest); }, frame);
@@ -359,7 +360,7 @@ bool Session::State::accept(LocalTime now, std::uint64_t number, const DataConte
   return newest;
 }
 
-void Session::State::observe(LocalTime now, PeerTime sent, const IncomingEcho& told) {
+void Session::State::observe(LocalTime now, LocalTime reached, PeerTime sent, const IncomingEcho& told) {
   const bool possible =
       told.packet_number < next_packet && told.sent >= opened && told.sent <= now && sent >= told.received;
   if (!possible) {
@@ -367,9 +368,11 @@ void Session::State::observe(LocalTime now, PeerTime sent, const IncomingEcho& t
     return;
   }
   count_lost_outgoing(told);
-  exchange = {.sent = told.sent, .received = told.received, .answered = sent, .answered_at = now};
+  // The answer cannot arrive before the question is sent, so an earlier time stamp must be wrong.
+  const LocalTime answered_at = reached >= told.sent ? reached : now;
+  exchange = {.sent = told.sent, .received = told.received, .answered = sent, .answered_at = answered_at};
   peer_clock.observe(*exchange);
-  const Duration sample = (now - told.sent) - (sent - told.received);
+  const Duration sample = (answered_at - told.sent) - (sent - told.received);
   if (sample < Duration::zero()) return;  // different clock rates, and a long delay at the peer
   round_trip.observe(sample);
   stats.round_trip = round_trip.newest();
@@ -588,7 +591,7 @@ bool Session::open() const noexcept { return state_->open; }
 std::uint32_t Session::connection_id() const noexcept { return state_->config.connection_id; }
 Suite Session::suite() const noexcept { return state_->suite; }
 const LinkStats& Session::stats() const noexcept { return state_->stats; }
-const std::optional<ClockExchange>& Session::newest_exchange() const noexcept { return state_->exchange; }
+const std::optional<ClockExchange>& Session::exchange() const noexcept { return state_->exchange; }
 std::optional<ClockOffsetEstimator::Estimate> Session::peer_clock() const noexcept {
   return state_->peer_clock.estimate(state_->latest);
 }

@@ -130,7 +130,9 @@ class Session {
   // Input.
   /// Handles a datagram. Malformed or foreign datagrams are counted and dropped. Returns true if this is the newest
   /// datagram so far, whose source is then the current address of the peer. Only suites 1 and 2 authenticate it.
-  bool receive(LocalTime now, std::span<const std::byte> datagram);
+  /// `reached` is used instead of `now` to measure the round trip and the clock of the peer (Link::reached).
+  bool receive(LocalTime now, std::span<const std::byte> datagram, LocalTime reached);
+  bool receive(LocalTime now, std::span<const std::byte> datagram) { return receive(now, datagram, now); }
   void send(const DeviceState& state);
   void send(const ForceCommand& command);
   void send(const LinkReport& report);
@@ -165,7 +167,8 @@ class Session {
   std::uint32_t connection_id() const noexcept;
   Suite suite() const noexcept;
   const LinkStats& stats() const noexcept;
-  const std::optional<ClockExchange>& newest_exchange() const noexcept;
+  /// Returns the exchange of the last accepted datagram, or nothing if it did not contain a valid echo.
+  const std::optional<ClockExchange>& exchange() const noexcept;
   /// The offset of the peer's clock at the newest `now`, with an error bound. Empty before the first echo.
   std::optional<ClockOffsetEstimator::Estimate> peer_clock() const noexcept;
 

@@ -245,6 +245,7 @@ Json in_json(const Server::Summary& summary) {
   add("duplicated", network.dropped.duplicated);
   add("invalid", network.dropped.invalid);
   add("stale", network.dropped.stale);
+  add("stamps_refused", network.refused_stamps);
   add("lost", network.controller.lost);
   add("round_trip_ms", seconds(network.controller.smoothed_round_trip) * 1e3);
   if (const auto& clock = network.controller_clock) {

@@ -17,11 +17,6 @@ namespace {
 
 using enum DatagramFilter::Sender;
 
-const ClockExchange* exchange_of(LocalTime now, const ServedClient& client) {
-  const auto& exchange = client.session.newest_exchange();
-  return exchange && exchange->answered_at == now ? &*exchange : nullptr;
-}
-
 }  // namespace
 
 NetworkLoop::NetworkLoop(const Config& config, Link& link, LocalTime now)
@@ -100,9 +95,10 @@ void NetworkLoop::receive(LocalTime now, const Address& from, std::span<const st
   const auto tap_from = [&](DatagramFilter::Sender sender) {
     tap(now, DatagramRecord::Direction::kIn, sender, from, datagram, datagram.size());
   };
+  const LocalTime reached = link_.reached(now);
   const auto header = decode_header(datagram);
   if (header && header->type == DatagramType::kHello) return greet(now, from, datagram);
-  if (ports_.receive(now, from, datagram)) return tap_from(kClient);
+  if (ports_.receive(now, from, datagram, reached)) return tap_from(kClient);
   if (!header || header->type != DatagramType::kData) {
     ++stats_.malformed;
     return tap_from(kUnauthenticated);
@@ -112,7 +108,7 @@ void NetworkLoop::receive(LocalTime now, const Address& from, std::span<const st
   };
   if (const auto client = std::find_if(clients_.begin(), clients_.end(), is_meant); client != clients_.end()) {
     const std::uint64_t accepted = client->session.stats().datagrams_received;
-    const bool newest = client->session.receive(now, datagram);
+    const bool newest = client->session.receive(now, datagram, reached);
     tap_from(client->session.stats().datagrams_received > accepted ? kClient : kUnauthenticated);
     if (newest && client->address != from) {
       client->address = from;
@@ -124,7 +120,7 @@ void NetworkLoop::receive(LocalTime now, const Address& from, std::span<const st
     if (newest) measure(now, *client);
   } else if (const auto waiting = std::find_if(half_open_.begin(), half_open_.end(), is_meant);
              waiting != half_open_.end()) {
-    if (!waiting->session.receive(now, datagram)) return tap_from(kUnauthenticated);
+    if (!waiting->session.receive(now, datagram, reached)) return tap_from(kUnauthenticated);
     tap_from(kClient);
     ServedClient arrived = std::move(*waiting);
     half_open_.erase(waiting);
@@ -155,8 +151,8 @@ void NetworkLoop::adapt(LocalTime now, ServedClient& client) {
 
 /// Passes on the timing of the datagram before the forces in it are judged.
 void NetworkLoop::hear(LocalTime now, ServedClient& client) {
-  const ClockExchange* const exchange = exchange_of(now, client);
-  const auto sent = exchange != nullptr ? std::optional(exchange->answered) : std::nullopt;
+  const auto& exchange = client.session.exchange();
+  const auto sent = exchange ? std::optional(exchange->answered) : std::nullopt;
   for (const Slot& slot : client.slots) {
     ServedChannel& channel = devices_[slot.device].channels[slot.channel];
     if (channel.holder == client.id()) channel.lateness.heard(now, sent, client.session.stats().lost);
@@ -167,8 +163,8 @@ void NetworkLoop::hear(LocalTime now, ServedClient& client) {
 void NetworkLoop::measure(LocalTime now, ServedClient& client) {
   if (!client.meter) return;
   client.meter->heard(now);
-  const ClockExchange* const exchange = exchange_of(now, client);
-  if (exchange == nullptr) return;
+  const auto& exchange = client.session.exchange();
+  if (!exchange) return;
   if (const auto clock = client.session.peer_clock()) client.meter->observe(*exchange, *clock);
 }
 
@@ -267,10 +263,12 @@ void NetworkLoop::take_force(LocalTime now, ServedClient& client, const ForceCom
   if (bound > 0 && command.force.squaredNorm() > bound * bound) channel.lateness.cut();
   const LinkStats& link = client.session.stats();
   const std::uint64_t lost = link.lost + link.lost_outgoing;
+  const auto& exchange = client.session.exchange();
+  const Duration waited = exchange ? now - exchange->answered_at : Duration::zero();
   channel.lateness.observe({.sampled = answered->at,
                             .sent = answered->sent,
                             .received = now,
-                            .round_trip = link.round_trip,
+                            .round_trip = link.round_trip + waited,
                             .valid_for = command.valid_for,
                             .lost = lost > std::exchange(client.lost, lost)});
   RemoteForce& force = device.mail->forces[command.channel].back();  // contains an old value

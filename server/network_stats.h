@@ -42,6 +42,7 @@ struct NetworkStats {
   std::uint64_t replaced = 0;  ///< by a client with the same key
   std::uint64_t roamed = 0;    ///< a client changed its address
   std::uint64_t half_open_forgotten = 0;
+  std::uint64_t refused_stamps = 0;      ///< time stamps of the kernel (KernelStamps)
   std::uint64_t malformed = 0;           ///< the size or the header is invalid
   std::uint64_t unknown_connection = 0;  ///< Data with an unknown connection id or the wrong address
   ServerHandshake::Stats hellos;         ///< Hellos that were not answered with a Welcome or a Refused

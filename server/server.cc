@@ -257,6 +257,7 @@ Server::Summary Server::stop() {
     if (!of.scene.driver().ids.empty()) device.counts = of.device.counts();
   }
   for (std::size_t i = 0; i < assembly_.networks(); ++i) summary.network += assembly_.network(i).stats();
+  for (const auto& network : networks_) summary.network.refused_stamps += network->link->refused_stamps();
   summary.recording = assembly_.log().recording();
   summary.uptime = clock::now() - started_;
   return summary;

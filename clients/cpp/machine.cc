@@ -12,6 +12,8 @@ namespace tendon {
 
 LocalTime read_clock() { return LocalTime(std::chrono::steady_clock::now().time_since_epoch()); }
 
+Duration read_unix_clock() { return std::chrono::system_clock::now().time_since_epoch(); }
+
 bool has_one_processor() {
   cpu_set_t allowed;
   return sched_getaffinity(0, sizeof allowed, &allowed) == 0 && CPU_COUNT(&allowed) == 1;

@@ -6,7 +6,8 @@
 
 namespace tendon {
 
-LocalTime read_clock();  ///< reads CLOCK_MONOTONIC; thread-safe
+LocalTime read_clock();      ///< reads CLOCK_MONOTONIC; thread-safe
+Duration read_unix_clock();  ///< reads CLOCK_REALTIME, the time since 1970; thread-safe
 
 bool has_one_processor();  ///< whether the affinity mask of this process contains only one processor
 

@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <asio/io_context.hpp>
 #include <asio/ip/udp.hpp>
 #include <asio/local/datagram_protocol.hpp>
@@ -33,6 +34,22 @@ udp::endpoint to_endpoint(const Address& address) {
   return {v6, address.port};
 }
 
+/// Receives a datagram and, if `stamp` is not null, its time stamp. MSG_TRUNC: returns the size of the datagram even if
+/// the buffer is smaller.
+ssize_t take(int fd, std::span<std::byte> buffer, std::optional<Duration>* stamp) noexcept {
+  if (stamp == nullptr) return ::recv(fd, buffer.data(), buffer.size(), MSG_TRUNC);
+  iovec piece{buffer.data(), buffer.size()};
+  alignas(cmsghdr) std::array<char, KernelStamps::kControlBytes> control;
+  msghdr header{};
+  header.msg_iov = &piece;
+  header.msg_iovlen = 1;
+  header.msg_control = control.data();
+  header.msg_controllen = control.size();
+  const ssize_t size = ::recvmsg(fd, &header, MSG_TRUNC);
+  if (size > 0) *stamp = KernelStamps::find(header);
+  return size;
+}
+
 /// Returns whether one of the descriptors is readable.
 bool poll_until_readable(std::span<pollfd> descriptors, Duration timeout) noexcept {
   const Duration left = std::max(timeout, Duration::zero());
@@ -47,6 +64,11 @@ bool poll_until_readable(std::span<pollfd> descriptors, Duration timeout) noexce
 void UdpTransport::use(int connected) noexcept {
   if (fd_ >= 0) ::close(fd_);
   fd_ = connected;
+  stamped_ = false;
+}
+
+void UdpTransport::ask_for_stamps() noexcept {
+  if (!std::exchange(stamped_, true)) KernelStamps::ask(fd_);
 }
 
 /// Binds to an address chosen by the kernel (unix(7), autobind), so that the server can answer.
@@ -118,9 +140,17 @@ void UdpTransport::send(const Address& to, std::span<const std::byte> datagram) 
 std::size_t UdpTransport::receive(Address& from, std::span<std::byte> buffer) {
   from = server_;
   for (int i = 0; i < kMaxSkips; ++i) {
-    // MSG_TRUNC: returns the size of the datagram even if the buffer is smaller.
-    const ssize_t size = ::recv(fd_, buffer.data(), buffer.size(), MSG_TRUNC);
-    if (size > 0) return static_cast<std::size_t>(size);
+    std::optional<Duration> stamp;
+    const ssize_t size = take(fd_, buffer, stamped_ ? &stamp : nullptr);
+    if (size > 0) {
+      if (stamp) {
+        const Duration unix_now = read_unix_clock();
+        stamps_.observe(*stamp, unix_now, read_clock());
+      } else {
+        stamps_.observe(read_clock());
+      }
+      return static_cast<std::size_t>(size);
+    }
     if (size < 0 && (errno == EAGAIN || errno == EWOULDBLOCK)) return 0;
   }
   return 0;
@@ -129,6 +159,7 @@ std::size_t UdpTransport::receive(Address& from, std::span<std::byte> buffer) {
 LocalTime UdpTransport::present(LocalTime now) const { return std::max(now, read_clock()); }
 
 void UdpTransport::wait(Duration timeout) {
+  ask_for_stamps();
   pollfd alone{fd_, POLLIN, 0};
   poll_until_readable({&alone, 1}, timeout);
 }
@@ -137,6 +168,7 @@ bool UdpTransport::wait_for_any(std::span<UdpTransport* const> transports, Durat
   std::vector<pollfd> readable;
   if (also >= 0) readable.push_back({also, POLLIN, 0});
   for (UdpTransport* const transport : transports) {
+    transport->ask_for_stamps();
     readable.push_back({transport->descriptor(), POLLIN, 0});
   }
   return poll_until_readable(readable, timeout);

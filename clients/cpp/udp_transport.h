@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <optional>
 #include <span>
 #include <vector>
 
 #include "clients/cpp/dscp.h"
+#include "clients/cpp/kernel_stamps.h"
 #include "clients/cpp/server_name.h"
 #include "protocol/link.h"
 #include "protocol/messages.h"
@@ -41,10 +43,13 @@ class UdpTransport : public Link {
   std::size_t receive(Address& from, std::span<std::byte> buffer) override;
 
   LocalTime present(LocalTime now) const override;  ///< reads std::chrono::steady_clock, the clock that run() uses
+  LocalTime arrived(LocalTime now) const override { return std::max(now, stamps_.read()); }
+  LocalTime reached(LocalTime now) const override { return std::min(now, stamps_.reached()); }
 
   int descriptor() const noexcept { return fd_; }  ///< of the socket, for poll(); changes in look_up_again()
 
   /// Waits for a datagram or until `timeout` has elapsed. A signal may end the wait. Returns at once if `timeout` ≤ 0.
+  /// The first wait enables the time stamps of the kernel.
   void wait(Duration timeout);
   /// Sleeps until one of `transports` or the descriptor `also` (−1: none) is readable, or until the timeout. Returns
   /// whether one of them is readable.
@@ -54,6 +59,7 @@ class UdpTransport : public Link {
   void connect_to_file();
   void connect(const std::vector<Address>& addresses, std::size_t first);
   void use(int connected) noexcept;
+  void ask_for_stamps() noexcept;
 
   ServerName name_;
   bool has_key_;
@@ -61,6 +67,8 @@ class UdpTransport : public Link {
   Address server_;
   std::string device_;
   int fd_ = -1;
+  bool stamped_ = false;
+  KernelStamps stamps_;
 };
 
 }  // namespace tendon

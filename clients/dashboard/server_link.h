@@ -31,6 +31,8 @@ class ServerLink : public Link {
   }
   std::size_t receive(Address& from, std::span<std::byte> buffer) override { return transport_->receive(from, buffer); }
   LocalTime present(LocalTime now) const override { return transport_->present(now); }
+  LocalTime arrived(LocalTime now) const override { return transport_->arrived(now); }
+  LocalTime reached(LocalTime now) const override { return transport_->reached(now); }
 
   const Address& server() const noexcept { return transport_->server(); }
   int descriptor() const noexcept { return transport_->descriptor(); }  ///< see UdpTransport::descriptor

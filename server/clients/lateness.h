@@ -64,7 +64,7 @@ class Lateness {
     LocalTime sampled;
     LocalTime sent;
     LocalTime received;
-    Duration round_trip;  ///< measured by the same datagram
+    Duration round_trip;  ///< measured by the same datagram; includes the time until it was read
     Duration valid_for;   ///< requested by the engine, starting at `received`
     bool lost = false;    ///< datagrams were lost since the previous force
   };

@@ -42,8 +42,9 @@ bool Peer::is_from_server(const Address& from, std::span<const std::byte> datagr
   return header->type == DatagramType::kData && session != nullptr && session->connection_id() == header->connection_id;
 }
 
-void Peer::receive(LocalTime now, const Address& from, std::span<const std::byte> datagram) {
+void Peer::receive(LocalTime now, const Address& from, std::span<const std::byte> datagram, LocalTime reached) {
   line_.from = from;
+  line_.reached_at = reached;
   line_.arrived = datagram;
   turn(now);
 }

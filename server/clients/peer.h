@@ -43,7 +43,7 @@ class Peer {
 
   /// Returns true if the datagram may be from this server and must be passed to receive().
   bool is_from_server(const Address& from, std::span<const std::byte> datagram) const;
-  void receive(LocalTime now, const Address& from, std::span<const std::byte> datagram);
+  void receive(LocalTime now, const Address& from, std::span<const std::byte> datagram, LocalTime reached);
   LocalTime turn(LocalTime now);  ///< processes what is due; returns the latest time of the next call
 
   void send(LocalTime now, const PortState& port);  ///< no effect unless coupled
@@ -60,8 +60,10 @@ class Peer {
     explicit Line(Send send) : send_(std::move(send)) {}
     void send(const Address& to, std::span<const std::byte> datagram) override { send_(now, to, datagram); }
     std::size_t receive(Address& from, std::span<std::byte> buffer) override;
+    LocalTime reached(LocalTime /*now*/) const override { return reached_at; }
 
     LocalTime now{};
+    LocalTime reached_at{};  ///< for `arrived`
     Address from;
     std::span<const std::byte> arrived;
 

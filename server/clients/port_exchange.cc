@@ -103,10 +103,10 @@ void PortExchange::arrived(LocalTime now, std::uint32_t index, std::uint32_t cou
   frame.of_peer = true;
 }
 
-bool PortExchange::receive(LocalTime now, const Address& from, std::span<const std::byte> datagram) {
+bool PortExchange::receive(LocalTime now, const Address& from, std::span<const std::byte> datagram, LocalTime reached) {
   for (Dialled& dialled : dialled_) {
     if (!dialled.peer->is_from_server(from, datagram)) continue;
-    dialled.peer->receive(now, from, datagram);
+    dialled.peer->receive(now, from, datagram, reached);
     renew(dialled);
     const auto port = dialled.peer->take();
     if (port && dialled.coupled) arrived(now, dialled.device, 0, 0, *port);

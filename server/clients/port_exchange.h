@@ -30,7 +30,7 @@ class PortExchange {
   bool take(LocalTime now, const ServedClient& client, const PortFrame& port);
 
   /// Returns false if the datagram is not from a dialled server.
-  bool receive(LocalTime now, const Address& from, std::span<const std::byte> datagram);
+  bool receive(LocalTime now, const Address& from, std::span<const std::byte> datagram, LocalTime reached);
 
   LocalTime turn(LocalTime now);
   std::vector<Peer::Notice> take_notices();

@@ -28,6 +28,8 @@ void sleep_until(LocalTime deadline) noexcept {
 
 Duration processor_time() noexcept { return read(CLOCK_THREAD_CPUTIME_ID); }
 
-Duration unix_offset() noexcept { return read(CLOCK_REALTIME) - read(CLOCK_MONOTONIC); }
+Duration unix_time() noexcept { return read(CLOCK_REALTIME); }
+
+Duration unix_offset() noexcept { return unix_time() - read(CLOCK_MONOTONIC); }
 
 }  // namespace tendon::clock

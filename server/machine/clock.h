@@ -15,6 +15,8 @@ void sleep_until(LocalTime deadline) noexcept;  ///< absolute, so that errors do
 
 Duration processor_time() noexcept;
 
+Duration unix_time() noexcept;  ///< since 1970, CLOCK_REALTIME
+
 Duration unix_offset() noexcept;  ///< Unix time − local time
 
 }  // namespace clock

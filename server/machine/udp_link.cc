@@ -15,6 +15,7 @@
 #include <ctime>
 #include <stdexcept>
 #include <system_error>
+#include <utility>
 
 #include "protocol/wire/header.h"
 #include "server/machine/clock.h"
@@ -62,7 +63,7 @@ struct Message {
   Message(const Message&) = delete;
   Message& operator=(const Message&) = delete;
 
-  void ask_for_local() noexcept {
+  void ask_for_control() noexcept {
     header.msg_control = control_.data();
     header.msg_controllen = control_.size();
   }
@@ -76,7 +77,7 @@ struct Message {
   }
 
   void leave_from(const AskedAt::Ip& local) noexcept {
-    ask_for_local();
+    ask_for_control();
     local_address::write(local, header);
   }
 
@@ -89,24 +90,26 @@ struct Message {
 
  private:
   iovec piece_;
-  alignas(cmsghdr) std::array<char, local_address::kControlBytes> control_{};
+  alignas(cmsghdr) std::array<char, local_address::kControlBytes + KernelStamps::kControlBytes> control_{};
 };
 
 /// Receives a datagram without waiting, like recvfrom(). If `local` is not null, it is set to the local address of the
-/// datagram. This requires recvmsg(), which takes longer.
-ssize_t take(int fd, std::span<std::byte> buffer, udp::endpoint& from, std::optional<AskedAt::Ip>* local) {
-  if (local == nullptr) {
+/// datagram, and if `stamp` is not null, to its time stamp. This requires recvmsg(), which takes longer.
+ssize_t take(int fd, std::span<std::byte> buffer, udp::endpoint& from, std::optional<AskedAt::Ip>* local,
+             std::optional<Duration>* stamp) {
+  if (local == nullptr && stamp == nullptr) {
     auto length = static_cast<socklen_t>(from.capacity());
     const ssize_t size = ::recvfrom(fd, buffer.data(), buffer.size(), MSG_TRUNC | MSG_DONTWAIT, from.data(), &length);
     if (size >= 0) from.resize(length);
     return size;
   }
   Message message(buffer, from, from.capacity());
-  message.ask_for_local();
+  message.ask_for_control();
   const ssize_t size = ::recvmsg(fd, &message.header, MSG_TRUNC | MSG_DONTWAIT);
   if (size >= 0) {
     from.resize(message.header.msg_namelen);
-    *local = message.local();
+    if (local != nullptr) *local = message.local();
+    if (stamp != nullptr) *stamp = KernelStamps::find(message.header);
   }
   return size;
 }
@@ -217,18 +220,28 @@ bool UdpLink::send_to_network(const Address& to, std::span<const std::byte> data
 }
 
 std::size_t UdpLink::receive(Address& from, std::span<std::byte> buffer) {
-  if (!unix_) return receive_from_network(from, buffer);
-  unix_first_ = !unix_first_;
-  const std::size_t size = unix_first_ ? unix_->receive(from, buffer) : receive_from_network(from, buffer);
-  if (size != 0) return size;
-  return unix_first_ ? receive_from_network(from, buffer) : unix_->receive(from, buffer);
+  std::optional<Duration> stamp;
+  const auto receive_from = [&](bool file) {
+    return file ? unix_->receive(from, buffer, stamp) : receive_from_network(from, buffer, stamp);
+  };
+  if (unix_) unix_first_ = !unix_first_;
+  std::size_t size = receive_from(unix_first_);
+  if (size == 0 && unix_) size = receive_from(!unix_first_);
+  if (size == 0) return 0;
+  if (stamp) {
+    const Duration unix_now = clock::unix_time();
+    stamps_.observe(*stamp, unix_now, clock::now());
+  } else {
+    stamps_.observe(clock::now());
+  }
+  return size;
 }
 
-std::size_t UdpLink::receive_from_network(Address& from, std::span<std::byte> buffer) {
+std::size_t UdpLink::receive_from_network(Address& from, std::span<std::byte> buffer, std::optional<Duration>& stamp) {
   udp::endpoint endpoint;
   for (int i = 0; i < kMaxEmptyDatagrams; ++i) {
     std::optional<AskedAt::Ip> local;
-    const ssize_t size = take(fd_, buffer, endpoint, asked_at_ ? &local : nullptr);
+    const ssize_t size = take(fd_, buffer, endpoint, asked_at_ ? &local : nullptr, stamped_ ? &stamp : nullptr);
     if (size == 0 || (size < 0 && errno == EINTR)) continue;
     if (size < 0) return 0;
     from = to_address(endpoint);
@@ -242,6 +255,10 @@ std::size_t UdpLink::receive_from_network(Address& from, std::span<std::byte> bu
 LocalTime UdpLink::present(LocalTime now) const { return std::max(now, clock::now()); }
 
 void UdpLink::wait(Duration timeout, Doorbell* doorbell) {
+  if (!std::exchange(stamped_, true)) {
+    KernelStamps::ask(fd_);
+    if (unix_) KernelStamps::ask(unix_->fd());
+  }
   // Entries with a negative descriptor are ignored by poll().
   std::array<pollfd, 3> fds = {pollfd{fd_, POLLIN, 0}, pollfd{doorbell != nullptr ? doorbell->fd() : -1, POLLIN, 0},
                                pollfd{unix_ ? unix_->fd() : -1, POLLIN, 0}};

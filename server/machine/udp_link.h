@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <filesystem>
 #include <memory>
@@ -8,6 +9,7 @@
 #include <vector>
 
 #include "clients/cpp/dscp.h"
+#include "clients/cpp/kernel_stamps.h"
 #include "core/base/time.h"
 #include "core/exchange/counter.h"
 #include "protocol/link.h"
@@ -53,9 +55,12 @@ class UdpLink : public Link {
   std::size_t receive(Address& from, std::span<std::byte> buffer) override;
 
   LocalTime present(LocalTime now) const override;
+  LocalTime arrived(LocalTime now) const override { return std::max(now, stamps_.read()); }
+  LocalTime reached(LocalTime now) const override { return std::min(now, stamps_.reached()); }
 
   /// Waits until a datagram can be received, the doorbell rings, or `timeout` has elapsed. Signal handlers can end it
-  /// early. The doorbell is answered. The resolution is the timer slack of the thread, which is 50 µs by default.
+  /// early. The doorbell is answered. The resolution is the timer slack of the thread, which is 50 µs by default. The
+  /// first wait enables the time stamps of the kernel.
   void wait(Duration timeout, Doorbell* doorbell = nullptr);
 
   Address local_address() const;  ///< with the actual port
@@ -63,12 +68,15 @@ class UdpLink : public Link {
   /// The number of datagrams dropped by send(). Thread-safe: yes.
   std::uint64_t send_failures() const noexcept { return send_failures_.value(); }
 
+  /// The number of time stamps of the kernel that were not used (KernelStamps). Thread-safe: yes.
+  std::uint64_t refused_stamps() const noexcept { return stamps_.refused(); }
+
   int fd() const noexcept { return fd_; }
 
  private:
   struct Further {};
   UdpLink(const UdpLink& first, std::optional<Dscp> dscp, Further);
-  std::size_t receive_from_network(Address& from, std::span<std::byte> buffer);
+  std::size_t receive_from_network(Address& from, std::span<std::byte> buffer, std::optional<Duration>& stamp);
   bool send_to_network(const Address& to, std::span<const std::byte> datagram) const;
 
   int fd_ = -1;
@@ -76,6 +84,8 @@ class UdpLink : public Link {
   AskedAt* asked_at_ = nullptr;  ///< null if bound to a single address
   std::optional<UnixSocket> unix_;
   bool unix_first_ = false;  ///< which socket is read first, to prevent starvation
+  bool stamped_ = false;
+  KernelStamps stamps_;
   Counter send_failures_;
 };
 

@@ -17,6 +17,8 @@
 #include <system_error>
 #include <utility>
 
+#include "clients/cpp/kernel_stamps.h"
+
 namespace tendon {
 namespace {
 
@@ -128,16 +130,24 @@ bool UnixSocket::send(const Address& to, std::span<const std::byte> datagram) no
   return ::sendto(fd_, datagram.data(), datagram.size(), MSG_NOSIGNAL, as_address(name), kNameBytes) >= 0;
 }
 
-std::size_t UnixSocket::receive(Address& from, std::span<std::byte> buffer) noexcept {
+std::size_t UnixSocket::receive(Address& from, std::span<std::byte> buffer, std::optional<Duration>& stamp) noexcept {
   for (int i = 0; i < kMaxSkips; ++i) {
     sockaddr_un name{};
-    socklen_t length = sizeof name;
-    const ssize_t size =
-        ::recvfrom(fd_, buffer.data(), buffer.size(), MSG_TRUNC, reinterpret_cast<sockaddr*>(&name), &length);
+    iovec piece{buffer.data(), buffer.size()};
+    alignas(cmsghdr) std::array<char, KernelStamps::kControlBytes> control;
+    msghdr header{};
+    header.msg_name = &name;
+    header.msg_namelen = sizeof name;
+    header.msg_iov = &piece;
+    header.msg_iovlen = 1;
+    header.msg_control = control.data();
+    header.msg_controllen = control.size();
+    const ssize_t size = ::recvmsg(fd_, &header, MSG_TRUNC);
     if (size < 0 && errno != EINTR) return 0;
     if (size <= 0) continue;
-    const auto address = address_of(name, length);
+    const auto address = address_of(name, header.msg_namelen);
     if (!address) continue;
+    stamp = KernelStamps::find(header);
     from = *address;
     return static_cast<std::size_t>(size);
   }

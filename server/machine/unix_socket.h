@@ -35,8 +35,8 @@ class UnixSocket {
   /// Returns false if it was dropped: the peer is gone, or its queue is full (10 by default, net.unix.max_dgram_qlen).
   bool send(const Address& to, std::span<const std::byte> datagram) noexcept;
 
-  /// Skips empty datagrams and datagrams from unnamed sockets.
-  std::size_t receive(Address& from, std::span<std::byte> buffer) noexcept;
+  /// Skips empty datagrams and datagrams from unnamed sockets. `stamp` is set if the kernel provides one.
+  std::size_t receive(Address& from, std::span<std::byte> buffer, std::optional<Duration>& stamp) noexcept;
 
   int fd() const noexcept { return fd_; }
 

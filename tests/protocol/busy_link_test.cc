@@ -30,12 +30,14 @@ class Queue : public Link {
     return size;
   }
   LocalTime present(LocalTime now) const override { return std::max(now, clock); }
+  LocalTime reached(LocalTime now) const override { return now - waited; }
 
   std::deque<std::size_t> sizes;
   int asked = 0;
   int sent = 0;
   LocalTime clock{std::chrono::seconds(1)};
   Duration took = microseconds(1);
+  Duration waited{};
 };
 
 struct Received {
@@ -113,6 +115,18 @@ TEST(BusyLink, WhatALookHasTakenHadComeByThenAndAllElseByNow) {
   EXPECT_EQ(busy.present(now), queue.clock);
   ASSERT_EQ(receive(busy).size, 50U);
   EXPECT_EQ(busy.arrived(now), queue.clock);
+}
+
+TEST(BusyLink, KnowsWhenTheDatagramOfALookHasReachedTheMachine) {
+  Queue queue;
+  queue.waited = microseconds(30);
+  BusyLink busy(queue);
+  LocalTime now = queue.clock;
+  queue.sizes = {40};
+  ASSERT_TRUE(busy.look(now));
+  queue.clock += microseconds(5);
+  ASSERT_EQ(receive(busy).size, 40U);
+  EXPECT_EQ(busy.reached(busy.arrived(now)), now - queue.waited);
 }
 
 TEST(BusyLink, TellsTheFullSizeOfADatagramThatIsCut) {

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <random>
+
 #include "protocol/limits.h"
 #include "protocol/reliable/round_trip.h"
 #include "protocol/wire/codec.h"
@@ -349,6 +351,72 @@ TEST_F(TwoEnds, TheRoundTripDoesNotCountTheTimeThatThePeerTook) {
   EXPECT_EQ(a_.stats().round_trip_variation, std::chrono::microseconds(3500));
 }
 
+TEST_F(TwoEnds, TheRoundTripDoesNotCountTheTimeInWhichDatagramsWaited) {
+  const auto there = pull(a_, now_);  // T1
+  now_ += milliseconds(3);
+  const LocalTime reached_z = now_;  // T2
+  now_ += milliseconds(20);
+  for (const Bytes& datagram : there) z_.receive(now_, datagram, reached_z);
+  const auto back = pull(z_, now_);  // T3
+  now_ += milliseconds(4);
+  const LocalTime reached_a = now_;  // T4
+  now_ += milliseconds(30);
+  for (const Bytes& datagram : back) a_.receive(now_, datagram, reached_a);
+  EXPECT_EQ(a_.stats().round_trip, milliseconds(7));
+  ASSERT_TRUE(a_.exchange());
+  EXPECT_EQ(a_.exchange()->answered_at, reached_a);
+}
+
+TEST_F(TwoEnds, AStampFromBeforeTheQuestionIsNotUsed) {
+  now_ += milliseconds(50);
+  deliver(z_, now_, pull(a_, now_));
+  z_.send(state(1));
+  const auto back = pull(z_, now_);
+  const LocalTime asked = now_;
+  now_ += milliseconds(4);
+  for (const Bytes& datagram : back) a_.receive(now_, datagram, asked - Duration{1});
+  EXPECT_EQ(a_.stats().round_trip, milliseconds(4));
+  EXPECT_EQ(a_.stats().invalid, 0U);
+}
+
+/// Returns A's estimate of Z's clock, which is 3 s ahead, after 30 exchanges. The delay of the network is 5 µs, and each
+/// thread needs 10 to 200 µs to wake up.
+ClockOffsetEstimator::Estimate clock_of_z(bool stamps) {
+  constexpr Duration kAhead = seconds(3);
+  constexpr Duration kWay = std::chrono::microseconds(5);
+  Session a(config(), kOpened);
+  Session z(config(), kOpened);
+  std::mt19937_64 dice(1);
+  const auto wake_up = [&dice] { return std::chrono::microseconds(10 + static_cast<int>(dice() % 191)); };
+  const auto pass = [&](Session& to, LocalTime sent, Duration ahead, const std::vector<Bytes>& datagrams) {
+    const LocalTime reached = sent + kWay;
+    const LocalTime read = reached + wake_up();
+    for (const Bytes& datagram : datagrams) to.receive(read + ahead, datagram, (stamps ? reached : read) + ahead);
+    return read;
+  };
+  LocalTime now = kOpened;
+  for (std::uint64_t n = 1; n <= 30; ++n) {
+    a.send(force(n));
+    const LocalTime asked = pass(z, now, kAhead, pull(a, now));
+    z.send(state(n));
+    now = pass(a, asked, Duration{}, pull(z, asked + kAhead));
+  }
+  EXPECT_TRUE(a.peer_clock());
+  ClockOffsetEstimator::Estimate estimate = a.peer_clock().value_or(ClockOffsetEstimator::Estimate{});
+  estimate.offset -= kAhead;
+  return estimate;
+}
+
+TEST(SessionClock, StampsKeepTheWakeUpsOfTheThreadsOutOfTheOffset) {
+  const auto with = clock_of_z(true);
+  const auto without = clock_of_z(false);
+  EXPECT_EQ(with.least_round_trip, std::chrono::microseconds(10));
+  EXPECT_GE(without.least_round_trip, std::chrono::microseconds(30));
+  EXPECT_LE(std::chrono::abs(with.offset), Duration(10));
+  EXPECT_GE(std::chrono::abs(without.offset), std::chrono::microseconds(1));
+  EXPECT_LE(2 * with.error_bound, without.error_bound);
+}
+
 TEST_F(TwoEnds, AnImpossibleEchoIsCountedAndTheRestIsRead) {
   pull(a_, now_);  // packet 0
   const auto echoing = [](Duration sent, Duration received, std::uint64_t number) {
@@ -368,6 +436,7 @@ TEST_F(TwoEnds, AnImpossibleEchoIsCountedAndTheRestIsRead) {
     a_.receive(now_, examples::data(number, echo, state(number + 1)));
     EXPECT_EQ(a_.stats().invalid, ++number);
     EXPECT_EQ(events(a_).size(), 1U);
+    EXPECT_FALSE(a_.exchange());
   }
   EXPECT_EQ(a_.stats().round_trip, Duration{});
   a_.receive(now_ + milliseconds(1), examples::data(number, echoing(opened, written, 0)));

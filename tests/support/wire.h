@@ -43,9 +43,11 @@ class End : public Link {
     return datagram.bytes.size();
   }
   LocalTime present(LocalTime now) const override { return std::max(now, taken); }
+  LocalTime reached(LocalTime now) const override { return now - waited; }
 
   Address self;
   LocalTime taken{};  ///< receive time, if later than the time of the turn
+  Duration waited{};  ///< time between the arrival of a datagram and receive()
   std::deque<Datagram> inbox;
   std::size_t sent = 0;
 

@@ -14,6 +14,7 @@
 #include <string>
 #include <vector>
 
+#include "clients/cpp/machine.h"
 #include "tests/support/traffic_class_reader.h"
 
 namespace tendon::udp_transport_test {
@@ -110,6 +111,27 @@ TEST(UdpTransport, WhatItHasReceivedWasHereByNowAndNotBeforeTheTurn) {
   const LocalTime long_ago{};
   EXPECT_GT(link.present(long_ago), long_ago);
   EXPECT_EQ(link.present(LocalTime::max()), LocalTime::max());
+}
+
+TEST(UdpTransport, KnowsWhenADatagramHasReachedTheMachineEvenIfItIsReadLate) {
+  Z z;
+  UdpTransport a(z.address());
+  greet(a, z);
+  a.wait({});
+  for (int i = 0; i < 10; ++i) {
+    const LocalTime before = read_clock();
+    z.reply(2);
+    const LocalTime sent = read_clock();
+    ::usleep(20'000);
+    ASSERT_EQ(received(a), 2U);
+    const LocalTime read = a.arrived(before);
+    EXPECT_GE(read, sent + std::chrono::milliseconds(20));
+    EXPECT_GE(a.reached(read), before);
+    if (a.reached(read) == read) continue;  // first datagram, or the thread was interrupted
+    EXPECT_LE(a.reached(read), sent + KernelStamps::kSteady);
+    return;
+  }
+  ADD_FAILURE() << "none of them had a time stamp";
 }
 
 TEST(UdpTransport, MarksEachDatagramOfBothFamiliesIfItIsTold) {

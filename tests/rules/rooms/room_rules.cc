@@ -44,12 +44,12 @@ const Names kAtTheRoot = {".ci",          ".dockerignore", ".clang-format",  ".c
                           "LICENSE",      "README.md"};
 
 /// Every room may use these headers: control the floating point unit, pass the newest value between threads, find
-/// misspelled words, format the errors of a command line, print without waiting for a reader, mark datagrams, and
-/// declare the keys of a scene.
-const Names kForAllRooms = {"core/base/arithmetic.h", "core/base/nearest_word.h", "core/exchange/latest.h",
-                            "clients/cpp/dscp.h",     "clients/cpp/usage.h",      "server/machine/output.h",
-                            "server/scene/reader.h",  "server/scene/reference.h", "server/scene/scene_error.h",
-                            "server/scene/values.h"};
+/// misspelled words, format the errors of a command line, print without waiting for a reader, mark datagrams and read
+/// their time stamps, and declare the keys of a scene.
+const Names kForAllRooms = {"core/base/arithmetic.h",     "core/base/nearest_word.h",    "core/exchange/latest.h",
+                            "clients/cpp/dscp.h",         "clients/cpp/kernel_stamps.h", "clients/cpp/usage.h",
+                            "server/machine/output.h",    "server/scene/reader.h",       "server/scene/reference.h",
+                            "server/scene/scene_error.h", "server/scene/values.h"};
 
 /// If a path ends with a slash, it is a folder. If it begins with a star, it is a suffix.
 struct Door {

@@ -70,6 +70,23 @@ TEST_P(InterruptedTurn, MakesNoWayLookShort) {
 
 INSTANTIATE_TEST_SUITE_P(OfTheServerAndOfTheClient, InterruptedTurn, testing::Bool());
 
+TEST_F(SealedServer, AStampShortensTheRoundTripAndMakesNoForceEarlier) {
+  // The server reads each datagram 1 ms after it was sent.
+  const auto measured = [&](Duration waited) {
+    restart();
+    Client a = controller(wall_, "192.0.2.1:4000");
+    ends_[0].waited = waited;
+    run(milliseconds(2500), {&a});
+    const RemoteForce* const force = mail(0).forces[0].take();
+    EXPECT_TRUE(force != nullptr && force->received == now_ - milliseconds(1)) << "when it was read";
+    EXPECT_EQ(stats().late_ours + stats().late_network + stats().late_engine + stats().late_unknown, 0U);
+    return a->report()->round_trip->median;
+  };
+  const Duration without = measured({});
+  constexpr Duration kWaited = std::chrono::microseconds(700);
+  EXPECT_EQ(measured(kWaited), without - kWaited);
+}
+
 TEST_F(SealedServer, SaysByNumbersAndInWordsThatTheNetworkWasLate) {
   Client a = controller(wall_, "192.0.2.1:4000");
   run(milliseconds(1500), {&a});

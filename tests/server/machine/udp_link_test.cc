@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "protocol/wire/header.h"
+#include "server/machine/clock.h"
 #include "tests/support/refusal.h"
 #include "tests/support/traffic_class_reader.h"
 #include "tests/support/wire.h"
@@ -308,6 +309,26 @@ TEST(UdpLink, WhatItHasReceivedWasHereByNowAndNotBeforeTheTurn) {
   const LocalTime long_ago{};
   EXPECT_GT(link.present(long_ago), long_ago);
   EXPECT_EQ(link.present(LocalTime::max()), LocalTime::max());
+}
+
+TEST_P(UdpLinkTest, KnowsWhenADatagramHasReachedTheMachineEvenIfItIsReadLate) {
+  constexpr Duration kLate = 20ms;
+  z.wait(0s);
+  for (int i = 0; i < 10; ++i) {
+    const LocalTime before = clock::now();
+    a.send(z.local_address(), bytes(2, 1));
+    const LocalTime sent = clock::now();  // over the loopback interface, it has arrived
+    clock::sleep_until(sent + kLate);
+    ASSERT_EQ(z.receive(from, buffer), 2U);
+    const LocalTime read = z.arrived(before);
+    EXPECT_GE(read, sent + kLate);
+    EXPECT_GE(z.reached(read), before);
+    EXPECT_EQ(z.reached(before), before) << "not after the time that a turn believes";
+    if (z.reached(read) == read) continue;  // first datagram, or the thread was interrupted
+    EXPECT_LE(z.reached(read), sent + KernelStamps::kSteady);
+    return;
+  }
+  ADD_FAILURE() << "none of them had a time stamp";
 }
 
 TEST(UdpLink, AWaitWithoutTimeLeftDoesNotWait) {

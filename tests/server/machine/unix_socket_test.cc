@@ -14,6 +14,7 @@
 #include <filesystem>
 #include <fstream>
 #include <memory>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -75,15 +76,16 @@ TEST_F(UnixSocketTest, BringsDatagramsThereAndBackByTheirSender) {
   a.send(bytes(3, 1));
   z.send(bytes(kMaxDatagram, 2));
   std::vector<std::byte> buffer(kMaxDatagram);
+  std::optional<Duration> stamp;
   Address from_a;
-  ASSERT_EQ(server.receive(from_a, buffer), 3U);
+  ASSERT_EQ(server.receive(from_a, buffer, stamp), 3U);
   EXPECT_TRUE(UnixSocket::is_peer(from_a)) << to_string(from_a);
   EXPECT_TRUE(is_loopback(from_a));
   EXPECT_EQ(parse_address(to_string(from_a)), from_a);
   Address from_z;
-  ASSERT_EQ(server.receive(from_z, buffer), kMaxDatagram);
+  ASSERT_EQ(server.receive(from_z, buffer, stamp), kMaxDatagram);
   EXPECT_NE(from_z, from_a);
-  EXPECT_EQ(server.receive(from_z, buffer), 0U);
+  EXPECT_EQ(server.receive(from_z, buffer, stamp), 0U);
   EXPECT_TRUE(server.send(from_z, bytes(7, 3)));
   EXPECT_TRUE(server.send(from_a, bytes(5, 4)));
   EXPECT_EQ(a.receive(), bytes(5, 4));
@@ -99,7 +101,8 @@ TEST_F(UnixSocketTest, SkipsWhoHasNoNameAndWhatIsEmpty) {
   named.send(bytes(5000, 2));
   std::vector<std::byte> buffer(kMaxDatagram);
   Address from;
-  EXPECT_EQ(server.receive(from, buffer), 5000U) << "cut, and the full size is told";
+  std::optional<Duration> stamp;
+  EXPECT_EQ(server.receive(from, buffer, stamp), 5000U) << "cut, and the full size is told";
 }
 
 TEST_F(UnixSocketTest, LosesADatagramToAPeerThatHasGone) {

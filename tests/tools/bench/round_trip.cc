@@ -173,6 +173,7 @@ class WatchedLink : public Link {
   }
   LocalTime present(LocalTime now) const override { return link_.present(now); }
   LocalTime arrived(LocalTime now) const override { return link_.arrived(now); }
+  LocalTime reached(LocalTime now) const override { return link_.reached(now); }
   void look() {
     const RemoteForce* const force = mail_.forces.front().take();
     if (force == nullptr) return;
