@@ -8,6 +8,7 @@
 #   modules         modules that are loaded, in this order
 #   build_programs  builds the programs
 #   programs        paths of the programs, which are in the root of the machine
+#   libraries       libraries that the programs load at run time, so that ldd does not list them
 #   machine         options of QEMU
 #   kernel_options  options of the kernel
 #   commands        prints the shell commands of the machine. They write the results to /dev/ttyS1, one JSON object per
@@ -68,18 +69,31 @@ build_targets() {
   cmake --build --preset release --target "$@" -j "$jobs"
 }
 
+# Adds the libraries of a program or library to the disk.
+add_libraries() {
+  local file
+  ldd "$1" | grep -oE '/[^ ]+' | sort -u | while read -r file; do
+    mkdir -p "$tree/${file%/*}"
+    cp -L "$file" "$tree$file"
+  done
+}
+
 # Creates the disk of the emulated machine, which contains busybox, the programs with their libraries, and the modules.
 make_disk() {
-  local program module file
+  local program library module file
   rm -rf "$tree"
   mkdir -p "$tree"/{bin,dev,modules,proc,sys,tmp}
   cp "$(command -v busybox)" "$tree/bin/busybox"
   for program in "${programs[@]}"; do
     strip -o "$tree/${program##*/}" "$program"
-    ldd "$program" | grep -oE '/[^ ]+' | sort -u | while read -r file; do
-      mkdir -p "$tree/${file%/*}"
-      cp -L "$file" "$tree$file"
-    done
+    add_libraries "$program"
+  done
+  for library in "${libraries[@]}"; do
+    file=$(/sbin/ldconfig -p | awk -v name="$library" '$1 == name && /x86-64/ && !found++ { print $NF }')
+    [ -n "$file" ] || { echo "the library $library is missing; run deploy/setup test"; return 1; }
+    mkdir -p "$tree/${file%/*}"
+    cp -L "$file" "$tree$file"
+    add_libraries "$file"
   done
   for module in "${modules[@]}"; do
     file=$(find "$folder/kernel" -name "$module.ko*" | head -1)
