@@ -97,13 +97,21 @@ void McapWriter::write(std::uint16_t channel_id, std::uint64_t log_time, std::st
   if (channel_id == 0 || channel_id > channels_.size()) throw std::invalid_argument("MCAP message without a channel");
   Channel& channel = channels_[channel_id - 1U];
   channel.index.push_back({log_time, records_.size()});
-  put_record(records_, Opcode::kMessage, [&] {
-    put(records_, channel_id);
-    put(records_, static_cast<std::uint32_t>(channel.messages));
-    put(records_, log_time);
-    put(records_, log_time);  // publish time
-    put_bytes(records_, bytes_of(data));
-  });
+  constexpr std::size_t kFront = sizeof channel_id + sizeof(std::uint32_t) + 2 * sizeof log_time;
+  std::array<std::byte, mcap::kRecordHead + kFront> front;
+  std::byte* at = front.data();
+  const auto add = [&at](auto value) {
+    put_little_endian(value, at);
+    at += sizeof value;
+  };
+  add(static_cast<std::uint8_t>(Opcode::kMessage));
+  add(std::uint64_t{kFront + data.size()});
+  add(channel_id);
+  add(static_cast<std::uint32_t>(channel.messages));
+  add(log_time);
+  add(log_time);  // publish time
+  put_bytes(records_, front);
+  put_bytes(records_, bytes_of(data));
   chunk_time_.include(log_time);
   ++channel.messages;
 }
@@ -131,15 +139,19 @@ void McapWriter::put_chunk() {
                  .index_offsets = {},
                  .index_length = 0,
                  .records_size = records_.size()};
+  const std::uint32_t records_crc = extend_crc(0, records_);
   put_record(out_, Opcode::kChunk, [&] {
     put(out_, info.time.first);
     put(out_, info.time.last);
     put(out_, std::uint64_t{records_.size()});
-    put(out_, extend_crc(0, records_));
+    put(out_, records_crc);
     put_string(out_, "");  // compression
     put(out_, std::uint64_t{records_.size()});
     put_bytes(out_, records_);
   });
+  update_crc(out_.size() - records_.size());
+  crc_ = mcap::join_crcs(crc_, records_crc, records_.size());
+  in_crc_ = out_.size();
   const std::uint64_t chunk_end = written_ + out_.size();
   info.length = chunk_end - info.start;
 
@@ -248,18 +260,18 @@ void McapWriter::put_summary() {
   put_bytes(out_, mcap::kMagic);
 }
 
+/// Includes the bytes of `out_` before `end`.
+void McapWriter::update_crc(std::size_t end) {
+  crc_ = extend_crc(crc_, std::span(out_).subspan(in_crc_, end - in_crc_));
+  in_crc_ = end;
+}
+
 bool McapWriter::hand_over() {
-  if (failed_ || out_.empty()) {
-    out_.clear();
-    return !failed_;
-  }
-  if (sink_.append(out_)) {
-    crc_ = extend_crc(crc_, out_);
-    written_ += out_.size();
-  } else {
-    failed_ = true;
-  }
+  update_crc(out_.size());
+  failed_ = failed_ || (!out_.empty() && !sink_.append(out_));
+  if (!failed_) written_ += out_.size();
   out_.clear();
+  in_crc_ = 0;
   return !failed_;
 }
 

@@ -77,6 +77,7 @@ class McapWriter {
 
   void put_chunk();
   void put_summary();
+  void update_crc(std::size_t end);
   bool hand_over();
 
   ByteSink& sink_;
@@ -89,7 +90,8 @@ class McapWriter {
   TimeRange file_time_;
   std::uint64_t messages_ = 0;
   std::uint64_t written_ = 0;
-  std::uint32_t crc_ = 0;
+  std::uint32_t crc_ = 0;  ///< of the file, including the first `in_crc_` bytes of `out_`
+  std::size_t in_crc_ = 0;
   bool failed_ = false;
   bool closed_ = false;
 };

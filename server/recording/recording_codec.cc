@@ -6,11 +6,13 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstring>
+#include <limits>
 #include <span>
 #include <stdexcept>
 #include <vector>
 
 #include "protocol/link.h"
+#include "protocol/wire/fields/writer.h"
 #include "protocol/wire/header.h"
 #include "recording.pb.h"
 
@@ -36,34 +38,12 @@ void put(pb::Quat* out, const Quat& q) {
 
 Quat quat(const pb::Quat& q) { return {q.w(), q.x(), q.y(), q.z()}; }
 
-void put(pb::Turn* out, const TurnStep& turn) {
-  put(out->mutable_orientation(), turn.hand.orientation);
-  put(out->mutable_angular_velocity_radps(), turn.hand.angular_velocity);
-  put(out->mutable_torque_held_nm(), turn.was_applied);
-  put(out->mutable_torque_wanted_nm(), turn.wanted);
-  put(out->mutable_torque_commanded_nm(), turn.torque);
-  put(out->mutable_torque_applied_nm(), turn.applied);
-  out->set_torque_wanted_norm_nm(turn.wanted.norm());
-  out->set_torque_applied_norm_nm(turn.applied.norm());
-}
-
 TurnStep turn_step(const pb::Turn& in) {
   return {.hand = {.orientation = quat(in.orientation()), .angular_velocity = vec3(in.angular_velocity_radps())},
           .was_applied = vec3(in.torque_held_nm()),
           .wanted = vec3(in.torque_wanted_nm()),
           .torque = vec3(in.torque_commanded_nm()),
           .applied = vec3(in.torque_applied_nm())};
-}
-
-void put(pb::Grip* out, const GripStep& grip) {
-  out->set_opening_rad(grip.hand.opening);
-  out->set_velocity_radps(grip.hand.velocity);
-  out->set_force_held_n(grip.was_applied);
-  out->set_force_wanted_n(grip.wanted);
-  out->set_force_commanded_n(grip.force);
-  out->set_force_applied_n(grip.applied);
-  out->set_permitted_n(grip.permitted);
-  out->set_energy_j(grip.energy);
 }
 
 GripStep grip_step(const pb::Grip& in) {
@@ -74,18 +54,6 @@ GripStep grip_step(const pb::Grip& in) {
           .applied = in.force_applied_n(),
           .permitted = in.permitted_n(),
           .energy = in.energy_j()};
-}
-
-void put(pb::Field* out, const FieldStep& field) {
-  out->set_generation(field.generation);
-  out->set_channel(field.channel);
-  out->set_swapping(field.swapping);
-  out->set_depth_m(field.depth);
-  put(out->mutable_proxy_m(), field.proxy);
-  put(out->mutable_force_n(), field.force);
-  out->set_stored_j(field.stored);
-  out->set_refused_j(field.refused);
-  out->set_credited_j(field.credit);
 }
 
 FieldStep field_step(const pb::Field& in) {
@@ -196,24 +164,77 @@ PortState port_state(const pb::PortState& in) {
   return out;
 }
 
-void put(pb::Reason* out, Reasons reasons) {
-  out->set_energy(reasons.has(Reason::kEnergy));
-  out->set_max_force(reasons.has(Reason::kMaxForce));
-  out->set_slew(reasons.has(Reason::kSlew));
-  out->set_ramp_in(reasons.has(Reason::kRampIn));
-  out->set_held(reasons.has(Reason::kHeld));
-  out->set_decaying(reasons.has(Reason::kDecaying));
-  out->set_safe_stop(reasons.has(Reason::kSafeStop));
-  out->set_not_finite(reasons.has(Reason::kNotFinite));
-  out->set_fault(reasons.has(Reason::kFault));
-  out->set_device_clamp(reasons.has(Reason::kDeviceClamp));
-  out->set_overrun(reasons.has(Reason::kOverrun));
-  out->set_watchdog(reasons.has(Reason::kWatchdog));
-  out->set_unseen(reasons.has(Reason::kUnseen));
-  out->set_disarmed(reasons.has(Reason::kDisarmed));
-  out->set_damped(reasons.has(Reason::kDamped));
-  out->set_acceleration(reasons.has(Reason::kAcceleration));
+// Steps and datagrams are frequent, so their bytes are written without protobuf's objects, in the order of the numbers.
+
+using wire::field;
+using wire::Writer;
+
+constexpr std::size_t kMostOfAStep = 1005;     // without force_way
+constexpr std::size_t kMostOfADatagram = 100;  // without payload
+constexpr wire::Entries kAllBytes{.least = 1, .most = std::numeric_limits<std::size_t>::max()};
+
+std::size_t size_of(const Writer& out, const std::string& message) {
+  return static_cast<std::size_t>(reinterpret_cast<const char*>(out.at()) - message.data());
 }
+
+void put(Writer& out, Reasons reasons) {
+  const auto put = [&]<unsigned kNumber>(wire::Field<kNumber> number, wire::Name name, Reason reason) {
+    out.flag(number, name, reasons.has(reason));
+  };
+  put(field<1>, "energy", Reason::kEnergy);
+  put(field<2>, "max_force", Reason::kMaxForce);
+  put(field<3>, "slew", Reason::kSlew);
+  put(field<4>, "ramp_in", Reason::kRampIn);
+  put(field<5>, "held", Reason::kHeld);
+  put(field<6>, "decaying", Reason::kDecaying);
+  put(field<7>, "safe_stop", Reason::kSafeStop);
+  put(field<8>, "not_finite", Reason::kNotFinite);
+  put(field<9>, "fault", Reason::kFault);
+  put(field<10>, "device_clamp", Reason::kDeviceClamp);
+  put(field<11>, "overrun", Reason::kOverrun);
+  put(field<12>, "watchdog", Reason::kWatchdog);
+  put(field<13>, "unseen", Reason::kUnseen);
+  put(field<14>, "disarmed", Reason::kDisarmed);
+  put(field<15>, "damped", Reason::kDamped);
+  put(field<16>, "acceleration", Reason::kAcceleration);
+}
+
+void put(Writer& out, const TurnStep& turn) {
+  out.rotation(field<1>, "orientation", turn.hand.orientation);
+  out.vector(field<2>, "angular_velocity_radps", turn.hand.angular_velocity);
+  out.vector(field<3>, "torque_held_nm", turn.was_applied);
+  out.vector(field<4>, "torque_wanted_nm", turn.wanted);
+  out.vector(field<5>, "torque_commanded_nm", turn.torque);
+  out.vector(field<6>, "torque_applied_nm", turn.applied);
+  out.number(field<7>, "torque_wanted_norm_nm", turn.wanted.norm());
+  out.number(field<8>, "torque_applied_norm_nm", turn.applied.norm());
+}
+
+void put(Writer& out, const GripStep& grip) {
+  out.number(field<1>, "opening_rad", grip.hand.opening);
+  out.number(field<2>, "velocity_radps", grip.hand.velocity);
+  out.number(field<3>, "force_held_n", grip.was_applied);
+  out.number(field<4>, "force_wanted_n", grip.wanted);
+  out.number(field<5>, "force_commanded_n", grip.force);
+  out.number(field<6>, "force_applied_n", grip.applied);
+  out.number(field<7>, "permitted_n", grip.permitted);
+  out.number(field<8>, "energy_j", grip.energy);
+}
+
+void put(Writer& out, const FieldStep& step) {
+  out.count(field<1>, "generation", step.generation);
+  out.count(field<2>, "channel", step.channel);
+  out.flag(field<3>, "swapping", step.swapping);
+  out.number(field<4>, "depth_m", step.depth);
+  out.vector(field<5>, "proxy_m", step.proxy);
+  out.number(field<6>, "stored_j", step.stored);
+  out.number(field<7>, "refused_j", step.refused);
+  out.number(field<8>, "credited_j", step.credit);
+  out.vector(field<9>, "force_n", step.force);
+}
+
+/// For Writer::message.
+constexpr auto kAll = [](Writer& out, const auto& value) { put(out, value); };
 
 template <class Message>
 Message parse(std::string_view bytes) {
@@ -265,49 +286,47 @@ std::string encode(const SceneRecord& scene) {
 }
 
 std::string encode(const StepRecord& step, std::string_view force_way) {
-  pb::Step out;
-  out.set_tick(step.tick);
-  out.set_late_ns((step.hand.at - step.scheduled).count());
-  out.set_interval_ns(step.held.count());
-  put(out.mutable_position_m(), step.hand.position);
-  put(out.mutable_velocity_mps(), step.hand.velocity);
-  put(out.mutable_force_held_n(), step.was_applied);
-  put(out.mutable_force_wanted_n(), step.wanted);
-  put(out.mutable_force_commanded_n(), step.force);
-  put(out.mutable_force_applied_n(), step.applied);
-  out.set_force_wanted_norm_n(step.wanted.norm());
-  out.set_force_applied_norm_n(step.applied.norm());
-  out.set_permitted_n(step.permitted);
-  out.set_energy_j(step.energy);
-  out.set_reason_bits(step.reasons.bits());
-  put(out.mutable_reason(), step.reasons);
-  out.set_mode(static_cast<pb::Mode>(step.mode));
-  out.set_force_sequence(step.force_sequence);
-  out.set_force_age_ns(step.force_age.count());
-  out.set_loop_age_ns(step.loop_age.count());
-  out.set_channel(step.channel);
-  if (step.hand_force) put(out.mutable_hand_force_n(), *step.hand_force);
-  if (step.force_error) out.set_force_error_n(*step.force_error);
-  out.set_force_way(force_way.data(), force_way.size());
-  out.set_rearmed(step.rearmed);
-  out.set_disarmed(step.disarmed);
-  out.set_longest_hold_ns(step.longest_hold.count());
-  out.set_buttons(step.buttons);
-  if (const TurnStep* const turn = step.turn()) put(out.mutable_turn(), *turn);
-  if (const GripStep* const grip = step.grip()) put(out.mutable_grip(), *grip);
-  if (step.field) put(out.mutable_field(), *step.field);
-  if (const Joints* const joints = step.joints()) {
-    for (std::size_t i = 0; i < joints->count; ++i) {
-      out.add_joint_rad(joints->angle[i]);
-      out.add_joint_velocity_radps(joints->velocity[i]);
-    }
-  }
+  std::string message(kMostOfAStep + force_way.size(), '\0');
+  Writer out(reinterpret_cast<wire::Byte*>(message.data()));
+  out.count(field<1>, "tick", step.tick);
+  out.difference(field<2>, "late_ns", step.hand.at - step.scheduled);
+  out.difference(field<3>, "interval_ns", step.held);
+  out.vector(field<4>, "position_m", step.hand.position);
+  out.vector(field<5>, "velocity_mps", step.hand.velocity);
+  out.vector(field<6>, "force_held_n", step.was_applied);
+  out.vector(field<7>, "force_wanted_n", step.wanted);
+  out.vector(field<8>, "force_commanded_n", step.force);
+  out.vector(field<9>, "force_applied_n", step.applied);
+  out.number(field<10>, "force_wanted_norm_n", step.wanted.norm());
+  out.number(field<11>, "force_applied_norm_n", step.applied.norm());
+  out.number(field<12>, "permitted_n", step.permitted);
+  out.number(field<13>, "energy_j", step.energy);
+  out.count(field<14>, "reason_bits", step.reasons.bits());
+  out.message(field<15>, "reason", step.reasons, kAll);
+  out.count(field<16>, "mode", static_cast<std::uint8_t>(step.mode));
+  out.count(field<17>, "force_sequence", step.force_sequence);
+  out.difference(field<18>, "force_age_ns", step.force_age);
+  out.difference(field<19>, "loop_age_ns", step.loop_age);
+  out.maybe(field<20>, "hand_force_n", step.hand_force);
+  out.count(field<21>, "channel", step.channel);
+  out.maybe(field<22>, "force_error_n", step.force_error);
   if (!step.stiffness.isZero(0)) {
-    for (const auto row : step.stiffness.rowwise()) {
-      for (const double entry : row) out.add_stiffness_wanted_n_per_m(entry);
-    }
+    const Eigen::Matrix<double, 3, 3, Eigen::RowMajor> rows = step.stiffness;
+    out.numbers(field<23>, "stiffness_wanted_n_per_m", std::span(rows.data(), 9), 9);
   }
-  return out.SerializeAsString();
+  out.flag(field<24>, "rearmed", step.rearmed);
+  out.flag(field<25>, "disarmed", step.disarmed);
+  out.difference(field<26>, "longest_hold_ns", step.longest_hold);
+  out.bits(field<28>, "buttons", step.buttons);
+  if (step.handle) {
+    out.message(field<29>, "turn", step.handle->turn, kAll);
+    out.message(field<30>, "grip", step.handle->grip, kAll);
+    out.joints(field<31>, field<32>, "joint_rad", step.handle->joints);
+  }
+  out.bytes(field<33>, "force_way", std::as_bytes(std::span(force_way)), kAllBytes);
+  out.message(field<34>, "field", step.field, kAll);
+  message.resize(size_of(out, message));
+  return message;
 }
 
 std::string encode(const PortRecord& port) {
@@ -387,19 +406,22 @@ std::string encode(const ClockRecord& clock) {
 }
 
 std::string encode(const DatagramRecord& datagram) {
-  pb::Datagram out;
-  out.set_direction(static_cast<pb::Direction>(datagram.direction));
-  out.set_peer(to_string(datagram.peer));
-  out.set_size_bytes(datagram.size);
   const auto payload = std::span(datagram.bytes).first(std::min<std::size_t>(datagram.size, datagram.bytes.size()));
-  out.set_payload(payload.data(), payload.size());
-  if (payload.size() < datagram.size) return out.SerializeAsString();  // larger than a datagram of this protocol
-  if (const auto header = decode_header(payload)) {
-    out.set_type(static_cast<pb::DatagramType>(header->type));
-    out.set_connection_id(header->connection_id);
-    out.set_packet_number(header->packet_number);
+  const std::string peer = to_string(datagram.peer);
+  std::string message(kMostOfADatagram + payload.size(), '\0');
+  Writer out(reinterpret_cast<wire::Byte*>(message.data()));
+  out.count(field<1>, "direction", static_cast<std::uint8_t>(datagram.direction));
+  out.bytes(field<2>, "peer", std::as_bytes(std::span(peer)), kAllBytes);
+  out.count(field<3>, "size_bytes", datagram.size);
+  out.bytes(field<4>, "payload", payload, kAllBytes);
+  // Larger datagrams are not of this protocol.
+  if (const auto header = payload.size() == datagram.size ? decode_header(payload) : std::nullopt) {
+    out.count(field<5>, "type", static_cast<std::uint8_t>(header->type));
+    out.count(field<6>, "connection_id", header->connection_id);
+    out.count(field<7>, "packet_number", header->packet_number);
   }
-  return out.SerializeAsString();
+  message.resize(size_of(out, message));
+  return message;
 }
 
 std::string encode(const LossRecord& loss) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // This program is used by loop_proof_test.cc. A line is printed for each case. Callgrind counts within `step_in_turn`
-// and writes a file each time the function returns.
+// (with the argument `record`: within `record_in_turn`) and writes a file each time the function returns.
 #include <iostream>
 #include <memory>
 #include <string_view>
@@ -8,6 +8,7 @@
 #include "core/base/rotation.h"
 #include "devices/falcon/kinematics.h"
 #include "server/haptic_loop.h"
+#include "server/recording/recorder.h"
 
 using namespace tendon;
 
@@ -87,9 +88,16 @@ RemoteForce answer(std::uint64_t sequence, LocalTime now, bool whole) {
   return force;
 }
 
+class NoSink final : public ByteSink {
+ public:
+  bool append(std::span<const std::byte> /*bytes*/) override { return true; }
+  std::string error() const override { return {}; }
+};
+
 }  // namespace
 
-/// This function is neither inlined nor mangled, so callgrind can find it.
+// These functions are neither inlined nor mangled, so callgrind can find them.
+
 extern "C" [[gnu::noinline]] void step_in_turn(HapticLoop& loop, Mailboxes& mail, bool whole, LocalTime& now,
                                                std::uint64_t steps) {
   for (std::uint64_t i = 0; i < steps; ++i) {
@@ -99,7 +107,29 @@ extern "C" [[gnu::noinline]] void step_in_turn(HapticLoop& loop, Mailboxes& mail
   }
 }
 
-int main() {
+/// The log thread's part of the steps that are in the mailbox.
+extern "C" [[gnu::noinline]] void record_in_turn(Recorder& recorder, Mailboxes& mail) {
+  for (; const StepRecord* step = mail.steps.front(); mail.steps.pop()) recorder.record(*step);
+}
+
+int main(int count, char** arguments) {
+  if (count > 1 && arguments[1] == std::string_view("record")) {
+    Handle device(false, false);
+    const auto mail = std::make_unique<Mailboxes>();
+    HapticLoop loop(config_of(false), device, *mail);
+    NoSink sink;
+    Recorder recorder({.scene = {}, .started = {}}, sink);
+    LocalTime now{};
+    for (const int steps : {1000, 3000}) {
+      for (int i = 0; i < steps; ++i) {
+        if (i % 10 == 0) mail->forces[0].put(answer(static_cast<std::uint64_t>(i) + 1, now, false));
+        now = loop.step(now);
+      }
+      record_in_turn(recorder, *mail);
+    }
+    std::cout << "record\n";
+    return 0;
+  }
   for (const std::string_view kind : {"point", "handle", "joints"}) {
     const bool whole = kind == "handle";
     Handle device(whole, kind == "joints");

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Counts the callgrind instructions of a haptic step for three handles: a point, for which the features of other
-// handles must be nearly free, a handle that rotates and grips, and a point that reports its joints.
+// handles must be nearly free, a handle that rotates and grips, and a point that reports its joints. Also counts those of
+// the log thread for a recorded step.
 #include <gtest/gtest.h>
 
 #include <iostream>
@@ -15,6 +16,8 @@ constexpr double kSteps = 3000 - 1000;  // the two run lengths of loop-proof
 
 /// The number of instructions for the step of a point at 38d7a6d, which did not support rotation and grip.
 constexpr double kBeforeHandles = 2977.5;
+
+constexpr double kMostOfARecord = 3150;  // a few percent above the measured value; half of it is zlib's CRC
 
 using LoopProof = testing::InstructionTest;
 
@@ -34,6 +37,15 @@ TEST_F(LoopProof, APointsStepIsNoSlowerAndAWholeHandleCostsTwoAndAHalf) {
   EXPECT_GT(handle, 1.5 * point) << "this is no handle";
   EXPECT_LT(jointed, 1.14 * point);
   EXPECT_GT(jointed, point) << "these are no joints";
+}
+
+TEST_F(LoopProof, RecordingAStepTakesFewInstructions) {
+  const auto counted = testing::count_instructions(TENDON_LOOP_PROOF, "record", "record_in_turn");
+  ASSERT_EQ(counted.size(), 1U);
+  const double record = counted[0].instructions / kSteps;
+  std::cout << "recording the step of a point: " << record << " instructions\n";
+  EXPECT_LT(record, kMostOfARecord);
+  EXPECT_GT(record, 0.5 * kMostOfARecord) << "this is no record, or this bound is old";
 }
 
 }  // namespace

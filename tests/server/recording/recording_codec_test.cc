@@ -141,13 +141,62 @@ std::vector<std::string> unset_in(const google::protobuf::Message& message) {
   std::vector<std::string> unset;
   for (int i = 0; i < message.GetDescriptor()->field_count(); ++i) {
     const auto* const field = message.GetDescriptor()->field(i);
-    if (!message.GetReflection()->HasField(message, field)) {
+    const auto* const reflection = message.GetReflection();
+    const bool set =
+        field->is_repeated() ? reflection->FieldSize(message, field) > 0 : reflection->HasField(message, field);
+    if (!set) {
       unset.push_back(field->full_name());
-    } else if (field->message_type() != nullptr) {
-      std::ranges::copy(unset_in(message.GetReflection()->GetMessage(message, field)), std::back_inserter(unset));
+    } else if (field->message_type() != nullptr && !field->is_repeated()) {
+      std::ranges::copy(unset_in(reflection->GetMessage(message, field)), std::back_inserter(unset));
     }
   }
   return unset;
+}
+
+template <class Message>
+Message parsed(const std::string& bytes) {
+  Message message;
+  EXPECT_TRUE(message.ParseFromString(bytes));
+  message.DiscardUnknownFields();
+  EXPECT_EQ(message.SerializeAsString(), bytes);
+  return message;
+}
+
+/// Steps and datagrams are encoded without protobuf.
+TEST(RecordingCodec, AStepHasTheBytesThatProtobufWrites) {
+  parsed<pb::Step>(recording::encode(StepRecord{}));
+  for (std::uint64_t tick = 0; tick < 3000; ++tick) {
+    StepRecord step = testing::sample_step(tick);
+    step.reasons = Reasons::from_bits(static_cast<std::uint32_t>(tick * 97));
+    if (tick % 2 == 1) step.hand_force = Vec3(0, -0.0, NAN);
+    parsed<pb::Step>(recording::encode(step, std::string(tick % 200, 'w')));
+  }
+  StepRecord whole = testing::sample_step(35);
+  whole.reasons = Reasons::from_bits(0xFFFF);
+  whole.hand.position.z() = whole.hand.velocity.y() = 1;
+  for (Vec3* const v : {&whole.was_applied, &whole.wanted, &whole.force, &whole.applied}) v->setConstant(0.5);
+  whole.hand_force = whole.wanted;
+  whole.force_error = 0;
+  whole.disarmed = true;
+  whole.buttons = 1;
+  whole.stiffness(0, 1) = 1;
+  const Vec3 one(1, 1, 1);
+  whole.handle = HandleStep{.turn = TurnStep{{{0.5, 0.5, 0.5, 0.5}, one}, one, one, one, one},
+                            .grip = GripStep{{1, 1}, 1, 1, 1, 1, 1, 1},
+                            .joints = Joints::three(one, one)};
+  EXPECT_EQ(unset_in(parsed<pb::Step>(recording::encode(whole, "near"))),
+            std::vector<std::string>{"tendon.recording.v1.Step.assumption_broken"});
+}
+
+TEST(RecordingCodec, ADatagramHasTheBytesThatProtobufWrites) {
+  for (const std::uint32_t size : {0U, 1U, 15U, 90U, 127U, 128U, 1200U, 60'000U}) {
+    DatagramRecord datagram = testing::sample_datagram(testing::ms(1), size, size % 2 == 0);
+    parsed<pb::Datagram>(recording::encode(datagram));
+    datagram.peer.ip.fill(0xfe);
+    datagram.bytes[0] = std::byte{0x54};
+    datagram.bytes[1] = std::byte{0x13};
+    parsed<pb::Datagram>(recording::encode(datagram));
+  }
 }
 
 TEST(RecordingCodec, APortComesBackWithAllThatItHad) {
