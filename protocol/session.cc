@@ -63,6 +63,7 @@ class Newest {
       if (&stream.value != value) continue;
       stream.waiting = false;
       --waiting_;
+      return;
     }
   }
 

@@ -48,13 +48,13 @@ bool publish_state(ServedClient& client, Subscription& subscription, const Devic
   if (state.tick - subscription.last_state < std::max(subscription.state_every, one_in)) return false;
   DeviceState told = state;
   told.device = number_of(subscription.device);
-  leave_out_what_no_frame_carries(told);
   if (!client.has<kFeatureDiagnostics>()) {
     told.force_wanted.reset();
     told.stiffness_wanted.reset();
   }
   if (!client.has<kFeatureHandle>()) leave_out_handle(told);
   if (!client.has<kFeatureJoints>()) told.joints.reset();
+  leave_out_what_no_frame_carries(told);
   if (told.field && !(client.has<kFeatureFields>() && fits_a_frame(*told.field))) told.field.reset();
   told.buttons = subscription.pressed;
   // The client uses these rounded values for its prediction.
