@@ -21,6 +21,9 @@ _LEFT_OUT = {
     *("OfferField", "UseField", "DropField", "FieldMaterial", "FieldFixture", "FieldBrick", "FieldStatus", "FieldPose"),
 }
 
+# An answer to one of these messages belongs to the session in which it was received.
+_RECEIVED_IN = {"DeviceState"}
+
 # The types of scalars, which are also the names of functions of ProtoReader and ProtoWriter.
 _SCALARS = {
     "double": ("double", "Double"),
@@ -122,6 +125,9 @@ class _Class:
             out += self._cases(oneof)
         for field in self._fields:
             out += self._declared(field)
+        if self._message.name in _RECEIVED_IN:
+            out.append("    /// <summary>The session in which it was received. It is copied, but not on the wire.</summary>")
+            out.append("    internal object Session;")
         for title, body in (
             ("public void Clear()", self._clear()),
             (f"public void CopyFrom({self._message.name} other)", self._copy()),
@@ -201,6 +207,8 @@ class _Class:
                 out.append(f"{name} = null;")
             else:
                 out.append(f"{name} = {self._zero(field)};")
+        if self._message.name in _RECEIVED_IN:
+            out.append("Session = null;")
         return out
 
     def _zero(self, field: Field) -> str:
@@ -222,6 +230,8 @@ class _Class:
                 out += [f"Has{name} = other.Has{name};", f"{name}.CopyFrom(other.{name});"]
             else:
                 out.append(f"{name} = other.{name};")
+        if self._message.name in _RECEIVED_IN:
+            out.append("Session = other.Session;")
         return out
 
     # ---- Bounds ----

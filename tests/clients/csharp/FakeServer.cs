@@ -71,6 +71,11 @@ namespace Tendon.Tests {
     /// <summary>Opens a session of suite 0 with these features.</summary>
     internal ForceClient Opened(Config config, params string[] features) {
       var client = new ForceClient(config);
+      Reopen(client, config, features);
+      return client;
+    }
+
+    internal void Reopen(ForceClient client, Config config, params string[] features) {
       var welcome = new Answer { Body = Answer.BodyCase.Welcome };
       welcome.Welcome.Version = 1;
       welcome.Welcome.Role = config.Observe ? Role.Observer : Role.Controller;
@@ -80,7 +85,6 @@ namespace Tendon.Tests {
       welcome.Welcome.Features.AddRange(features);
       Reply(client, welcome);
       Check.Equal(Phase.Open, client.Phase, client.Reason);
-      return client;
     }
 
     /// <summary>Answers the client's Hello.</summary>

@@ -207,10 +207,46 @@ namespace Tendon.Tests {
       }
     }
 
+    public static void AStateIsOnlyAnsweredInItsOwnSession() {
+      var server = new FakeServer();
+      ForceClient client = server.Opened(new Config());
+      DeviceState old = Taken(server, client, 100);
+      var kept = new DeviceState();
+      kept.CopyFrom(old);
+      var answer = new ForceCommand { Force = new Vec3(1, 0, 0) };
+      Check.Equal(null, client.Send(kept, answer), "a copy is answered");
+
+      server.Now += 3 * Time.Second; // without a datagram: the session ends
+      server.Listen(client);
+      server.Now += 3 * Time.Second;
+      server.Number = 0;
+      server.Reopen(client, new Config());
+      Check.Equal(ForceClient.OtherSession, client.Send(old, answer), "before a state of the new session");
+      DeviceState current = Taken(server, client, 50_000); // the tick of the server, which was never restarted
+      foreach (DeviceState state in new[] { old, kept, new DeviceState { Tick = 50_000 } }) {
+        Check.Equal(ForceClient.OtherSession, client.Send(state, answer), $"tick {state.Tick}");
+      }
+      server.Heard.Clear();
+      server.Listen(client);
+      Check.That(server.Heard.TrueForAll(frame => frame.Body != Frame.BodyCase.Force), "none is sent");
+      Check.Equal(null, client.Send(current, answer), "the new one is answered");
+      server.Listen(client);
+      ForceCommand sent = server.Heard.Find(frame => frame.Body == Frame.BodyCase.Force).Force;
+      Check.Equal(1UL, sent.Sequence, "sequence");
+      Check.Equal(50_000UL, sent.BasedOnTick, "tick");
+    }
+
+    private static DeviceState Taken(FakeServer server, ForceClient client, ulong tick) {
+      var state = new DeviceState();
+      client.Receive(server.Now, server.Datagram, server.SayState(tick));
+      Check.That(client.TakeState(state), "a state");
+      return state;
+    }
+
     public static void AForceThatIsNotFiniteOrNotGrantedIsNotSent() {
       var server = new FakeServer();
       ForceClient client = server.Opened(new Config(), "local-model");
-      var hand = new DeviceState { Tick = 5 };
+      DeviceState hand = Taken(server, client, 5);
       var force = new ForceCommand { Force = new Vec3(1, double.NaN, 0) };
       Check.Equal("force_n is not finite, or out of the bounds in WIRE.md", client.Send(hand, force), "NaN");
       force.Force = new Vec3(1, 0, 0);

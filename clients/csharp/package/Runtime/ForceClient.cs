@@ -204,17 +204,20 @@ namespace Tendon {
       if (Phase != Phase.Open || !_session.HasState) return false;
       _session.HasState = false;
       into.CopyFrom(_session.State);
+      into.Session = _session;
       return true;
     }
 
     /// <summary>
     /// Answers a state with a force on the hand. The sequence, tick, device, channel and a zero ValidForUs are filled
-    /// in. What the server has not granted is left out. Returns null, or the reason why nothing is sent: no session,
-    /// no lease, or the first field that is not finite or out of bounds.
+    /// in. What the server has not granted is left out. Returns null, or the reason why nothing is sent: no session, a
+    /// state that TakeState has not returned in this session, no lease, or the first field that is not finite or out of
+    /// bounds.
     /// </summary>
     public string Send(DeviceState answered, ForceCommand force) {
       if (Phase != Phase.Open) return NoSession;
       if (!Holds) return NoLease;
+      if (answered.Session != _session) return OtherSession;
       _command.CopyFrom(force);
       _command.Sequence = _sequence + 1;
       _command.BasedOnTick = answered.Tick;
@@ -237,6 +240,7 @@ namespace Tendon {
     }
 
     internal const string NoSession = "there is no session";
+    internal const string OtherSession = "the state is not of this session";
     internal const string NoLease = "another client holds the channel, or this client is an observer";
 
     // ---- Out ----

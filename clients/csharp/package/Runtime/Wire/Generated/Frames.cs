@@ -350,6 +350,8 @@ namespace Tendon {
     public double FieldDepth;
     /// <summary>M, the position of the proxy, which is ignored if there is no field</summary>
     public Vec3 FieldProxy;
+    /// <summary>The session in which it was received. It is copied, but not on the wire.</summary>
+    internal object Session;
 
     public void Clear() {
       Tick = 0;
@@ -380,6 +382,7 @@ namespace Tendon {
       Field = 0;
       FieldDepth = 0;
       FieldProxy = default(Vec3);
+      Session = null;
     }
 
     public void CopyFrom(DeviceState other) {
@@ -411,6 +414,7 @@ namespace Tendon {
       Field = other.Field;
       FieldDepth = other.FieldDepth;
       FieldProxy = other.FieldProxy;
+      Session = other.Session;
     }
 
     /// <summary>The name of the first field that is out of bounds, or null.</summary>
