@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cmath>
 #include <limits>
 #include <memory>
 #include <span>
@@ -71,6 +72,28 @@ std::string objection_to_tables(const UseField& wanted, std::vector<field::Mater
     table = field::DepthTable::of(sent.step, std::span(sent.force).first(sent.size));
   }
   return {};
+}
+
+/// Relative to the stiffness, and to the force in a knot of the table: more than the error of a client that computes them
+/// in doubles, and less than any difference that is meant.
+constexpr double kRounding = 1e-9;
+
+/// Moves a stiffness and knots onto their bounds if they are only beyond them by rounding. Without this, half of the
+/// measured curves that are as steep as `max_stiffness` would be refused.
+void forgive_rounding(field::Material& material, double max_stiffness) noexcept {
+  field::Material bounded = material;
+  const double over = material.stiffness + material.branch - max_stiffness;
+  if (over > 0 && over <= kRounding * max_stiffness) {
+    bounded.stiffness = max_stiffness - material.branch;
+    while (bounded.stiffness + bounded.branch > max_stiffness) bounded.stiffness = std::nextafter(bounded.stiffness, 0.0);
+  }
+  const field::DepthTable& was = material.table;
+  if (was.used) field::bound_table(bounded, max_stiffness);
+  for (std::size_t i = 0; i < was.force.size(); ++i) {
+    const double force = material.stiffness * was.step * static_cast<double>(i) + std::abs(was.force[i]);
+    if (!(std::abs(bounded.table.force[i] - was.force[i]) <= kRounding * force)) return;
+  }
+  material = bounded;
 }
 
 field::Field field_of(const FieldManifest& manifest, const UseField& wanted) {
@@ -191,7 +214,9 @@ Outcome FieldIntake::pass_on(LocalTime now, Guest& guest, Channel& channel, cons
                              const UseField& wanted, std::uint32_t source) {
   field::Field field = field_of(manifest, wanted);
   std::string objection = objection_to_tables(wanted, field.materials);
-  if (objection.empty()) objection = objection_to(field, manifest, devices_[wanted.device].fields->max_stiffness);
+  const double max_stiffness = devices_[wanted.device].fields->max_stiffness;
+  for (field::Material& material : field.materials) forgive_rounding(material, max_stiffness);
+  if (objection.empty()) objection = objection_to(field, manifest, max_stiffness);
   if (!objection.empty()) return {.code = Code::kInvalid, .detail = named_field(wanted.field) + std::move(objection)};
   const std::size_t bricks = manifest.bricks();
   if (bricks > 0 && !channel.slots.has(wanted.field)) {

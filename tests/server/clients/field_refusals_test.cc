@@ -1,11 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cmath>
 #include <limits>
+#include <span>
 #include <string>
 #include <vector>
 
+#include "clients/cpp/field/field.h"
+#include "core/field/material.h"
 #include "protocol/secrets/blake2b.h"
 #include "tests/server/clients/field_server.h"
+#include "tests/support/dice.h"
+#include "tests/support/refusal.h"
 
 namespace tendon::field_refusals_test {
 namespace {
@@ -135,6 +140,48 @@ TEST_F(FieldRefusals, EachBoundOfAMaterialIsNamed) {
                  of_ball(one, "fixture.stiffness = 2000: expected above 0, and at most 1500 N/m"));
   run(milliseconds(10), {&one});
   EXPECT_FALSE(one->state->field);
+}
+
+TEST_F(FieldRefusals, ACurveAsSteepAsAllowedIsNotRefusedForItsRounding) {
+  const Engine one = with_ball();
+  constexpr double kMost = 1500;
+  std::uint32_t generation = 0;
+  int rounded = 0;
+  const auto code = [&](const Field& field) {
+    return answer_to(one->use(newest(one), ++generation, field.materials, 0, field.tables), one).code;
+  };
+  Dice dice(2);
+  for (std::size_t run = 0; run < 60; ++run) {
+    const std::size_t count = 2 + dice.bits() % 15;
+    const double step = dice.decades(-3.5, -2.5);
+    std::vector<double> depths;
+    std::vector<double> forces;
+    for (std::size_t i = 0; i < count; ++i) {
+      depths.push_back(step * static_cast<double>(i + 1));
+      const double slope = i == run % count ? kMost : dice.within(300, 1200);
+      forces.push_back((i == 0 ? 0 : forces.back()) + slope * step);
+    }
+    Field field;
+    field.set_curve(0, depths, forces);
+    const field::Material law{
+        .stiffness = field.materials[0].stiffness,
+        .table = field::DepthTable::of(field.tables[0].step, std::span(field.tables[0].force).first(count))};
+    rounded += thrown_by([&] { law.expect_valid(kMost); }).empty() ? 0 : 1;
+    EXPECT_EQ(code(field), Code::kOk) << "run " << run;
+    const std::size_t steepest = run % count;
+    field.tables[0].force[steepest] += 1e-6 * forces[steepest];
+    EXPECT_EQ(code(field), Code::kInvalid) << "run " << run << ": more than rounding";
+  }
+  EXPECT_GT(rounded, 15);
+  const auto two = [](double stiffness, double branch) {
+    return std::vector<FieldMaterial>{{.stiffness = stiffness, .branch_stiffness = branch, .relaxation = 0.2}};
+  };
+  for (const double branch : {0.1, 700.3}) {
+    const double above = (kMost - branch) * (1 + 1e-12);
+    ASSERT_GT(above + branch, kMost);
+    EXPECT_EQ(answer_to(one->use(newest(one), ++generation, two(above, branch)), one).code, Code::kOk);
+    EXPECT_EQ(answer_to(one->use(newest(one), ++generation, two(above * (1 + 1e-7), branch)), one).code, Code::kInvalid);
+  }
 }
 
 TEST_F(FieldRefusals, ATableIsRefusedWithItsMaterialAndItsKnot) {
