@@ -241,6 +241,8 @@ tendon_package(idlc DEBIAN cyclonedds-tools PROGRAM idlc
 # Version 3.2 is the first version that sends small messages immediately. It is not available in Debian 12.
 tendon_package(precice DEBIAN libprecice-dev PKG_CONFIG libprecice>=3.2 libprecice<4 HEADERS precice/precice.hpp
   PROBE "#include <precice/precice.hpp>\nint main() { precice::Participant(\"a\", \"b\", 0, 1).initialize(); }")
+tendon_package(mujoco DEBIAN libmujoco-dev HEADERS mujoco/mujoco.h LIBRARIES mujoco
+  PROBE "#include <mujoco/mujoco.h>\nint main() { return mj_version() != mjVERSION_HEADER; }")
 tendon_package(petsc DEBIAN petsc-dev PKG_CONFIG PETSc>=3.17 HEADERS petscksp.h)
 tendon_package(mpi DEBIAN libopenmpi-dev MODULE MPI TARGET MPI::MPI_CXX
   PROBE "#include <mpi.h>\nint main(int count, char** words) { return MPI_Init(&count, &words); }")

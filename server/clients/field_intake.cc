@@ -85,7 +85,8 @@ void forgive_rounding(field::Material& material, double max_stiffness) noexcept 
   const double over = material.stiffness + material.branch - max_stiffness;
   if (over > 0 && over <= kRounding * max_stiffness) {
     bounded.stiffness = max_stiffness - material.branch;
-    while (bounded.stiffness + bounded.branch > max_stiffness) bounded.stiffness = std::nextafter(bounded.stiffness, 0.0);
+    while (bounded.stiffness + bounded.branch > max_stiffness)
+      bounded.stiffness = std::nextafter(bounded.stiffness, 0.0);
   }
   const field::DepthTable& was = material.table;
   if (was.used) field::bound_table(bounded, max_stiffness);

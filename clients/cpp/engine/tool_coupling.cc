@@ -14,10 +14,20 @@ ToolCoupling::ToolCoupling(const Config& config) : config_(config) {
   share_ = 1 / (1 + (config.damping + config.stiffness * config.step_s) * config.step_s / config.tool_mass);
 }
 
+ToolCoupling ToolCoupling::felt_as(Config config) {
+  static_cast<void>(ToolCoupling(config));  // checks it
+  const double least = config.stiffness * config.step_s * config.step_s;
+  expect(config.tool_mass > least, "tool_mass", config.tool_mass, "more than stiffness·step_s², " + shortest(least));
+  config.stiffness *= (1 + config.damping * config.step_s / config.tool_mass) / (1 - least / config.tool_mass);
+  return ToolCoupling(config);
+}
+
 ToolCoupling::Forces ToolCoupling::couple(const DeviceState& hand, const Vec3& tool_position,
                                           const Vec3& tool_velocity) const noexcept {
-  const Vec3 apart = hand.position - tool_position;
-  const Vec3 parting = hand.velocity - tool_velocity;
+  return couple(Vec3(hand.position - tool_position), Vec3(hand.velocity - tool_velocity));
+}
+
+ToolCoupling::Forces ToolCoupling::couple(const Vec3& apart, const Vec3& parting) const noexcept {
   Vec3 force = share_ * (config_.stiffness * (apart + config_.step_s * parting) + config_.damping * parting);
   const double size = force.norm();
   if (size > config_.max_force) force *= config_.max_force / size;

@@ -33,9 +33,18 @@ class ToolCoupling {
 
   explicit ToolCoupling(const Config& config);  ///< throws std::invalid_argument "FIELD = VALUE: expected …"
 
+  /// Returns a coupling with `config`, except that felt_stiffness() is `config.stiffness`, and k is larger. Throws
+  /// std::invalid_argument as above, and if the mass is not above stiffness·step_s²: no spring is then felt that hard.
+  static ToolCoupling felt_as(Config config);
+
   /// Must be called before each step of the engine. Positions (m) and velocities (m/s) that are not finite result in
   /// a force that is not finite. ForceClient does not send such a force; do not apply it in the engine.
   Forces couple(const DeviceState& hand, const Vec3& tool_position, const Vec3& tool_velocity) const noexcept;
+
+  /// The same for the displacement `apart` from the tool to the hand, and its rate `parting`. A second coupling can thus
+  /// turn the tool with the handle (HeldTool): its config is in N·m/rad, N·m·s/rad, kg·m² and N·m, `apart` in rad,
+  /// `parting` in rad/s, and the forces are torques in N·m.
+  Forces couple(const Vec3& apart, const Vec3& parting) const noexcept;
 
   /// N/m, stiffness felt if the tool cannot move: k/[1 + (b + k·T)·T/m].
   double felt_stiffness() const noexcept { return share_ * config_.stiffness; }

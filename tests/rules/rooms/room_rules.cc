@@ -76,6 +76,7 @@ const std::vector<Door>& front_doors() {
       {"Eigen's tree of boxes", {"unsupported/Eigen/BVH"}, {"clients/softbody/effects/self_collision.cc"}},
       {"libsodium", {"sodium.h", "sodium/"}, {"protocol/secrets/crypto.cc", "devices/falcon/firmware.cc"}},
       {"libusb", {"libusb.h", "libusb-1.0/"}, {"devices/usb/with_libusb.cc", "tests/devices/usb/far_usbfs.cc"}},
+      {"MuJoCo", {"mujoco/"}, {"clients/mujoco/cpp/touch_mjcf.cc"}},
       // The haptic thread must not write JSON.
       {"nlohmann's JSON",
        {"nlohmann/"},

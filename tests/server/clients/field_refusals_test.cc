@@ -180,7 +180,8 @@ TEST_F(FieldRefusals, ACurveAsSteepAsAllowedIsNotRefusedForItsRounding) {
     const double above = (kMost - branch) * (1 + 1e-12);
     ASSERT_GT(above + branch, kMost);
     EXPECT_EQ(answer_to(one->use(newest(one), ++generation, two(above, branch)), one).code, Code::kOk);
-    EXPECT_EQ(answer_to(one->use(newest(one), ++generation, two(above * (1 + 1e-7), branch)), one).code, Code::kInvalid);
+    EXPECT_EQ(answer_to(one->use(newest(one), ++generation, two(above * (1 + 1e-7), branch)), one).code,
+              Code::kInvalid);
   }
 }
 

@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <limits>
 
+#include "tests/support/refusal.h"
+
 namespace tendon::tool_coupling_test {
 namespace {
 
@@ -82,6 +84,19 @@ TEST(ToolCoupling, MakesNoForceOfAHandThatIsNowhere) {
   DeviceState hand;
   hand.position = Vec3(0, std::numeric_limits<double>::quiet_NaN(), 0);
   EXPECT_FALSE(ToolCoupling({}).couple(hand, Vec3::Zero(), Vec3::Zero()).on_hand.allFinite());
+}
+
+TEST(ToolCoupling, CanBeMadeForTheStiffnessThatIsFelt) {
+  const ToolCoupling::Config config{.stiffness = 1000, .damping = 14, .tool_mass = 0.05, .step_s = 0.001};
+  const ToolCoupling coupling = ToolCoupling::felt_as(config);
+  EXPECT_NEAR(coupling.felt_stiffness(), 1000, 1e-9);
+  EXPECT_NEAR(coupling.couple(Vec3(0.002, 0, 0), Vec3::Zero()).on_hand.x(), -2, 1e-12);
+  Tool tool{.mass = 0.05, .step = 0.001, .position = Vec3(0.01, 0, 0)};
+  settle(coupling, tool, DeviceState{}, 500);
+  EXPECT_LT(tool.position.norm(), 1e-9);
+  EXPECT_EQ(thrown_by([] { ToolCoupling::felt_as({.stiffness = 1000, .tool_mass = 0.001}); }),
+            "tool_mass = 0.001: expected more than stiffness·step_s², 0.001");
+  EXPECT_THROW(ToolCoupling::felt_as({.stiffness = -1}), std::invalid_argument);
 }
 
 TEST(ToolCoupling, RefusesTheImpossible) {
