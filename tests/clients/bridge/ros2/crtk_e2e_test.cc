@@ -234,5 +234,34 @@ TEST(Crtk, AProgramThatIsKilledLetsTheHandGoAndComesBack) {
   EXPECT_LT(taken, 0.8) << "300 ms, and what a machine may stand still";
 }
 
+TEST(Crtk, OnlyThePublisherThatLeavesIsSaidToHaveLeftAndTheOthersStay) {
+  Room room(kRests + kNoLimiter);
+  BridgeProcess bridge(room.folder, room.server.address(), room.domain, {"--crtk"});
+  Client echo("echo_motion", room.server.address(), room.folder.path(), {"--json", "--rate-hz", "100"});
+  const auto is_pushed = [](double force) { return force < -0.4; };
+  const std::string wrench_command = "tendon/device/wrench_command";
+  Peer owner(room, {"push", "0.5"});
+  bridge.wait_for_line("the hand feels its servo_cf");
+  Peer waits(room, {"push", "0.1", wrench_command});
+  bridge.wait_for_line("a wrench_command of");
+  Peer commands(room, {"text", "enable", "late"});
+  bridge.wait_for_line("requested \"enable\"");
+  watch_force(echo, is_pushed);
+  const LocalTime begin = read_clock();
+  Peer leaves(room, {"push", "0.1", wrench_command, "1"});
+  leaves.wait_for_line(R"("event":"left")");
+  bridge.wait_for_line("has left");
+  watch_force(echo, is_pushed);
+  const LocalTime end = read_clock();
+  EXPECT_EQ(bridge.err().find("has left"), bridge.err().rfind("has left")) << bridge.err();
+  int steps = 0;
+  for (const StepRecord& step : room.recording().steps) {
+    if (step.hand.at < begin || step.hand.at > end) continue;
+    ++steps;
+    ASSERT_FALSE(step.applied.isZero(0)) << step.tick << ": " << bridge.err();
+  }
+  EXPECT_GT(steps, 1000);
+}
+
 }  // namespace
 }  // namespace tendon::e2e::crtk_e2e_test

@@ -44,7 +44,8 @@ def spinning_node():
 
 
 def publisher(node, kind, topic, transient_local=False):
-    return node.create_publisher(ros.MESSAGES[kind], NAMESPACE + "/" + topic, profile(transient_local))
+    name = topic if "/" in topic else NAMESPACE + "/" + topic
+    return node.create_publisher(ros.MESSAGES[kind], name, profile(transient_local))
 
 
 def wait_until(holds):
@@ -97,17 +98,21 @@ def text(options):
 
 
 def push(options):
-    """Sends a servo_cf with the given force along y, in N, 200 times per second."""
+    """Sends the given force along y, in N, 200 times per second to servo_cf or to another topic (the second argument), for
+    a time in s (the third)."""
+    force, topic, seconds = options.arguments + ["servo_cf", SECONDS][len(options.arguments) - 1 :]
     node = spinning_node()
-    out = publisher(node, "geometry_msgs/WrenchStamped", "servo_cf")
+    out = publisher(node, "geometry_msgs/WrenchStamped", topic)
     message = ros.MESSAGES["geometry_msgs/WrenchStamped"]()
-    message.wrench.force.y = float(options.arguments[0])
+    message.wrench.force.y = float(force)
     say("ready")
     rate = node.create_rate(200)
-    end = time.monotonic() + SECONDS
+    end = time.monotonic() + float(seconds)
     while time.monotonic() < end:
         out.publish(message)
         rate.sleep()
+    node.destroy_publisher(out)
+    say("left")
 
 
 def ages(options):
