@@ -74,8 +74,7 @@ std::string objection_to_tables(const UseField& wanted, std::vector<field::Mater
   return {};
 }
 
-/// Relative to the stiffness, and to the force in a knot of the table: more than the error of a client that computes them
-/// in doubles, and less than any difference that is meant.
+/// The relative tolerance of a stiffness and of the forces in a table. It is larger than rounding errors of doubles.
 constexpr double kRounding = 1e-9;
 
 /// Moves a stiffness and knots onto their bounds if they are only beyond them by rounding. Without this, half of the

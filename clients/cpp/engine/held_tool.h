@@ -27,23 +27,22 @@ struct ToolEngine {
   double mass = 0.05;     ///< kg, > stiffness·step_s² of HeldTool::Config
   double inertia = 2e-5;  ///< kg·m², > angular_stiffness·step_s²: the smallest moment of inertia about the origin
   std::function<Motion()> motion;
-  std::function<void(const Six& pull)> pull;  ///< sets what acts on the tool from now on, instead of the last pull
+  std::function<void(const Six& pull)> pull;  ///< replaces the force on the tool
   /// Simulates a time step. Returns false if the solution was lost, for example as NaN. The engine must then be at its
   /// start again.
   std::function<bool()> step;
-  /// Returns what the contacts and joints exert on the tool now, with the newest pull. `moved` is false if only the pull
-  /// has changed since the last call, so that the engine need not find the contacts again.
+  /// Returns the force of contacts and joints on the tool for the newest pull. `moved` is false if only the pull has
+  /// changed since the last call. The contacts are then the same.
   std::function<Six(bool moved)> held;
   /// Appends the contacts of the tool. Each normal points to the tool, and the gap is between the surfaces.
   std::function<void(std::vector<Contact>& found)> contacts;
 };
 
-/// The tool of a rigid-body engine in the hand. It is held by a virtual coupling (ToolCoupling) for its position, and by
-/// another one for its orientation. The hand feels their springs, but not their dampers, which keep the tool from
-/// oscillating:
+/// A tool in a rigid-body engine that is held by the hand. There is a virtual coupling (ToolCoupling) for the position
+/// and another for the orientation. Only the springs of the couplings are felt. The dampers prevent oscillations.
 ///
-/// * The tool is where it was at the start when the device is at its origin, and its handle is not rotated.
-/// * The engine is stepped until it has reached the time of the state. The hand moves at constant speed meanwhile.
+/// * The initial pose of the tool corresponds to the origin of the device and an unrotated handle.
+/// * The engine simulates the time since the previous state. The hand moves at constant speed meanwhile.
 /// * The stiffness is a finite difference of held(), so it is zero in free space, and that of the coupling at a wall.
 ///   It is valid up to the distance at which the force is zero.
 /// * A contact is sent if all contacts have the same direction.
@@ -61,10 +60,10 @@ class HeldTool {
     double max_speed = 1;          ///< m/s, > 0
     double max_spin = 20;          ///< rad/s, > 0
     int max_steps = 20;            ///< ≥ 1, per answer. If more are due, the simulation falls behind.
-    /// The scene has z up, y away from the operator and x to the right, and the base frame of the device has y up.
-    /// Otherwise the scene has the axes of the device.
+    /// If true, z points up in the scene and y points up in the device. Both x axes point to the right. If false, the
+    /// axes are the same.
     bool z_up = false;
-    std::string tool = "tool";  ///< for the engine: the name of the body
+    std::string tool = "tool";  ///< name of the body, which is not used by HeldTool
 
     /// Adds --tool, --z-up, --stiffness-n-per-m and --angular-stiffness-nm-per-rad.
     void add_to(CommandLine& line);
@@ -95,7 +94,7 @@ class HeldTool {
   ToolCoupling spring_;
   ToolCoupling twist_;
   Pose home_;
-  Pose led_;  ///< of the hand in the scene
+  Pose led_;  ///< pose of the hand in the scene
   Vec3 speed_ = Vec3::Zero();
   Vec3 spin_ = Vec3::Zero();
   std::optional<PeerTime> sampled_{};

@@ -20,7 +20,7 @@ int main(int argc, char** argv) try {
 
   static const auto say = [](const char* text) { std::cerr << "touch_mjcf: MuJoCo: " << text << std::endl; };
   static unsigned warnings = 0;
-  mju_user_error = [](const char* text) { say(text), std::exit(1); };
+  mju_user_error = [](const char* text) { say(text), std::_Exit(1); };
   mju_user_warning = [](const char* text) { std::has_single_bit(++warnings) ? say(text) : void(); };
   const mjModel* const m = mj_loadXML(file.c_str(), nullptr, error.data(), static_cast<int>(error.size()));
   if (m == nullptr) throw std::runtime_error(file + ": " + error.c_str());

@@ -139,7 +139,7 @@ describe("the engine in C++ agrees with this client within 2 %", () => {
 });
 
 describe("the engine in C++", () => {
-  it("sends the surface in the axes of the device, where the force of the spring is zero", (test) => {
+  it("sends the surface in the axes of the device", (test) => {
     const answers = inCpp(test, file("plane"), kPress, "--z-up");
     if (!answers) return;
     const { normal, gap, stiffness } = answers[2500]!;
@@ -168,7 +168,7 @@ describe("the engine in C++", () => {
     for (const t of [2.5, 4]) assert.ok(apart(answers[100 * t]!.force, all[1000 * t]!.force) < 0.02 * norm(all[1000 * t]!.force), `${t} s`);
   });
 
-  it("sends no force if the simulation diverges, says so, and is felt again afterwards", (test) => {
+  it("sends no force if the simulation diverges, and is felt again", (test) => {
     const program = process.env["TENDON_TOUCH_STATES"];
     if (!program) return test.skip(kNotBuilt);
     // MuJoCo integrates this spring with k T²/m = 4.1, and more than 4 is unstable. It needs about 100 steps to 1e10 m.
