@@ -122,6 +122,7 @@ void LogLoop::close(LocalTime now, std::uint64_t unsent) {
 }
 
 void LogLoop::round(LocalTime now, std::uint64_t unsent, bool last) {
+  for (DeviceLog& device : devices_) device.of.mail.flight.make_ready();
   if (takes_records_) record_all(now);
   for (DeviceLog& device : devices_) report_health(now, unsent, device);
   if (now < trouble_due_ && !last) return;

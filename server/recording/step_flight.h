@@ -1,65 +1,76 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <atomic>
 #include <cstddef>
-#include <optional>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
 
-#include "core/exchange/flight_recorder.h"
-#include "server/recording/records.h"
+#include "server/recording/packed_step.h"
 
 namespace tendon {
 
-/// Stores the last steps of a device before a fault. The handles and the fields of the steps are optional, because a
-/// handle needs half of the memory of a StepRecord. Thread-safe, Realtime-safe: see FlightRecorder.
+/// Stores the last steps of a device before a fault. If a fault freezes it, another thread can read them. The steps are
+/// packed in chunks of a page each, and a chunk is used again when all of its steps are too old. So the memory depends
+/// on what changes from step to step. Address space is reserved for the largest steps, but only the pages that were
+/// used, and some in advance, are in memory.
+/// Thread-safe: one thread can call `record` and `freeze`, and another one `make_ready`. While it is frozen, the other
+/// thread can read it and call `thaw`. Realtime-safe: `record` and `freeze`.
 class StepFlight {
  public:
-  /// `capacity` must be a power of two.
-  explicit StepFlight(std::size_t capacity, bool handles = true, bool fields = true) : steps_(capacity) {
-    if (handles) handles_.emplace(capacity);
-    if (fields) fields_.emplace(capacity);
-  }
+  /// Keeps the last `capacity` steps. The handles and the fields of the steps are optional. Throws
+  /// std::invalid_argument if the capacity is 0 or above 65536, and std::bad_alloc.
+  explicit StepFlight(std::size_t capacity, bool handles = true, bool fields = true);
 
-  void record(const StepRecord& step) {
-    steps_.record(step);
-    if (handles_) handles_->record(step.handle);
-    if (fields_) fields_->record(step.field);
-  }
+  /// Does nothing while frozen.
+  void record(const StepRecord& step) noexcept;
 
-  /// In this order, because the other thread only checks the recorder of the steps.
-  void freeze() noexcept {
-    if (handles_) handles_->freeze();
-    if (fields_) fields_->freeze();
-    steps_.freeze();
-  }
-  bool frozen() const noexcept { return steps_.frozen(); }
-  void thaw() noexcept {
-    if (handles_) handles_->thaw();
-    if (fields_) fields_->thaw();
-    steps_.thaw();
-  }
+  void freeze() noexcept { frozen_.store(true, std::memory_order_release); }
+  bool frozen() const noexcept { return frozen_.load(std::memory_order_acquire); }
+  void thaw() noexcept;  ///< removes all steps and resumes recording
 
-  std::size_t size() const noexcept { return steps_.size(); }
-  StepRecord operator[](std::size_t i) const noexcept {
-    StepRecord step;
-    static_cast<PositionStep&>(step) = steps_[i];
-    static_cast<LoopStep&>(step) = steps_[i];
-    if (handles_) step.handle = (*handles_)[i];
-    if (fields_) step.field = (*fields_)[i];
-    return step;
-  }
+  /// Loads the pages that the next steps may need, at least 40 ms of the largest steps at 1 kHz. If this is not called
+  /// in time, `record` keeps all steps, but the kernel has to load a page while it runs.
+  void make_ready() noexcept;
+
+  /// Must be frozen, or called from the recording thread. This is also true for operator[].
+  std::size_t size() const noexcept { return count_ < capacity_ ? count_ : capacity_; }
+  StepRecord operator[](std::size_t i) const noexcept;  ///< the i-th oldest step, i < size()
+
+  std::size_t used_bytes() const noexcept;  ///< of the chunks that have been used
 
  private:
-  struct Kept : PositionStep, LoopStep {
-    Kept& operator=(const StepRecord& step) {
-      PositionStep::operator=(step);
-      LoopStep::operator=(step);
-      return *this;
-    }
+  struct Unmap {
+    std::size_t bytes = 0;
+    void operator()(std::byte* memory) const noexcept;
   };
 
-  FlightRecorder<Kept> steps_;
-  std::optional<FlightRecorder<std::optional<HandleStep>>> handles_;
-  std::optional<FlightRecorder<std::optional<FieldStep>>> fields_;
+  std::byte* chunk(std::uint16_t number) const noexcept;
+  std::span<std::byte> memory_of(std::size_t first, std::size_t end) const noexcept;
+  std::uint16_t in_order(std::size_t i) const noexcept { return order_[i % order_.size()]; }
+  void begin_chunk() noexcept;
+  void record_without(StepRecord step) noexcept;  ///< the parts that are not kept
+
+  std::size_t capacity_;
+  bool handles_;
+  bool fields_;
+  std::size_t most_;    ///< bytes of a packed step, with those that are overwritten after it
+  std::size_t chunks_;  ///< enough for `capacity_` of the largest steps
+  std::unique_ptr<std::byte, Unmap> memory_;
+  std::vector<std::uint64_t> first_;  ///< of each chunk: the number of its first step
+  std::vector<std::uint16_t> order_;  ///< ring of the chunks with steps, from oldest_ to newest_
+  std::vector<std::uint16_t> free_;   ///< used before, without steps
+  std::size_t oldest_ = 0;
+  std::size_t newest_ = 0;  ///< after the last one
+  std::size_t ready_ = 0;   ///< chunks in memory
+  std::atomic<std::size_t> used_{0};
+  std::uint64_t count_ = 0;  ///< steps since the start or `thaw`
+  std::byte* at_ = nullptr;
+  std::byte* end_ = nullptr;  ///< of the chunk
+  StepBefore before_;
+  std::atomic<bool> frozen_{false};
 };
 
 }  // namespace tendon
