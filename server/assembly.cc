@@ -155,8 +155,9 @@ void Assembly::add_devices(std::vector<Part>& parts, const Config& config, std::
     // The datagrams of a shard are only stored in the mailboxes of the first device.
     if (devices_.size() != shard.first_device(parts.size())) capacities.datagrams = 1;
     if (!config.watched) {
-      const std::size_t couplings = std::max<std::size_t>(loop.control.leaders.size(), 1);
-      capacities.ports = part.scene.teleoperation ? std::bit_ceil(couplings) * capacities.ports : 1;
+      capacities.channels = loop.control.channels.size();
+      capacities.couplings = loop.control.coupling ? std::max<std::size_t>(loop.control.leaders.size(), 1) : 0;
+      capacities.ports = capacities.couplings > 0 ? std::bit_ceil(capacities.couplings) * capacities.ports : 1;
     }
     capacities.flight_handles = !part.device.info().position_only();
     capacities.fields = part.scene.has_fields();
@@ -180,6 +181,7 @@ void Assembly::add_group_of(DeviceLoop& device, std::size_t network) {
 void Assembly::add_networks(const std::vector<Part>& parts, const Config& config, const std::vector<Link*>& links) {
   const auto count = static_cast<std::uint32_t>(links.size());
   NetworkLoop::Config network = network_config(config, parts.front().scene, count);
+  network.devices.reserve(parts.size());
   for (std::size_t i = 0; i < parts.size(); ++i) network.devices.push_back(served_config(parts[i], devices_[i].mail));
   for (Link* const link : links) {
     network.shard.number = static_cast<std::uint32_t>(networks_.size());

@@ -9,6 +9,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <vector>
 
 #include "core/exchange/latest.h"
 #include "core/exchange/spsc_ring.h"
@@ -98,7 +99,9 @@ struct Mailboxes {
     std::size_t ports = 1;      ///< for each coupling
     std::size_t flight = 2048;  ///< 2 s at 1 kHz
     std::size_t datagrams = 4096;
-    bool flight_handles = true;  ///< if false, only positions are stored
+    std::size_t channels = limits::kMaxChannels;  ///< `forces`
+    std::size_t couplings = Shares::kMost;        ///< `port_in` and `port_out`
+    bool flight_handles = true;                   ///< if false, only positions are stored
     bool fields = false;
 
     /// For each device of a server that records. For more than 16 devices, the total size of the step queues is the
@@ -121,7 +124,10 @@ struct Mailboxes {
   static constexpr std::size_t kOrders = 16;  ///< more than clients can cause within one haptic step
 
   explicit Mailboxes(const Capacities& capacities)
-      : steps(capacities.steps),
+      : forces(capacities.channels),
+        port_in(capacities.couplings),
+        port_out(capacities.couplings),
+        steps(capacities.steps),
         ports(capacities.ports),
         flight(capacities.flight, capacities.flight_handles, capacities.fields),
         datagrams(capacities.datagrams) {
@@ -130,14 +136,14 @@ struct Mailboxes {
   }
   Mailboxes() : Mailboxes(Capacities{}) {}
 
-  std::array<Latest<RemoteForce>, limits::kMaxChannels> forces;
+  std::vector<Latest<RemoteForce>> forces;                             ///< of each channel
   std::unique_ptr<std::array<FieldBox, limits::kMaxChannels>> fields;  ///< null if no channel can use fields
   std::unique_ptr<FieldTape> field_tape;  ///< null if no channel can use fields, or if the steps are not recorded
   SpscRing<HapticOrder> orders{kOrders};
   Latest<DeviceState> state;
   Latest<OutputSettings> outputs;
-  std::array<Latest<ArrivedPort>, Shares::kMost> port_in;
-  std::array<Latest<PortState>, Shares::kMost> port_out;
+  std::vector<Latest<ArrivedPort>> port_in;
+  std::vector<Latest<PortState>> port_out;
   SpscRing<StepRecord> steps;
   std::atomic<std::uint64_t> steps_lost{0};
   SpscRing<PortRecord> ports;

@@ -165,6 +165,7 @@ void NetworkLoop::open(LocalTime now, ServedClient client) {
                   ? " with the key \"" + client.key->name + "\", encrypted by " + names_of({client.session.suite()})
                   : ""),
          change_of(client, true, ""));
+  for (const Subscription& seen : client.subscriptions) devices_[seen.device].sampled.remember();
   if (client.role == Role::kController) client.meter.emplace(now);
   if (config_.adapt_state_rate) client.adaptation.emplace(RateAdaptation::Config{}, now);
   clients_.push_back(std::move(client));

@@ -119,6 +119,7 @@ Server::Hardware::Hardware(const Scene& scene, Guardian* guardian)
 
 std::vector<Server::Hardware> Server::hardware_of(const std::vector<Scene>& scenes, Guardian* guardian) {
   std::vector<Hardware> all;
+  all.reserve(scenes.size());
   for (const Scene& scene : scenes) all.emplace_back(scene, guardian);
   return all;
 }
@@ -161,6 +162,7 @@ std::vector<Link*> Server::links() {
 
 std::vector<Assembly::Part> Server::parts_of(const std::vector<Scene>& scenes) {
   std::vector<Assembly::Part> parts;
+  parts.reserve(scenes.size());
   for (std::size_t i = 0; i < scenes.size(); ++i) {
     const Scene& scene = scenes[i];
     parts.push_back({.scene = scene,

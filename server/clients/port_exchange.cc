@@ -32,8 +32,9 @@ void PortExchange::dial(LocalTime now, std::uint32_t device, const Peer::Config&
 
 void PortExchange::publish(LocalTime now) {
   for (const std::uint32_t device : coupled_) {
-    for (std::uint32_t coupling = 0; coupling < Shares::kMost; ++coupling) {
-      const PortState* const port = devices_[device].mail->port_out[coupling].take();
+    auto& ports = devices_[device].mail->port_out;
+    for (std::uint32_t coupling = 0; coupling < ports.size(); ++coupling) {
+      const PortState* const port = ports[coupling].take();
       if (port != nullptr) publish(now, device, coupling, *port);
     }
   }

@@ -11,17 +11,18 @@
 namespace tendon {
 
 /// Stores the times of the newest haptic steps of a device, to find the step that a force answers. Thread-safe: no.
-/// Realtime-safe: yes, except for the constructor.
+/// Realtime-safe: yes, except for `remember`.
 class SampledSteps {
  public:
   static constexpr std::size_t kRemembered = 4096;  ///< 4 s at 1 kHz
 
   struct Step {
     LocalTime at{};
-    LocalTime sent{};
+    LocalTime sent{};  ///< from `at` to 4.2 s after it; other times are changed to these
   };
 
-  SampledSteps() : steps_(kRemembered) {}
+  /// Must be called before the first client sees the steps. Before this, they do not need memory (48 kB).
+  void remember();
 
   /// Interpolates skipped ticks, because a client can answer a predicted tick that the network thread did not receive.
   void observe(std::uint64_t tick, LocalTime at, LocalTime sent);
@@ -31,11 +32,11 @@ class SampledSteps {
   std::uint64_t newest() const noexcept { return newest_; }
 
  private:
-  struct Numbered {
-    std::uint64_t tick = 0;
-    Step step{};
-  };
-  std::vector<Numbered> steps_;
+  void put(std::uint64_t tick, const Step& step);
+
+  std::vector<LocalTime> at_{};                 ///< all from oldest_ to newest_, at most kRemembered; by tick
+  std::vector<std::uint32_t> sent_after_ns_{};  ///< since at_
+  std::uint64_t oldest_ = 1;
   std::uint64_t newest_ = 0;
 };
 

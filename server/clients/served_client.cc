@@ -86,6 +86,7 @@ std::vector<ServedDevice> served_devices(const std::vector<ServedDevice::Config>
                                 std::to_string(shard.of) + " for " + std::to_string(all.size()) + " devices");
   }
   std::vector<ServedDevice> devices;
+  devices.reserve(shard.end_device(all.size()) - shard.first_device(all.size()));
   for (std::size_t i = shard.first_device(all.size()); i < shard.end_device(all.size()); ++i) {
     const ServedDevice::Config& config = all[i];
     ServedDevice& device = devices.emplace_back(ServedDevice{.about = config.about,

@@ -38,6 +38,9 @@ std::string Scene::name_of(std::uint32_t index) const { return count == 1 ? name
 
 std::vector<Scene> each_device(const std::vector<Scene>& scenes) {
   std::vector<Scene> each;
+  std::size_t devices = 0;
+  for (const Scene& scene : scenes) devices += scene.count;
+  each.reserve(devices);
   for (const Scene& scene : scenes) {
     for (std::uint32_t index = 0; index < scene.count; ++index) {
       Scene& one = each.emplace_back(scene);
