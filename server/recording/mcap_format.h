@@ -37,7 +37,7 @@ inline constexpr std::size_t kRecordHead = 1 + 8;
 /// Updates a CRC-32 as used by zlib, PNG and Ethernet. `crc` is 0 if there are no previous bytes.
 std::uint32_t extend_crc(std::uint32_t crc, std::span<const std::byte> bytes);
 
-/// Like `extend_crc` with `size` bytes whose own CRC is `next`. The time does not depend on `size`.
+/// Returns the CRC of two pieces of data. `next` is the CRC of the second piece, and `size` is its length in bytes.
 std::uint32_t join_crcs(std::uint32_t crc, std::uint32_t next, std::size_t size);
 
 }  // namespace tendon::mcap

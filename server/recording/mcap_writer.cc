@@ -260,7 +260,7 @@ void McapWriter::put_summary() {
   put_bytes(out_, mcap::kMagic);
 }
 
-/// Includes the bytes of `out_` before `end`.
+/// Adds the bytes of `out_` before `end` to the CRC of the file.
 void McapWriter::update_crc(std::size_t end) {
   crc_ = extend_crc(crc_, std::span(out_).subspan(in_crc_, end - in_crc_));
   in_crc_ = end;

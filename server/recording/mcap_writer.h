@@ -90,8 +90,8 @@ class McapWriter {
   TimeRange file_time_;
   std::uint64_t messages_ = 0;
   std::uint64_t written_ = 0;
-  std::uint32_t crc_ = 0;  ///< of the file, including the first `in_crc_` bytes of `out_`
-  std::size_t in_crc_ = 0;
+  std::uint32_t crc_ = 0;   ///< of the file
+  std::size_t in_crc_ = 0;  ///< the number of bytes of `out_` that `crc_` includes
   bool failed_ = false;
   bool closed_ = false;
 };

@@ -164,13 +164,14 @@ PortState port_state(const pb::PortState& in) {
   return out;
 }
 
-// Steps and datagrams are frequent, so their bytes are written without protobuf's objects, in the order of the numbers.
+// There are thousands of steps and datagrams per second, so they are encoded without protobuf. The fields must be
+// written in the order of their numbers.
 
 using wire::field;
 using wire::Writer;
 
-constexpr std::size_t kMostOfAStep = 1005;     // without force_way
-constexpr std::size_t kMostOfADatagram = 100;  // without payload
+constexpr std::size_t kMostOfAStep = 1005;     // without the force_way
+constexpr std::size_t kMostOfADatagram = 100;  // without the payload
 constexpr wire::Entries kAllBytes{.least = 1, .most = std::numeric_limits<std::size_t>::max()};
 
 std::size_t size_of(const Writer& out, const std::string& message) {
@@ -414,7 +415,7 @@ std::string encode(const DatagramRecord& datagram) {
   out.bytes(field<2>, "peer", std::as_bytes(std::span(peer)), kAllBytes);
   out.count(field<3>, "size_bytes", datagram.size);
   out.bytes(field<4>, "payload", payload, kAllBytes);
-  // Larger datagrams are not of this protocol.
+  // If the payload is truncated, the datagram is not of this protocol.
   if (const auto header = payload.size() == datagram.size ? decode_header(payload) : std::nullopt) {
     out.count(field<5>, "type", static_cast<std::uint8_t>(header->type));
     out.count(field<6>, "connection_id", header->connection_id);

@@ -107,7 +107,7 @@ extern "C" [[gnu::noinline]] void step_in_turn(HapticLoop& loop, Mailboxes& mail
   }
 }
 
-/// The log thread's part of the steps that are in the mailbox.
+/// Records all steps that are in the mailbox.
 extern "C" [[gnu::noinline]] void record_in_turn(Recorder& recorder, Mailboxes& mail) {
   for (; const StepRecord* step = mail.steps.front(); mail.steps.pop()) recorder.record(*step);
 }

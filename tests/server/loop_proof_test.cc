@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Counts the callgrind instructions of a haptic step for three handles: a point, for which the features of other
-// handles must be nearly free, a handle that rotates and grips, and a point that reports its joints. Also counts those of
-// the log thread for a recorded step.
+// handles must be nearly free, a handle that rotates and grips, and a point that reports its joints. It also
+// counts the instructions of the log thread for each step.
 #include <gtest/gtest.h>
 
 #include <iostream>
@@ -17,7 +17,7 @@ constexpr double kSteps = 3000 - 1000;  // the two run lengths of loop-proof
 /// The number of instructions for the step of a point at 38d7a6d, which did not support rotation and grip.
 constexpr double kBeforeHandles = 2977.5;
 
-constexpr double kMostOfARecord = 3150;  // a few percent above the measured value; half of it is zlib's CRC
+constexpr double kMostOfARecord = 3150;  // this is a few percent above the measured value
 
 using LoopProof = testing::InstructionTest;
 
