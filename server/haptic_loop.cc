@@ -54,6 +54,15 @@ void put_state(DeviceState& state, std::uint32_t device, const StepRecord& recor
   }
 }
 
+/// Loads a slot of the queue into the cache while the law is computed. The queue is larger than the cache.
+void load_ahead(StepRecord* slot) noexcept {
+  constexpr std::size_t kLine = 64;  // bytes
+  if (slot == nullptr) return;
+  for (std::size_t at = 0; at < sizeof *slot; at += kLine) {
+    __builtin_prefetch(reinterpret_cast<const char*>(slot) + at, 1);
+  }
+}
+
 Coupling* coupling_of(HapticController& controller, std::uint32_t number) noexcept {
   Couplings* const couplings = controller.couplings();
   return couplings != nullptr && number < couplings->size() ? &(*couplings)[number] : nullptr;
@@ -287,6 +296,7 @@ void HapticLoop::command_all(StepRecord& record) noexcept {
 LocalTime HapticLoop::step(LocalTime now) noexcept {
   const DenormalsOff off;
   if (tick_ == 0) due_ = now;
+  if (config_.record) load_ahead(mail_.steps.back());
   take_mail(now);
 
   StepRecord record;
