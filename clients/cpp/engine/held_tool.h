@@ -24,21 +24,21 @@ struct ToolEngine {
   };
 
   double step_s = 0.001;  ///< s, > 0
-  double mass = 0.05;     ///< kg, > stiffness·step_s² of HeldTool::Config
+  double mass = 0.05;     ///< kg, must be larger than stiffness·step_s²
   double inertia = 2e-5;  ///< kg·m², > angular_stiffness·step_s²: the smallest moment of inertia about the origin
   std::function<Motion()> motion;
   std::function<void(const Six& pull)> pull;  ///< replaces the force on the tool
   /// Simulates a time step. Returns false if the solution was lost, for example as NaN. The engine must then be at its
   /// start again.
   std::function<bool()> step;
-  /// Returns the force of contacts and joints on the tool for the newest pull. `moved` is false if only the pull has
-  /// changed since the last call. The contacts are then the same.
+  /// Returns the force of contacts and joints on the tool for the newest pull. If only the pull has changed since
+  /// the last call, `moved` is false.
   std::function<Six(bool moved)> held;
   /// Appends the contacts of the tool. Each normal points to the tool, and the gap is between the surfaces.
   std::function<void(std::vector<Contact>& found)> contacts;
 };
 
-/// A tool in a rigid-body engine that is held by the hand. There is a virtual coupling (ToolCoupling) for the position
+/// The hand holds a tool in a rigid-body engine. There is a virtual coupling (ToolCoupling) for the position
 /// and another for the orientation. Only the springs of the couplings are felt. The dampers prevent oscillations.
 ///
 /// * The initial pose of the tool corresponds to the origin of the device and an unrotated handle.

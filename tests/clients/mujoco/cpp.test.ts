@@ -171,7 +171,7 @@ describe("the engine in C++", () => {
   it("sends no force if the simulation diverges, and is felt again", (test) => {
     const program = process.env["TENDON_TOUCH_STATES"];
     if (!program) return test.skip(kNotBuilt);
-    // MuJoCo integrates this spring with k T²/m = 4.1, and more than 4 is unstable. It needs about 100 steps to 1e10 m.
+    // MuJoCo integrates this spring with k T²/m = 4.1, and more than 4 is unstable. The solution is lost after about 100 steps.
     const spring = `<body><joint type="slide" stiffness="410000" springref="0.001"/>
       <geom size="0.01" mass="0.1" contype="0" conaffinity="0"/></body>`;
     const scene = write(test, readFileSync(file("plane"), "utf8").replace("</worldbody>", `${spring}</worldbody>`));

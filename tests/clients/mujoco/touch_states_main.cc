@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // touch_states ARGUMENT…: runs touch_mjcf, which is linked unchanged, without a server. Each input line is a state,
 // "T X Y Z W I J K": the time in s, the position in m, and the orientation, or four zeros in place of it. For each line,
-// it prints a JSON object with the answer and the time of the processor that it took. Numbers that are not finite are
-// null.
+// it prints the answer and its processor time as a JSON object. If a number is not finite, it prints null.
 #include <ctime>
 #include <iostream>
 #include <nlohmann/json.hpp>

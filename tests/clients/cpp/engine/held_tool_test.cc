@@ -63,7 +63,7 @@ struct Floor {
   }
 };
 
-/// Moves to `x` m at 0.1 m/s and rests there for half a second.
+/// Moves the hand from the origin to `x` in 0.5 s. The hand then rests for 0.5 s.
 Touch press(HeldTool& tool, const Vec3& x, const Quat& turn = {}) {
   static std::int64_t ms = 0;
   Touch touch;
