@@ -1,17 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
-// The bounds are about 25 % above the measured values. The goal for the whole server is 12 MB, which depends on the
-// listed libraries.
+// The bounds are 10 to 50 % above the measured values, so that 100 kB more per device or session are found. The goal for
+// the whole server is 6 MB.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <chrono>
 #include <cstdint>
 #include <fstream>
+#include <iostream>
 #include <iterator>
 #include <memory>
 #include <set>
 #include <sstream>
 #include <stdexcept>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "tests/e2e/stage/stage.h"
@@ -78,29 +81,30 @@ class Fleet {
 
 TEST(Memory, OfAServerWithADeviceIsSmall) {
   Fleet one(1);
-  EXPECT_LT(bytes(one.pid(), "VmRSS"), 12 * kMegabyte);
-  EXPECT_LT(one.own(), 3 * kMegabyte);
-  EXPECT_LT(one.faults_at_start(), 1000);
+  EXPECT_LT(bytes(one.pid(), "VmRSS"), 11 * kMegabyte);
+  EXPECT_LT(one.own(), 5 * kMegabyte / 4);
+  EXPECT_LT(one.faults_at_start(), 500);
 }
 
 TEST(Memory, HasNoLibraryThatTheSceneDoesNotNeed) {
   Fleet one(1);
-  // These libraries are needed in every scene. They are used for the language runtimes, the scene file, the protocol
-  // and its cryptography, and the log. USB and discovery also load libusb and libsystemd, which have seven
+  // The C++ libraries are part of the program. USB and discovery also load libusb and libsystemd, which have seven
   // dependencies.
-  const std::set<std::string> needed = {"ld-linux-x86-64", "libc",        "libm", "libgcc_s",  "libstdc++",
-                                        "libtomlplusplus", "libprotobuf", "libz", "libsodium", "libfmt"};
+  const std::set<std::string> needed = {"ld-linux-x86-64", "libc", "libm", "libz", "libsodium"};
   for (const std::string& library : libraries(one.pid())) EXPECT_TRUE(needed.contains(library)) << library;
 }
 
-TEST(Memory, OfAFurtherDeviceIsAMegabyte) {
+TEST(Memory, OfAFurtherDeviceIsAQuarterOfAMegabyte) {
   Fleet one(1);
   Fleet nine(9);
-  EXPECT_LT(nine.own() - one.own(), 8 * kMegabyte * 5 / 4);
-  EXPECT_LT(nine.faults_at_start() - one.faults_at_start(), 8 * 350);
+  EXPECT_LT(nine.own() - one.own(), 8 * kMegabyte / 4);
+  EXPECT_LT(nine.faults_at_start() - one.faults_at_start(), 8 * 100);
 }
 
-TEST(Memory, OfADeviceThatIsCountedIsAMegabyte) {
+/// The steps before a fault are only complete after two seconds.
+void fill_the_flight() { std::this_thread::sleep_for(std::chrono::milliseconds(2500)); }
+
+TEST(Memory, OfADeviceAtRestIsAHundredKilobytes) {
   const testing::ScratchFolder folder;
   const auto own = [&folder](int count) {
     const auto file = folder.path() / ("hand-" + std::to_string(count) + ".toml");
@@ -109,9 +113,12 @@ TEST(Memory, OfADeviceThatIsCountedIsAMegabyte) {
         write(file, "[device]\nkind = \"simulated\"\nprofile = \"falcon\"\ncount = " + std::to_string(count) + "\n"));
     Client watcher("echo_motion", server.address(), folder.path());
     for (int line = 0; line < 6; ++line) watcher.wait_for_line("position");
+    fill_the_flight();
     return bytes(server.process().pid(), "RssAnon");
   };
-  EXPECT_LT(own(65) - own(1), 64 * kMegabyte);
+  const std::int64_t of_one = (own(65) - own(1)) / 64;
+  std::cout << of_one << " bytes of memory per device\n";
+  EXPECT_LT(of_one, 160'000);
 }
 
 TEST(Memory, OfAFurtherSessionIsAFewPages) {
@@ -122,7 +129,7 @@ TEST(Memory, OfAFurtherSessionIsAFewPages) {
     guests.push_back(std::make_unique<Client>("echo_motion", one.address(), one.folder()));
     guests.back()->wait_for_line("position");
   }
-  EXPECT_LT(one.own() - before, 7 * kMegabyte / 8);
+  EXPECT_LT(one.own() - before, 7 * kMegabyte / 16);
 }
 
 TEST(Memory, OfAStepIsInPlaceBeforeItIsUsed) {
