@@ -21,7 +21,7 @@ constexpr double kMostOfARecord = 3150;  // this is a few percent above the meas
 
 using LoopProof = testing::InstructionTest;
 
-TEST_F(LoopProof, APointsStepIsNoSlowerAndAWholeHandleCostsTwoAndAHalf) {
+TEST_F(LoopProof, APointsStepIsHardlySlowerAndAWholeHandleCostsTwoAndAHalf) {
   const auto counted = testing::count_instructions(TENDON_LOOP_PROOF, "", "step_in_turn");
   ASSERT_EQ(counted.size(), 3U);
   const double point = counted[0].instructions / kSteps;
@@ -31,11 +31,12 @@ TEST_F(LoopProof, APointsStepIsNoSlowerAndAWholeHandleCostsTwoAndAHalf) {
             << " before there were handles), of a "
             << "handle that turns and grips " << handle << ": " << handle / point << " times as many; of a point "
             << "with three joints " << jointed << "\n";
-  EXPECT_LT(point, 0.9 * kBeforeHandles);  // because the velocity estimate is now cheaper
+  // The velocity estimate is cheaper than before, and packing the steps before a fault (StepFlight) adds 490.
+  EXPECT_LT(point, 1.06 * kBeforeHandles);
   EXPECT_GT(point, 0.5 * kBeforeHandles) << "this is no step";
   EXPECT_LT(handle, 2.6 * point);
   EXPECT_GT(handle, 1.5 * point) << "this is no handle";
-  EXPECT_LT(jointed, 1.14 * point);
+  EXPECT_LT(jointed, 1.18 * point);
   EXPECT_GT(jointed, point) << "these are no joints";
 }
 
