@@ -9,8 +9,8 @@
 namespace tendon {
 namespace {
 
-// A section starts with a mask of its values that were not predicted. After it, each of them has a byte (a vector: two
-// bytes) with the number of significant bytes, and these bytes. Sections: the step, turn, grip, joints, field.
+// The format of a section: a mask of the stored values, then the size of each value (one byte, or two bytes for a
+// vector) and its significant bytes. The sections are step, turn, grip, joints and field.
 constexpr std::size_t kMask = sizeof(std::uint32_t);
 constexpr std::size_t kMostOfNumber = 1 + 8;
 constexpr std::size_t kMostOfVector = 2 + 3 * 8;
@@ -220,7 +220,7 @@ void code_field(Field& field, const FieldStep& before, Coder& coder) noexcept {
   coder.real(field.credit, before.credit);
 }
 
-/// The optional parts of a StepRecord. The coder of an unpacked step creates them.
+/// Codes the optional parts, which must exist in `step`.
 template <class Record, class Coder>
 void code_packed_parts(Record& step, const StepRecord& last, std::uint32_t parts, Coder& coder) noexcept {
   if ((parts & kHandle) != 0) {

@@ -11,8 +11,8 @@
 namespace tendon {
 namespace {
 
-constexpr std::size_t kChunk = 4096;  ///< bytes; a page, so that a chunk in memory does not require others
-/// Chunks to load in advance. Half of them, which are always there, hold 40 of the largest steps of a point.
+constexpr std::size_t kChunk = 4096;  ///< bytes, one page
+/// Number of chunks to load in advance. Half of them hold 40 steps without a handle.
 constexpr std::size_t kAhead = 8;
 constexpr std::size_t kOverwritten = 7;  ///< bytes after a packed step
 constexpr std::size_t kMostSteps = 65536;
@@ -28,7 +28,7 @@ std::byte* reserve(std::size_t bytes) {
 std::size_t chunks_for(std::size_t capacity, std::size_t most) {
   expect(capacity >= 1 && capacity <= kMostSteps, "capacity", static_cast<double>(capacity), "1 to 65536 steps");
   const std::size_t in_a_chunk = kChunk / most;
-  return (capacity + in_a_chunk - 1) / in_a_chunk + 2;  // also the newest, and the oldest with steps that are too old
+  return (capacity + in_a_chunk - 1) / in_a_chunk + 2;  // two chunks can be incomplete
 }
 
 }  // namespace
@@ -57,7 +57,7 @@ void StepFlight::make_ready() noexcept {
   if (ready_ >= std::min(used + kAhead / 2, chunks_)) return;
   const std::size_t enough = std::min(used + kAhead, chunks_);
   const std::span<std::byte> next = memory_of(ready_, enough);
-  // Linux before 5.14 does not know this advice.
+  // Linux supports this since 5.14.
   if (::madvise(next.data(), next.size(), MADV_POPULATE_WRITE) != 0) ::mlock(next.data(), next.size());
   ready_ = enough;
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The bounds are 10 to 50 % above the measured values, so that 100 kB more per device or session are found. The goal for
-// the whole server is 6 MB.
+// The bounds are 10 to 50 % above the measured values. An additional 100 kB per device or session must fail the tests.
+// The goal for the whole server is 6 MB.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -88,7 +88,7 @@ TEST(Memory, OfAServerWithADeviceIsSmall) {
 
 TEST(Memory, HasNoLibraryThatTheSceneDoesNotNeed) {
   Fleet one(1);
-  // The C++ libraries are part of the program. USB and discovery also load libusb and libsystemd, which have seven
+  // The C++ libraries are linked statically. USB and discovery also load libusb and libsystemd, which have seven
   // dependencies.
   const std::set<std::string> needed = {"ld-linux-x86-64", "libc", "libm", "libz", "libsodium"};
   for (const std::string& library : libraries(one.pid())) EXPECT_TRUE(needed.contains(library)) << library;
@@ -101,7 +101,7 @@ TEST(Memory, OfAFurtherDeviceIsAQuarterOfAMegabyte) {
   EXPECT_LT(nine.faults_at_start() - one.faults_at_start(), 8 * 100);
 }
 
-/// The steps before a fault are only complete after two seconds.
+/// Waits until StepFlight is full.
 void fill_the_flight() { std::this_thread::sleep_for(std::chrono::milliseconds(2500)); }
 
 TEST(Memory, OfADeviceAtRestIsAHundredKilobytes) {

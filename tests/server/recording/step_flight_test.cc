@@ -20,7 +20,7 @@ class Steps {
  public:
   explicit Steps(std::uint64_t seed) : random_(seed) {}
 
-  /// Each value stays the same, changes by a little, or has random bits, also those of NaN and infinity.
+  /// Some values are not changed, and the others are random, including NaN and infinity.
   StepRecord next() {
     StepRecord step = last_;
     ++step.tick;
@@ -208,7 +208,7 @@ TEST(StepFlight, PartsThatAreNotKeptAreLeftOut) {
   EXPECT_TRUE(step.handle);
 }
 
-// A hand moves, and each step has a new force.
+// The hand moves, and there is a new force in each step.
 TEST(StepFlight, NeedsAThirdOfTheMemoryOfTheSteps) {
   StepFlight flight(2048, false, false);
   StepRecord step;
