@@ -93,7 +93,7 @@ struct HandedHello {
 /// what happens if it is full. The name of a solver path in `ways` is written before the first force with its number.
 /// The constructor allocates all memory, before the loops run.
 struct Mailboxes {
-  /// Numbers of elements, which must be powers of two. The defaults, for a server that records, require about 21 MB.
+  /// Numbers of elements, which must be powers of two. The defaults, for a server that records, require about 20 MB.
   struct Capacities {
     std::size_t steps = 16384;  ///< 16 s at 1 kHz, for slow disks
     std::size_t ports = 1;      ///< for each coupling
@@ -114,7 +114,7 @@ struct Mailboxes {
     }
 
     /// For each device of a server that does not record. The steps are not used. The port queue lasts at least 125 ms,
-    /// because the log thread only reads it every 20 ms. In total 0.8 MB, if the device only measures its position.
+    /// because the log thread only reads it every 20 ms. The total depends on StepFlight: 0.1 to 0.3 MB.
     static Capacities unrecorded(Duration period) {
       const auto ports = static_cast<std::size_t>(std::max<Duration::rep>(std::chrono::milliseconds(125) / period, 1));
       return {.steps = 1, .ports = std::bit_ceil(ports), .datagrams = 1};

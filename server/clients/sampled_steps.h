@@ -18,7 +18,7 @@ class SampledSteps {
 
   struct Step {
     LocalTime at{};
-    LocalTime sent{};  ///< from `at` to 4.2 s after it; other times are changed to these
+    LocalTime sent{};  ///< clamped to `at` … `at` + 4.2 s
   };
 
   /// Must be called before the first client sees the steps. Before this, they do not need memory (48 kB).
@@ -34,7 +34,7 @@ class SampledSteps {
  private:
   void put(std::uint64_t tick, const Step& step);
 
-  std::vector<LocalTime> at_{};                 ///< all from oldest_ to newest_, at most kRemembered; by tick
+  std::vector<LocalTime> at_{};                 ///< ring of the ticks from oldest_ to newest_
   std::vector<std::uint32_t> sent_after_ns_{};  ///< since at_
   std::uint64_t oldest_ = 1;
   std::uint64_t newest_ = 0;

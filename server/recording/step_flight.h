@@ -12,10 +12,9 @@
 
 namespace tendon {
 
-/// Stores the last steps of a device before a fault. If a fault freezes it, another thread can read them. The steps are
-/// packed in chunks of a page each, and a chunk is used again when all of its steps are too old. So the memory depends
-/// on what changes from step to step. Address space is reserved for the largest steps, but only the pages that were
-/// used, and some in advance, are in memory.
+/// Stores the last steps before a fault. If it is frozen, another thread can read them. Steps are packed into chunks of
+/// one page, which are reused when their steps are too old. The amount of memory depends on how many values change. The
+/// constructor reserves addresses for the maximum size, but it only loads the first pages.
 /// Thread-safe: one thread can call `record` and `freeze`, and another one `make_ready`. While it is frozen, the other
 /// thread can read it and call `thaw`. Realtime-safe: `record` and `freeze`.
 class StepFlight {
@@ -31,15 +30,14 @@ class StepFlight {
   bool frozen() const noexcept { return frozen_.load(std::memory_order_acquire); }
   void thaw() noexcept;  ///< removes all steps and resumes recording
 
-  /// Loads the pages that the next steps may need, at least 40 ms of the largest steps at 1 kHz. If this is not called
-  /// in time, `record` keeps all steps, but the kernel has to load a page while it runs.
+  /// Loads the next pages. If this is not called every 40 ms, no steps are lost, but `record` can cause page faults.
   void make_ready() noexcept;
 
   /// Must be frozen, or called from the recording thread. This is also true for operator[].
   std::size_t size() const noexcept { return count_ < capacity_ ? count_ : capacity_; }
   StepRecord operator[](std::size_t i) const noexcept;  ///< the i-th oldest step, i < size()
 
-  std::size_t used_bytes() const noexcept;  ///< of the chunks that have been used
+  std::size_t used_bytes() const noexcept;
 
  private:
   struct Unmap {
@@ -51,22 +49,22 @@ class StepFlight {
   std::span<std::byte> memory_of(std::size_t first, std::size_t end) const noexcept;
   std::uint16_t in_order(std::size_t i) const noexcept { return order_[i % order_.size()]; }
   void begin_chunk() noexcept;
-  void record_without(StepRecord step) noexcept;  ///< the parts that are not kept
+  void record_without(StepRecord step) noexcept;  ///< removes parts
 
   std::size_t capacity_;
   bool handles_;
   bool fields_;
-  std::size_t most_;    ///< bytes of a packed step, with those that are overwritten after it
+  std::size_t most_;    ///< maximum size of a packed step
   std::size_t chunks_;  ///< enough for `capacity_` of the largest steps
   std::unique_ptr<std::byte, Unmap> memory_;
-  std::vector<std::uint64_t> first_;  ///< of each chunk: the number of its first step
+  std::vector<std::uint64_t> first_;  ///< number of the first step, for each chunk
   std::vector<std::uint16_t> order_;  ///< ring of the chunks with steps, from oldest_ to newest_
   std::vector<std::uint16_t> free_;   ///< used before, without steps
   std::size_t oldest_ = 0;
   std::size_t newest_ = 0;  ///< after the last one
   std::size_t ready_ = 0;   ///< chunks in memory
   std::atomic<std::size_t> used_{0};
-  std::uint64_t count_ = 0;  ///< steps since the start or `thaw`
+  std::uint64_t count_ = 0;  ///< number of steps
   std::byte* at_ = nullptr;
   std::byte* end_ = nullptr;  ///< of the chunk
   StepBefore before_;
