@@ -349,9 +349,7 @@ bool Session::State::accept(LocalTime now, LocalTime reached, std::uint64_t numb
   stats.reordered += newest ? 0 : 1;
   seen.insert(number);
   stats.lost = seen.missing();
-  if (newest) {
-    echo = {.sent = content.sent, .received = reached, .packet_number = number, .received_mask = 0};
-  }
+  if (newest) echo = {.sent = content.sent, .received = reached, .packet_number = number, .received_mask = 0};
   exchange.reset();
   if (content.echo) observe(now, reached, content.sent, *content.echo);
   untold |= !content.frames.empty();
