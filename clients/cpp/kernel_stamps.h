@@ -3,6 +3,7 @@
 
 #include <sys/socket.h>
 
+#include <atomic>
 #include <chrono>
 #include <cstddef>
 #include <cstring>
@@ -10,8 +11,7 @@
 #include <optional>
 #include <utility>
 
-#include "core/base/time.h"
-#include "core/exchange/counter.h"
+#include "protocol/link.h"
 
 namespace tendon {
 
@@ -67,19 +67,20 @@ class KernelStamps {
     if (steady && waited >= Duration::zero() && waited <= kMostWait) {
       reached_ = now - waited;
     } else {
-      refused_.add();
+      refused_.store(refused() + 1, std::memory_order_relaxed);  // there is only one writer
     }
   }
 
   LocalTime read() const noexcept { return read_; }  ///< when the newest datagram was read
   LocalTime reached() const noexcept { return reached_; }
-  std::uint64_t refused() const noexcept { return refused_.value(); }  ///< number of time stamps that were not used
+  /// The number of time stamps that were not used.
+  std::uint64_t refused() const noexcept { return refused_.load(std::memory_order_relaxed); }
 
  private:
   std::optional<Duration> difference_;  ///< Unix time − local time
   LocalTime read_{};
   LocalTime reached_{};
-  Counter refused_;
+  std::atomic<std::uint64_t> refused_{0};
 };
 
 }  // namespace tendon

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "server/recording/recording_codec.h"
+#include "tests/support/dice.h"
 
 namespace tendon::step_flight_test {
 namespace {
@@ -212,24 +213,23 @@ TEST(StepFlight, PartsThatAreNotKeptAreLeftOut) {
 TEST(StepFlight, NeedsAThirdOfTheMemoryOfTheSteps) {
   StepFlight flight(2048, false, false);
   StepRecord step;
-  std::mt19937_64 random(1);
-  std::normal_distribution<double> noise;
+  Dice dice(1);
   for (int i = 0; i < 10'000; ++i) {
     const double t = 1e-3 * i;
     ++step.tick;
     step.scheduled += Duration(1'000'000);
     const LocalTime before = step.hand.at;
-    step.hand.at = step.scheduled + Duration(50'000 + static_cast<int>(10'000 * noise(random)));
+    step.hand.at = step.scheduled + Duration(50'000 + static_cast<int>(10'000 * dice.within(-2, 2)));
     step.held = step.hand.at - before;
     step.hand.position = 0.015 * Vec3(std::sin(3 * t), std::sin(2 * t), std::cos(t));
     step.hand.velocity =
-        0.045 * Vec3(std::cos(3 * t), std::cos(2 * t), std::sin(t)) + 1e-3 * Vec3::Constant(noise(random));
+        0.045 * Vec3(std::cos(3 * t), std::cos(2 * t), std::sin(t)) + 1e-3 * Vec3::Constant(dice.within(-2, 2));
     step.was_applied = step.applied;
     step.wanted = step.force = step.applied = -300 * step.hand.position;
-    step.permitted = 1 + std::abs(noise(random));
+    step.permitted = 1 + std::abs(dice.within(-2, 2));
     step.energy = 1e-3 * step.permitted;
     ++step.force_sequence;
-    step.force_age = Duration(200'000 + static_cast<int>(10'000 * noise(random)));
+    step.force_age = Duration(200'000 + static_cast<int>(10'000 * dice.within(-2, 2)));
     step.loop_age = step.force_age + Duration(500'000);
     flight.record(step);
   }
