@@ -144,6 +144,7 @@ TEST(IgtlWorld, TheSpringPullsToTheTargetAndFollowsTheHandInEachStep) {
     followed += (stage.world.step.wanted - spring).norm() < 0.01 ? 1 : 0;
   });
   EXPECT_GT(followed, 1800) << "in nearly every step, though it was sent once";
+  EXPECT_TRUE(stage.world.step.stiffness.isApprox(100 * Mat3::Identity(), 1e-3)) << stage.world.step.stiffness;
   EXPECT_GT(stage.program.pose->position().z(), 3) << "mm; a hand of 300 N/m holds it at a quarter of the way";
   EXPECT_EQ(stage.bridged.owner(), 1U) << "it stays until it disconnects";
 }
