@@ -121,6 +121,7 @@ class ForceClient:
         self._pressed = 0  # buttons pressed in any state since the last returned one
         self._newest: DeviceState | None = None  # newest state, returned or not
         self._newest_arrived = now
+        self._first_tick: int | None = None  # of the first state in this session
         self._seen_tick = 0  # newest returned tick
         self._deadband_request: int | None = None  # id of the request for the state deadband
         self._predicts = False  # the server omits predictable states
@@ -157,8 +158,9 @@ class ForceClient:
 
     def _objection(self, hand: DeviceState, answer: Answer) -> str:
         """Returns why an answer is unusable, or an empty string."""
-        if not 0 < hand.tick <= max(self._seen_tick, self._newest.tick if self._newest else 0):
-            return f"it answers tick {hand.tick}, which was not received"
+        newest = max(self._seen_tick, self._newest.tick if self._newest else 0)
+        if self._first_tick is None or not self._first_tick <= hand.tick <= newest:
+            return f"it answers tick {hand.tick}, which was not received in this session"
         return answer.objection()
 
     def _of_handle(self, hand: DeviceState, answer: Answer) -> tuple[Torque | None, float | None]:
@@ -464,6 +466,7 @@ class ForceClient:
         asked = self.config.state_deadband
         self._deadband_request = self._session.request(asked) if asked else None
         self._predicts = False
+        self._first_tick = None
         self._seen_tick = 0
         self.report = self.device_report = None
         self.peer_reports = {}
@@ -498,6 +501,8 @@ class ForceClient:
                 self._stats.states += 1
                 self._stats.states_skipped += self._unseen is not None
                 self._unseen = self._newest = event
+                if self._first_tick is None:
+                    self._first_tick = event.tick
                 # When the button was pressed, another engine had the channel.
                 self._pressed = event.buttons | (0 if self._waits_for_lease() else self._pressed)
                 self._newest_arrived = now

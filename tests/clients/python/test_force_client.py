@@ -383,11 +383,25 @@ def test_an_answer_to_a_state_that_did_not_come_is_not_sent():
     sent = len(stage.forces)
     hand = replace(stage.seen[-1], tick=stage.seen[-1].tick + 1000)
     stage.client.send(hand, Touch((1, 0, 0)))
-    assert stage.client.stats.unusable == f"it answers tick {hand.tick}, which was not received"
+    assert stage.client.stats.unusable == f"it answers tick {hand.tick}, which was not received in this session"
     stage.client.send(stage.seen[-1], Touch((0, -2e12, 0)))
     assert stage.client.stats.unusable == "the force exceeds 1e12 N"
     assert stage.client.stats.forces_unusable == 2
     assert len(stage.forces) == sent
+
+
+def test_a_state_that_was_kept_over_a_reconnect_is_not_answered():
+    stage = Stage(Config(rate_hz=100))
+    stage.run(200 * MS)
+    kept = stage.seen[-1]
+    stage.server.session.close(Code.SHUTDOWN, "SIGTERM")
+    stage.run(300 * MS)
+    assert stage.client.stats.sessions == 2
+    sent = len(stage.forces)
+    stage.client.send(kept, Touch((1, 0, 0)))
+    stage.run(20 * MS)
+    assert stage.client.stats.unusable == f"it answers tick {kept.tick}, which was not received in this session"
+    assert [force.based_on_tick for force in stage.forces[sent:]] == [hand.tick for hand in stage.seen[-2:]]
 
 
 @pytest.mark.parametrize("touch", [Touch((1, 2)), Touch((1, 2, 3), (1, 2)), Touch(7), Touch(("a", 0, 0))])
