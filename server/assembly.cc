@@ -155,6 +155,7 @@ void Assembly::add_devices(std::vector<Part>& parts, const Config& config, std::
     // The datagrams of a shard are only stored in the mailboxes of the first device.
     if (devices_.size() != shard.first_device(parts.size())) capacities.datagrams = 1;
     if (!config.watched) {
+      capacities.flight = Mailboxes::Capacities::flight_of(parts.size());
       capacities.channels = loop.control.channels.size();
       capacities.couplings = loop.control.coupling ? std::max<std::size_t>(loop.control.leaders.size(), 1) : 0;
       capacities.ports = capacities.couplings > 0 ? std::bit_ceil(capacities.couplings) * capacities.ports : 1;

@@ -97,7 +97,7 @@ struct Mailboxes {
   struct Capacities {
     std::size_t steps = 16384;  ///< 16 s at 1 kHz, for slow disks
     std::size_t ports = 1;      ///< for each coupling
-    std::size_t flight = 2048;  ///< 2 s at 1 kHz
+    std::size_t flight = 2048;  ///< steps before a fault, 2 s at 1 kHz
     std::size_t datagrams = 4096;
     std::size_t channels = limits::kMaxChannels;  ///< `forces`
     std::size_t couplings = Shares::kMost;        ///< `port_in` and `port_out`
@@ -113,8 +113,15 @@ struct Mailboxes {
       return {.steps = std::bit_floor(share), .ports = std::bit_floor(share)};
     }
 
+    /// For more than 128 devices, the total number of steps before a fault is the same as for 128. For example, each of
+    /// 512 devices keeps half a second at 1 kHz.
+    static std::size_t flight_of(std::size_t devices) {
+      constexpr std::size_t kMostDevices = 128;
+      return Capacities{}.flight * kMostDevices / std::max(devices, kMostDevices);
+    }
+
     /// For each device of a server that does not record. The steps are not used. The port queue lasts at least 125 ms,
-    /// because the log thread only reads it every 20 ms. The total depends on StepFlight: 0.1 to 0.3 MB.
+    /// because the log thread only reads it every 20 ms. The total depends on StepFlight: 0.1 to 0.5 MB.
     static Capacities unrecorded(Duration period) {
       const auto ports = static_cast<std::size_t>(std::max<Duration::rep>(std::chrono::milliseconds(125) / period, 1));
       return {.steps = 1, .ports = std::bit_ceil(ports), .datagrams = 1};

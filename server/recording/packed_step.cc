@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/recording/packed_step.h"
 
+#include <array>
 #include <bit>
 #include <cstdint>
 #include <cstring>
@@ -9,40 +10,77 @@
 namespace tendon {
 namespace {
 
-// The format of a section: a mask of the stored values, then the size of each value (one byte, or two bytes for a
-// vector) and its significant bytes. The sections are step, turn, grip, joints and field.
-constexpr std::size_t kMask = sizeof(std::uint32_t);
-constexpr std::size_t kMostOfNumber = 1 + 8;
-constexpr std::size_t kMostOfVector = 2 + 3 * 8;
+// The sections are step, turn, grip, joints and field. A section begins with a mask, followed by the values that were not
+// predicted. A whole number has two bits in the mask and needs 4 or 8 bytes, and a real number needs 8.
+constexpr std::size_t kMask = sizeof(std::uint64_t);
+constexpr std::size_t kNumber = 8;
+constexpr std::size_t kVector = 3 * 8;
+constexpr std::size_t kMatrix = 3 * kVector;
 
-enum Has : std::uint32_t {
+enum Has : std::uint16_t {
   kHandForce = 1U << 0,
   kForceError = 1U << 1,
   kRearmed = 1U << 2,
   kIsDisarmed = 1U << 3,
-  kHandle = 1U << 4,
-  kTurn = 1U << 5,
-  kGrip = 1U << 6,
-  kJoints = 1U << 7,
-  kField = 1U << 8,
+  kStiffness = 1U << 4,
+  kHandle = 1U << 5,
+  kTurn = 1U << 6,
+  kGrip = 1U << 7,
+  kJoints = 1U << 8,
+  kField = 1U << 9,
 };
+constexpr unsigned kParts = 10;  ///< number of bits of the first mask
 
-std::uint32_t packed_parts(const StepRecord& step) noexcept {
-  std::uint32_t parts = 0;
+template <std::size_t count>
+using Words = std::array<std::uint64_t, count>;
+
+/// The bits of the numbers, because NaN is not equal to itself and −0 is equal to 0.
+template <class Numbers>
+auto words(const Numbers& numbers) noexcept {
+  Words<sizeof numbers / kNumber> result;
+  std::memcpy(result.data(), &numbers, sizeof numbers);
+  return result;
+}
+
+template <std::size_t count>
+bool same(const Words<count>& a, const Words<count>& b) noexcept {
+  std::uint64_t apart = 0;
+  for (std::size_t i = 0; i < count; ++i) apart |= a[i] ^ b[i];
+  return apart == 0;
+}
+
+std::uint16_t packed_parts(const StepRecord& step) noexcept {
+  unsigned parts = 0;
   if (step.hand_force) parts |= kHandForce;
   if (step.force_error) parts |= kForceError;
   if (step.rearmed) parts |= kRearmed;
   if (step.disarmed) parts |= kIsDisarmed;
+  if (!same(words(step.stiffness), {})) parts |= kStiffness;
   if (step.field) parts |= kField;
-  if (!step.handle) return parts;
-  parts |= kHandle;
-  if (step.handle->turn) parts |= kTurn;
-  if (step.handle->grip) parts |= kGrip;
-  if (step.handle->joints) parts |= kJoints;
-  return parts;
+  if (step.handle) {
+    parts |= kHandle;
+    if (step.handle->turn) parts |= kTurn;
+    if (step.handle->grip) parts |= kGrip;
+    if (step.handle->joints) parts |= kJoints;
+  }
+  return static_cast<std::uint16_t>(parts);
 }
 
-std::uint64_t bits(double value) noexcept { return std::bit_cast<std::uint64_t>(value); }
+/// Creates the optional parts with zero values.
+void make_packed_parts(StepRecord& step, unsigned parts) noexcept {
+  step = {};
+  if ((parts & kHandForce) != 0) step.hand_force.emplace();
+  if ((parts & kForceError) != 0) step.force_error.emplace();
+  step.rearmed = (parts & kRearmed) != 0;
+  step.disarmed = (parts & kIsDisarmed) != 0;
+  if ((parts & kField) != 0) step.field.emplace();
+  if ((parts & kHandle) == 0) return;
+  HandleStep& handle = step.handle.emplace();
+  if ((parts & kTurn) != 0) handle.turn.emplace();
+  if ((parts & kGrip) != 0) handle.grip.emplace();
+  if ((parts & kJoints) != 0) handle.joints.emplace();
+}
+
 std::uint64_t number(std::uint64_t value) noexcept { return value; }
 std::uint64_t number(Duration value) noexcept { return static_cast<std::uint64_t>(value.count()); }
 std::uint64_t number(LocalTime value) noexcept { return number(value.time_since_epoch()); }
@@ -53,27 +91,26 @@ void set(LocalTime& value, std::uint64_t to) noexcept { value = LocalTime(Durati
 
 class Packer {
  public:
-  explicit Packer(std::byte* to) noexcept : section_(to), to_(to + kMask) {}
+  Packer(std::byte* to, unsigned parts) noexcept : section_(to), to_(to + kMask), mask_(parts) {}
 
   template <class Whole>
-  void whole(const Whole& value, const Whole& predicted) noexcept {
+  void whole(const Whole& value, const Whole& predicted = {}) noexcept {
     const std::uint64_t apart = number(value) - number(predicted);
-    one((apart << 1U) ^ (0 - (apart >> 63U)));  // small for small negative differences
+    if (apart != 0) {
+      const bool small = static_cast<std::uint64_t>(static_cast<std::int32_t>(apart)) == apart;
+      mask_ |= small ? bit_ : bit_ << 1U;
+      std::memcpy(to_, &apart, sizeof apart);
+      to_ += small ? 4 : 8;
+    }
+    bit_ <<= 2U;
   }
-  void real(const double& value, double predicted) noexcept { one(bits(value) ^ bits(predicted)); }
-  void vector(const Vec3& value, const Vec3& predicted) noexcept {
-    const std::uint64_t x = bits(value[0]) ^ bits(predicted[0]);
-    const std::uint64_t y = bits(value[1]) ^ bits(predicted[1]);
-    const std::uint64_t z = bits(value[2]) ^ bits(predicted[2]);
-    if ((x | y | z) != 0) {
+  /// One or several real numbers.
+  template <class Real>
+  void real(const Real& value, const Real& predicted) noexcept {
+    if (!same(words(value), words(predicted))) {
       mask_ |= bit_;
-      std::byte* const sizes = to_;
-      to_ += 2;
-      const std::size_t of_x = put(x);
-      const std::size_t of_y = put(y);
-      const std::size_t of_z = put(z);
-      const auto packed = static_cast<std::uint16_t>(of_x | of_y << 4U | of_z << 8U);
-      std::memcpy(sizes, &packed, sizeof packed);
+      std::memcpy(to_, &value, sizeof value);
+      to_ += sizeof value;
     }
     bit_ <<= 1U;
   }
@@ -90,240 +127,182 @@ class Packer {
   }
 
  private:
-  void one(std::uint64_t word) noexcept {
-    if (word != 0) {
-      mask_ |= bit_;
-      std::byte* const size = to_++;
-      *size = static_cast<std::byte>(put(word));
-    }
-    bit_ <<= 1U;
-  }
-  std::size_t put(std::uint64_t word) noexcept {
-    const auto size = static_cast<std::size_t>(std::bit_width(word) + 7) / 8;
-    std::memcpy(to_, &word, sizeof word);
-    to_ += size;
-    return size;
-  }
-
   std::byte* section_;
   std::byte* to_;
-  std::uint32_t mask_ = 0;
-  std::uint32_t bit_ = 1;
+  std::uint64_t mask_;
+  std::uint64_t bit_ = 1U << kParts;
 };
 
 class Unpacker {
  public:
-  explicit Unpacker(const std::byte* from) noexcept : from_(from) { begin_section(); }
+  explicit Unpacker(const std::byte* from) noexcept : from_(from) {
+    next_section();
+    parts_ = static_cast<unsigned>(mask_ & ((1U << kParts) - 1));
+    mask_ >>= kParts;
+  }
+  unsigned parts() const noexcept { return parts_; }
 
   template <class Whole>
-  void whole(Whole& value, const Whole& predicted) noexcept {
-    const std::uint64_t folded = one();
-    set(value, number(predicted) + ((folded >> 1U) ^ (0 - (folded & 1U))));
+  void whole(Whole& value, const Whole& predicted = {}) noexcept {
+    std::int32_t small = 0;
+    std::uint64_t apart = 0;
+    if (read(small)) apart = static_cast<std::uint64_t>(std::int64_t{small});
+    read(apart);
+    set(value, number(predicted) + apart);
   }
-  void real(double& value, double predicted) noexcept { value = std::bit_cast<double>(one() ^ bits(predicted)); }
-  void vector(Vec3& value, const Vec3& predicted) noexcept {
-    Vec3 result = predicted;
-    if (take()) {
-      std::uint16_t sizes = 0;
-      std::memcpy(&sizes, from_, sizeof sizes);
-      from_ += sizeof sizes;
-      for (int axis = 0; axis < 3; ++axis) {
-        result[axis] = std::bit_cast<double>(bits(predicted[axis]) ^ get(sizes >> (4 * axis) & 15U));
-      }
-    }
-    value = result;
+  template <class Real>
+  void real(Real& value, const Real& predicted) noexcept {
+    if (!read(value)) value = predicted;
   }
-  void next_section() noexcept { begin_section(); }
-  const std::byte* end() const noexcept { return from_; }
-
- private:
-  void begin_section() noexcept {
+  void next_section() noexcept {
     std::memcpy(&mask_, from_, kMask);
     from_ += kMask;
   }
-  bool take() noexcept {
-    const bool there = (mask_ & 1U) != 0;
+  const std::byte* end() const noexcept { return from_; }
+
+ private:
+  template <class Value>
+  bool read(Value& value) noexcept {
+    const bool stored = (mask_ & 1U) != 0;
     mask_ >>= 1U;
-    return there;
-  }
-  std::uint64_t one() noexcept {
-    if (!take()) return 0;
-    const auto size = static_cast<std::size_t>(*from_++);
-    return get(size);
-  }
-  std::uint64_t get(std::size_t size) noexcept {
-    std::uint64_t word = 0;
-    std::memcpy(&word, from_, size);
-    from_ += size;
-    return word;
+    if (!stored) return false;
+    std::memcpy(static_cast<void*>(&value), from_, sizeof value);
+    from_ += sizeof value;
+    return true;
   }
 
   const std::byte* from_;
-  std::uint32_t mask_ = 0;
+  std::uint64_t mask_ = 0;
+  unsigned parts_ = 0;
 };
 
+const Vec3 kNoVector = Vec3::Zero();
+
 template <class Turn, class Coder>
-void code_turn(Turn& turn, const TurnStep* before, Coder& coder) noexcept {
-  constexpr Quat kNone{.w = 0};
-  const Quat& last = before != nullptr ? before->hand.orientation : kNone;
+void code_turn(Turn& turn, Coder& coder) noexcept {
   coder.next_section();
   auto& q = turn.hand.orientation;
-  coder.real(q.w, last.w);
-  coder.real(q.x, last.x);
-  coder.real(q.y, last.y);
-  coder.real(q.z, last.z);
-  coder.vector(turn.hand.angular_velocity, before != nullptr ? before->hand.angular_velocity : Vec3(Vec3::Zero()));
-  coder.vector(turn.was_applied, before != nullptr ? before->applied : Vec3(Vec3::Zero()));
-  coder.vector(turn.wanted, before != nullptr ? before->wanted : Vec3(Vec3::Zero()));
-  coder.vector(turn.torque, turn.wanted);
-  coder.vector(turn.applied, turn.torque);
+  for (auto* part : {&q.w, &q.x, &q.y, &q.z}) coder.real(*part, 0.0);
+  coder.real(turn.hand.angular_velocity, kNoVector);
+  coder.real(turn.was_applied, kNoVector);
+  coder.real(turn.wanted, kNoVector);
+  coder.real(turn.torque, turn.wanted);
+  coder.real(turn.applied, turn.torque);
 }
 
 template <class GripOf, class Coder>
-void code_grip(GripOf& grip, const GripStep& before, Coder& coder) noexcept {
+void code_grip(GripOf& grip, Coder& coder) noexcept {
   coder.next_section();
-  coder.real(grip.hand.opening, before.hand.opening);
-  coder.real(grip.hand.velocity, before.hand.velocity);
-  coder.real(grip.was_applied, before.applied);
-  coder.real(grip.wanted, before.wanted);
+  coder.real(grip.hand.opening, 0.0);
+  coder.real(grip.hand.velocity, 0.0);
+  coder.real(grip.was_applied, 0.0);
+  coder.real(grip.wanted, 0.0);
   coder.real(grip.force, grip.wanted);
   coder.real(grip.applied, grip.force);
-  coder.real(grip.permitted, before.permitted);
-  coder.real(grip.energy, before.energy);
+  coder.real(grip.permitted, 0.0);
+  coder.real(grip.energy, 0.0);
 }
 
 template <class JointsOf, class Coder>
-void code_joints(JointsOf& joints, const Joints& before, Coder& coder) noexcept {
+void code_joints(JointsOf& joints, Coder& coder) noexcept {
   coder.next_section();
-  coder.whole(joints.count, before.count);
-  for (std::size_t i = 0; i < Joints::kMost; ++i) {
-    coder.real(joints.angle[i], before.angle[i]);
-    coder.real(joints.velocity[i], before.velocity[i]);
-  }
+  coder.whole(joints.count);
+  for (auto& angle : joints.angle) coder.real(angle, 0.0);
+  for (auto& velocity : joints.velocity) coder.real(velocity, 0.0);
 }
 
 template <class Field, class Coder>
-void code_field(Field& field, const FieldStep& before, Coder& coder) noexcept {
+void code_field(Field& field, Coder& coder) noexcept {
   coder.next_section();
-  coder.whole(field.generation, before.generation);
+  coder.whole(field.generation);
   auto place = static_cast<std::uint32_t>(field.channel | (field.swapping ? 256U : 0U));
-  coder.whole(place, static_cast<std::uint32_t>(before.channel | (before.swapping ? 256U : 0U)));
+  coder.whole(place);
   if constexpr (!std::is_const_v<Field>) {
     field.channel = static_cast<std::uint8_t>(place);
     field.swapping = (place & 256U) != 0;
   }
-  coder.real(field.depth, before.depth);
-  coder.vector(field.proxy, before.proxy);
-  coder.vector(field.force, before.force);
-  coder.real(field.stored, before.stored);
-  coder.real(field.refused, before.refused);
-  coder.real(field.credit, before.credit);
+  coder.real(field.depth, 0.0);
+  coder.real(field.proxy, kNoVector);
+  coder.real(field.force, kNoVector);
+  coder.real(field.stored, 0.0);
+  coder.real(field.refused, 0.0);
+  coder.real(field.credit, 0.0);
 }
 
-/// Codes the optional parts, which must exist in `step`.
+/// The order of the values, for both directions. The optional parts must exist.
 template <class Record, class Coder>
-void code_packed_parts(Record& step, const StepRecord& last, std::uint32_t parts, Coder& coder) noexcept {
-  if ((parts & kHandle) != 0) {
-    const HandleStep* const before = last.handle ? &*last.handle : nullptr;
-    auto& handle = *step.handle;
-    if ((parts & kTurn) != 0)
-      code_turn(*handle.turn, before != nullptr && before->turn ? &*before->turn : nullptr, coder);
-    if ((parts & kGrip) != 0)
-      code_grip(*handle.grip, before != nullptr && before->grip ? *before->grip : GripStep{}, coder);
-    if ((parts & kJoints) != 0) {
-      code_joints(*handle.joints, before != nullptr && before->joints ? *before->joints : Joints{}, coder);
-    }
-  }
-  if ((parts & kField) != 0) code_field(*step.field, last.field ? *last.field : FieldStep{}, coder);
-}
-
-void make_packed_parts(StepRecord& step, std::uint32_t parts) noexcept {
-  const auto make = [parts](auto& part, std::uint32_t which) {
-    part.reset();
-    if ((parts & which) != 0) part.emplace();
-  };
-  make(step.hand_force, kHandForce);
-  make(step.force_error, kForceError);
-  make(step.field, kField);
-  make(step.handle, kHandle);
-  step.rearmed = (parts & kRearmed) != 0;
-  step.disarmed = (parts & kIsDisarmed) != 0;
-  if (!step.handle) return;
-  make(step.handle->turn, kTurn);
-  make(step.handle->grip, kGrip);
-  make(step.handle->joints, kJoints);
-}
-
-/// The order of the values, for both directions: a prediction only uses values that were coded before.
-template <class Record, class Coder>
-void code(Record& step, const StepBefore& before, Coder& coder) noexcept {
+void code(Record& step, unsigned parts, StepBefore& before, Coder& coder) noexcept {
   constexpr bool kUnpacks = !std::is_const_v<Record>;
-  const StepRecord& last = before.step;
-  std::uint32_t parts = 0;
-  if constexpr (!kUnpacks) parts = packed_parts(step);
-  coder.whole(parts, packed_parts(last));
-  if constexpr (kUnpacks) make_packed_parts(step, parts);
-
-  coder.whole(step.tick, last.tick + 1);
-  coder.whole(step.scheduled, last.scheduled + before.spacing);
+  coder.whole(step.tick, before.tick + 1);
+  coder.whole(step.scheduled, before.scheduled + before.spacing);
   coder.whole(step.hand.at, step.scheduled);
-  coder.whole(step.held, step.hand.at - last.hand.at);
-  coder.vector(step.hand.position, last.hand.position);
-  coder.vector(step.hand.velocity, last.hand.velocity);
-  coder.vector(step.was_applied, last.applied);
-  if ((parts & kHandForce) != 0) {
-    coder.vector(*step.hand_force, last.hand_force ? *last.hand_force : Vec3(Vec3::Zero()));
-  }
-  coder.vector(step.wanted, last.wanted);
-  coder.vector(step.force, step.wanted);
-  coder.vector(step.applied, step.force);
-  for (int column = 0; column < 3; ++column) {
-    Vec3 stiffness = step.stiffness.col(column);
-    coder.vector(stiffness, last.stiffness.col(column));
-    if constexpr (kUnpacks) step.stiffness.col(column) = stiffness;
-  }
-  coder.real(step.permitted, last.permitted);
-  coder.real(step.energy, last.energy);
-  coder.whole(step.longest_hold, last.longest_hold);
+  coder.whole(step.held, step.hand.at - before.at);
+  coder.real(step.hand.position, kNoVector);
+  coder.real(step.hand.velocity, kNoVector);
+  coder.real(step.was_applied, before.applied);
+  coder.real(step.wanted, kNoVector);
+  coder.real(step.force, step.wanted);
+  coder.real(step.applied, step.force);
+  coder.real(step.permitted, 0.0);
+  coder.real(step.energy, 0.0);
+  coder.whole(step.longest_hold, before.longest_hold);
   std::uint64_t labels = 0;
-  const auto labels_of = [](const StepRecord& of) {
-    return std::uint64_t{of.reasons.bits()} << 16U | std::uint64_t{of.force_way} << 8U |
-           static_cast<std::uint64_t>(of.mode);
-  };
-  if constexpr (!kUnpacks) labels = labels_of(step);
-  coder.whole(labels, labels_of(last));
+  if constexpr (!kUnpacks) {
+    labels = std::uint64_t{step.reasons.bits()} << 16U | std::uint64_t{step.force_way} << 8U |
+             static_cast<std::uint64_t>(step.mode);
+  }
+  coder.whole(labels, before.labels);
   if constexpr (kUnpacks) {
     step.mode = static_cast<Mode>(labels & 255U);
     step.force_way = static_cast<std::uint8_t>(labels >> 8U);
     step.reasons = Reasons::from_bits(static_cast<std::uint32_t>(labels >> 16U));
   }
-  coder.whole(step.channel, last.channel);
-  coder.whole(step.buttons, last.buttons);
-  coder.whole(step.force_sequence, last.force_sequence);
-  coder.whole(step.force_age, last.force_age);
-  coder.whole(step.loop_age, last.loop_age);
-  if ((parts & kForceError) != 0) coder.real(*step.force_error, last.force_error.value_or(0));
-  code_packed_parts(step, last, parts, coder);
+  coder.whole(step.channel);
+  coder.whole(step.buttons);
+  coder.whole(step.force_sequence);
+  coder.whole(step.force_age);
+  coder.whole(step.loop_age);
+
+  before.spacing = step.scheduled - before.scheduled;
+  before.tick = step.tick;
+  before.scheduled = step.scheduled;
+  before.at = step.hand.at;
+  before.applied = step.applied;
+  before.longest_hold = step.longest_hold;
+  before.labels = labels;
+
+  if ((parts & kStiffness) != 0) {
+    coder.real(step.stiffness, before.stiffness);
+    before.stiffness = step.stiffness;
+  }
+  if ((parts & kHandForce) != 0) coder.real(*step.hand_force, kNoVector);
+  if ((parts & kForceError) != 0) coder.real(*step.force_error, 0.0);
+  if ((parts & kTurn) != 0) code_turn(*step.handle->turn, coder);
+  if ((parts & kGrip) != 0) code_grip(*step.handle->grip, coder);
+  if ((parts & kJoints) != 0) code_joints(*step.handle->joints, coder);
+  if ((parts & kField) != 0) code_field(*step.field, coder);
 }
 
 }  // namespace
 
 std::size_t most_packed_bytes(bool handles, bool fields) noexcept {
-  std::size_t most = kMask + 15 * kMostOfNumber + 10 * kMostOfVector;
-  if (handles) most += 3 * kMask + (4 + 8 + 1 + 2 * Joints::kMost) * kMostOfNumber + 5 * kMostOfVector;
-  if (fields) most += kMask + 6 * kMostOfNumber + 2 * kMostOfVector;
+  std::size_t most = kMask + 14 * kNumber + 7 * kVector + kMatrix;
+  if (handles) most += 3 * kMask + (4 + 8 + 1 + 2 * Joints::kMost) * kNumber + 5 * kVector;
+  if (fields) most += kMask + 6 * kNumber + 2 * kVector;
   return most;
 }
 
-std::byte* pack_step(const StepRecord& step, const StepBefore& before, std::byte* to) noexcept {
-  Packer packer(to);
-  code(step, before, packer);
+std::byte* pack_step(const StepRecord& step, StepBefore& before, std::byte* to) noexcept {
+  const unsigned parts = packed_parts(step);
+  Packer packer(to, parts);
+  code(step, parts, before, packer);
   return packer.end();
 }
 
-const std::byte* unpack_step(const std::byte* from, const StepBefore& before, StepRecord& step) noexcept {
+const std::byte* unpack_step(const std::byte* from, StepBefore& before, StepRecord& step) noexcept {
   Unpacker unpacker(from);
-  code(step, before, unpacker);
+  make_packed_parts(step, unpacker.parts());
+  code(step, unpacker.parts(), before, unpacker);
   return unpacker.end();
 }
 

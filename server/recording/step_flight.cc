@@ -12,9 +12,8 @@ namespace tendon {
 namespace {
 
 constexpr std::size_t kChunk = 4096;  ///< bytes, one page
-/// Number of chunks to load in advance. Half of them hold 40 steps without a handle.
+/// Number of chunks to load in advance. Half of them hold 40 of the largest steps without a handle.
 constexpr std::size_t kAhead = 8;
-constexpr std::size_t kOverwritten = 7;  ///< bytes after a packed step
 constexpr std::size_t kMostSteps = 65536;
 
 std::byte* reserve(std::size_t bytes) {
@@ -39,7 +38,7 @@ StepFlight::StepFlight(std::size_t capacity, bool handles, bool fields)
     : capacity_(capacity),
       handles_(handles),
       fields_(fields),
-      most_(most_packed_bytes(handles, fields) + kOverwritten),
+      most_(most_packed_bytes(handles, fields)),
       chunks_(chunks_for(capacity, most_)),
       memory_(reserve(chunks_ * kChunk), Unmap{chunks_ * kChunk}),
       first_(chunks_),
@@ -89,7 +88,6 @@ void StepFlight::record(const StepRecord& step) noexcept {
   if ((step.handle && !handles_) || (step.field && !fields_)) return record_without(step);
   if (static_cast<std::size_t>(end_ - at_) < most_) begin_chunk();
   at_ = pack_step(step, before_, at_);
-  before_.now(step);
   ++count_;
 }
 
@@ -116,7 +114,6 @@ StepRecord StepFlight::operator[](std::size_t i) const noexcept {
     StepRecord step;
     at = unpack_step(at, before, step);
     if (of == number) return step;
-    before.now(step);
   }
 }
 
