@@ -37,6 +37,7 @@
 #include "server/commands/explain.h"
 #include "server/machine/clock.h"
 #include "server/machine/log.h"
+#include "server/machine/out_of_memory.h"
 #include "server/machine/output.h"
 #include "server/machine/randomness.h"
 #include "server/machine/realtime.h"
@@ -432,19 +433,18 @@ int make_key(const std::string& name, const std::string& file, bool observer) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  exit_when_out_of_memory();
   CLI::App app(
-      "Run the haptics server. It runs the control loop and the output limiter next to the device, and receives "
-      "forces\n"
-      "from remote physics engines over UDP.\n",
+      "Run the haptics server. It runs the control loop and the output limiter next to the device, and receives\n"
+      "forces from remote physics engines over UDP.\n",
       "tendond");
   usage::dress(app);
   app.footer(
       "Examples:\n"
       "  tendond deploy/scenes/demo.toml --record run.mcap\n"
       "  tendond deploy/scenes/left.toml deploy/scenes/right.toml\n\n"
-      "The second example runs two devices. [network] and [recording] are only allowed in the first scene. Use "
-      "[device]\n"
-      "count = 512 in a scene for many simulated devices.\n\n"
+      "The second example runs two devices. [network] and [recording] are only allowed in the first scene. Use\n"
+      "[device] count = 512 in a scene for many simulated devices.\n\n"
       "Files:\n"
       "  /etc/tendon/scene.toml     scene of the service tendond\n"
       "  /usr/share/tendon/scenes   example scenes\n\n"
@@ -590,7 +590,7 @@ int main(int argc, char** argv) {
     log::error(problem.what());
     return kWrongUsage;
   } catch (const std::bad_alloc&) {
-    log::error("out of memory; check the limit in `ulimit -v`");
+    say_out_of_memory();
     return kFailed;
   } catch (const std::exception& problem) {
     log::error(problem.what());

@@ -368,7 +368,7 @@ TEST(ExitCodes, TooLittleMemoryIsSaidInASentence) {
            {"tendond", demo_scene().string() + " --listen 127.0.0.1:0 --record none.mcap --duration-s 0.1"},
            {"tendon-report", run},
            {"tendon-replay", run}}) {
-    for (const int limit_mb : {10, 15, 20, 25, 30, 40, 60}) {
+    for (const int limit_mb : {10, 15, 20, 25, 27, 28, 29, 30, 31, 32, 33, 35, 40, 60}) {
       SCOPED_TRACE(name + " with " + std::to_string(limit_mb) + " MB");
       std::filesystem::remove(folder.path() / "none.mcap");
       Process process(
