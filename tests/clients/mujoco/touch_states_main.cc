@@ -22,7 +22,7 @@ double processor_us() {
 
 }  // namespace
 
-int run(const Options&, Physics physics) {
+int run(const Options&, Physics physics) {  // NOLINT(performance-unnecessary-value-param): as in run.h
   double t = 0;
   Vec3 x;
   Quat q;
