@@ -23,7 +23,9 @@ TEST(Engines, TheForcesOfTwoAddUpOnOneDevice) {
   const ScratchFolder folder;
   const auto scene = folder.path() / "device.toml";
   write(scene, std::string(kPressingHand) + "[[channel]]\nname = \"one\"\n[[channel]]\nname = \"two\"\n");
-  Server server(folder.path(), scene);
+  // An overrun of a busy machine takes energy from the account of the limiter, which then bounds the force on a hand at
+  // rest.
+  Server server(folder.path(), scene, {"--without-limiter"});
   Client echo("echo_motion", server.address(), folder.path(), {"--json"});
   Client one("virtual_wall", server.address(), folder.path(), {"--stiffness-n-per-m", "150"});
   wait_until_felt(echo, 0.3);
