@@ -97,7 +97,7 @@ struct Mailboxes {
   struct Capacities {
     std::size_t steps = 16384;  ///< 16 s at 1 kHz, for slow disks
     std::size_t ports = 1;      ///< for each coupling
-    std::size_t flight = 2048;  ///< steps before a fault, 2 s at 1 kHz
+    std::size_t flight = 2048;  ///< the size of `flight`: 2 s at 1 kHz
     std::size_t datagrams = 4096;
     std::size_t channels = limits::kMaxChannels;  ///< `forces`
     std::size_t couplings = Shares::kMost;        ///< `port_in` and `port_out`
@@ -113,8 +113,7 @@ struct Mailboxes {
       return {.steps = std::bit_floor(share), .ports = std::bit_floor(share)};
     }
 
-    /// For more than 128 devices, the total number of steps before a fault is the same as for 128. For example, each of
-    /// 512 devices keeps half a second at 1 kHz.
+    /// Returns the size of `flight`. More than 128 devices share the memory of 128, so 512 devices keep half a second.
     static std::size_t flight_of(std::size_t devices) {
       constexpr std::size_t kMostDevices = 128;
       return Capacities{}.flight * kMostDevices / std::max(devices, kMostDevices);

@@ -3,8 +3,8 @@
 
 namespace tendon {
 
-/// If no memory can be allocated in any thread, prints the reason and exits with status 1. std::bad_alloc could not always
-/// be caught, because glibc needs memory if an exception passes through pthread_once.
+/// Makes `new` print a message and exit with status 1 if there is no memory, in all threads. An exception would need
+/// memory itself to pass through pthread_once.
 void exit_when_out_of_memory();
 
 /// Prints the reason, for memory that is not allocated by `new`.

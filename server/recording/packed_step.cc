@@ -2,7 +2,6 @@
 #include "server/recording/packed_step.h"
 
 #include <array>
-#include <bit>
 #include <cstdint>
 #include <cstring>
 #include <type_traits>
@@ -10,8 +9,8 @@
 namespace tendon {
 namespace {
 
-// The sections are step, turn, grip, joints and field. A section begins with a mask, followed by the values that were not
-// predicted. A whole number has two bits in the mask and needs 4 or 8 bytes, and a real number needs 8.
+// The sections are step, turn, grip, joints and field. Each starts with a mask. The prediction was wrong for the values
+// that follow. Whole numbers take 4 or 8 bytes and two bits of the mask. Real numbers take 8 bytes.
 constexpr std::size_t kMask = sizeof(std::uint64_t);
 constexpr std::size_t kNumber = 8;
 constexpr std::size_t kVector = 3 * 8;

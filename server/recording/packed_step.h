@@ -7,8 +7,8 @@
 
 namespace tendon {
 
-/// The values of the previous steps that predict the next one. Use a default object for the first step of a chunk. The
-/// haptic thread loads this memory in each step of each device, so it only contains what saves most.
+/// The prediction of the next step. Use a default object for the first step of a chunk. Keep this small: the haptic
+/// thread loads it for each device in each step.
 struct StepBefore {
   std::uint64_t tick = 0;
   LocalTime scheduled{};
@@ -17,14 +17,14 @@ struct StepBefore {
   Vec3 applied = Vec3::Zero();
   Duration longest_hold{};
   std::uint64_t labels = 0;       ///< reasons, force_way and mode
-  Mat3 stiffness = Mat3::Zero();  ///< the last one that was not zero
+  Mat3 stiffness = Mat3::Zero();  ///< the last nonzero matrix
 };
 
 /// Returns the maximum size of a packed step.
 std::size_t most_packed_bytes(bool handles, bool fields) noexcept;
 
-/// Stores a step without loss, and updates `before`. If the device only measures its position, a step needs about 110
-/// bytes instead of 368, and 60 without a force. Returns the end of the packed step.
+/// Stores a step without loss, and updates `before`. A step of a position needs about 110 bytes, or 60 without a force.
+/// `to` must have `most_packed_bytes`. Returns the end of the packed step.
 /// Thread-safe: yes. Realtime-safe: yes.
 std::byte* pack_step(const StepRecord& step, StepBefore& before, std::byte* to) noexcept;
 

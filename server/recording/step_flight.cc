@@ -12,7 +12,7 @@ namespace tendon {
 namespace {
 
 constexpr std::size_t kChunk = 4096;  ///< bytes, one page
-/// Number of chunks to load in advance. Half of them hold 40 of the largest steps without a handle.
+/// Number of chunks to load in advance. Half of them hold 40 steps without a handle.
 constexpr std::size_t kAhead = 8;
 constexpr std::size_t kMostSteps = 65536;
 

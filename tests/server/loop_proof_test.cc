@@ -31,7 +31,7 @@ TEST_F(LoopProof, APointsStepIsHardlySlowerAndAWholeHandleCostsTwoAndAHalf) {
             << " before there were handles), of a "
             << "handle that turns and grips " << handle << ": " << handle / point << " times as many; of a point "
             << "with three joints " << jointed << "\n";
-  // The velocity estimate is cheaper than before, and packing the steps before a fault (StepFlight) adds 490.
+  // The velocity estimate is cheaper than before, and packing the steps before a fault (StepFlight) adds 240.
   EXPECT_LT(point, 0.98 * kBeforeHandles);
   EXPECT_GT(point, 0.5 * kBeforeHandles) << "this is no step";
   EXPECT_LT(handle, 2.6 * point);
